@@ -2,7 +2,16 @@
 
 from __future__ import annotations
 
-from labctl.exports.format import Format
-from labctl.exports.registry import FORMATS, export_calibration, export_formats
+from labctl.exports.format import Format, Loss, Written
+from labctl.exports.registry import FORMATS, export_calibration, export_formats, format_named, written_calibration
 
-__all__ = ["FORMATS", "Format", "export_calibration", "export_formats"]
+__all__ = [
+    "FORMATS",
+    "Format",
+    "Loss",
+    "Written",
+    "export_calibration",
+    "export_formats",
+    "format_named",
+    "written_calibration",
+]

@@ -11,6 +11,7 @@ from labctl.calibration import Calibration
 from labctl.compensator import MARGIN_C, output_limits_dps
 from labctl.errors import BadInput
 from labctl.exports.c_memory import memory_body
+from labctl.exports.c_orientation import orientation_body
 from labctl.exports.c_sine import sine_body
 from labctl.exports.c_tables import c_table
 from labctl.exports.format import Format
@@ -172,7 +173,7 @@ def c_header(calibration: Calibration) -> bytes:
     elif linear is not None:
         body = _linear(name, linear, calibration.temperature_c)
     elif sine is not None:
-        body = sine_body(name, sine, *_nodes(sine.linear, calibration.temperature_c))
+        body = sine_body(name, sine, *temperature_nodes(sine.linear, calibration.temperature_c))
     else:
         effects = fitted.model.effect_ids
         blocking = [effect for effect in effects if effect not in LINEAR_EFFECTS | {SINE}] or effects
@@ -182,7 +183,7 @@ def c_header(calibration: Calibration) -> bytes:
         )
     if memory is not None:
         body += memory_body(name, memory, is_direct=fitted.model.argument == "output")
-    return (_head(name, calibration) + body + TAIL).encode()
+    return (_head(name, calibration) + body + orientation_body(name) + TAIL).encode()
 
 
 def _head(name: str, calibration: Calibration) -> str:
@@ -233,7 +234,7 @@ def _surface(name: str, surface: Surface) -> str:
     )
 
 
-def _nodes(linear: Linear, span_c: tuple[float, float]) -> tuple[Array, int]:
+def temperature_nodes(linear: Linear, span_c: tuple[float, float]) -> tuple[Array, int]:
     """Return the temperatures (n,) at which a model is tabulated, and over how many of them it is interpolated."""
     basis = linear.fitted.model.temperature
     if isinstance(basis, LagrangeTable) and not any("temperature" in e for e in linear.fitted.model.effect_ids):
@@ -245,7 +246,7 @@ def _nodes(linear: Linear, span_c: tuple[float, float]) -> tuple[Array, int]:
 
 
 def _linear(name: str, linear: Linear, span_c: tuple[float, float]) -> str:
-    nodes, points = _nodes(linear, span_c)
+    nodes, points = temperature_nodes(linear, span_c)
     k, b = linear.k_and_b(nodes)
     return LINEAR.format(
         name=name,

@@ -2,17 +2,57 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 
-from labctl.calibration import Calibration
+#: Digits of a size that is said; it is rounded up.
+DIGITS = 3
+
+
+def at_most(size: float) -> float:
+    """Return a size rounded up to three digits, so that it stays a bound."""
+    if size <= 0 or not math.isfinite(size):
+        return size
+    step = 10.0 ** (math.floor(math.log10(size)) + 1 - DIGITS)
+    return float(f"{math.ceil(size / step * (1 - 1e-12)) * step:.{DIGITS}g}")
+
+
+@dataclass(frozen=True)
+class Loss:
+    """What a format does not carry of a calibration, and its largest size over the calibrated range."""
+
+    what: str
+    size: float | None = None  #: None: it is not known, or has none
+    unit: str = "deg/s"
+
+    @property
+    def text(self) -> str:
+        """One line, plain ASCII."""
+        return self.what if self.size is None else f"{self.what}: up to {at_most(self.size):.3g} {self.unit}"
+
+
+@dataclass(frozen=True)
+class Written:
+    """A file, what it lost, and how far its consumer's formula is from labctl's in what it carries, deg/s."""
+
+    content: bytes
+    losses: tuple[Loss, ...] = ()
+    differs_dps: float | None = None
 
 
 @dataclass(frozen=True)
 class Format:
-    """A consumer's format: its title on a page, and the suffix of its files."""
+    """A consumer's format: its title on a page, and the suffix of its files.
+
+    `write` gets the calibration, and as second argument the options (name -> text) where the format has any; it raises
+    BadInput for what the format cannot express. One with `needs_noise` gets the options `noise_dps_rthz` and
+    `walk_dps_s_rthz` from the unit's Allan deviation where the user gives none.
+    """
 
     title: str
     media_type: str
     suffix: str
-    write: Callable[[Calibration], bytes]  #: raises BadInput for a model that the format cannot express
+    write: Callable[..., bytes | Written]
+    options: Mapping[str, str] = field(default_factory=dict)  #: name -> what it is, its unit and default
+    needs_noise: bool = False

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from instruments.plugins import PluginError, PluginGroup, failure, instance_of
 from labctl.calibration import read_calibration
 from labctl.errors import BadInput, LabctlError
-from labctl.exports.format import Format
+from labctl.exports.format import Format, Written
 
 FORMATS: PluginGroup[Format] = PluginGroup("labctl.exports", "export format", instance_of(Format))
 #: The calibration file itself.
@@ -17,16 +19,32 @@ def export_formats() -> dict[str, Format]:
     return dict(sorted(FORMATS.all().items(), key=lambda each: each[0] != FIRST))
 
 
-def export_calibration(document: bytes, format_name: str) -> tuple[bytes, str]:
-    """Return a calibration in a format, and its media type; raises BadInput for one that cannot be used."""
+def format_named(format_name: str) -> Format:
+    """Return a format; raises BadInput for one that cannot be used."""
     try:
-        chosen = FORMATS.get(format_name)
+        return FORMATS.get(format_name)
     except PluginError as error:
         raise BadInput(f"format {format_name!r} is not known: {error}") from error
+
+
+def export_calibration(document: bytes, format_name: str) -> tuple[bytes, str]:
+    """Return a calibration in a format, and its media type; raises BadInput for one that cannot be used."""
+    return written_calibration(document, format_name).content, format_named(format_name).media_type
+
+
+def written_calibration(document: bytes, format_name: str, options: Mapping[str, str] | None = None) -> Written:
+    """Return a calibration in a format with what was lost; raises BadInput for a format or option that is not known."""
+    chosen = format_named(format_name)
+    given = dict(options or {})
+    unknown = sorted(set(given) - set(chosen.options))
+    if unknown:
+        known = ", ".join(chosen.options) or "none"
+        raise BadInput(f"format {format_name}: option {unknown[0]!r} is not known; options of this format: {known}")
     calibration = read_calibration(document)
     try:
-        return chosen.write(calibration), chosen.media_type
+        found = chosen.write(calibration, given) if chosen.options else chosen.write(calibration)
     except LabctlError:
         raise
     except Exception as error:
         raise BadInput(failure(FORMATS.plugin(format_name), "write this calibration", error)) from error
+    return found if isinstance(found, Written) else Written(found)

@@ -1,0 +1,36 @@
+"""The comment lines at the head of a text file: which calibration, how far off, what was lost."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from labctl.calibration import Calibration
+from labctl.exports.format import Loss, at_most
+
+
+def plain(text: str) -> str:
+    """Return text that ends no line: printable ASCII."""
+    return "".join(char if char.isascii() and char.isprintable() else "?" for char in text)
+
+
+def head_lines(
+    calibration: Calibration, carries: str, differs_dps: float | None, losses: Iterable[Loss], notes: Iterable[str] = ()
+) -> list[str]:
+    """Return the lines, without the sign that begins a comment."""
+    (low, high), (slow, fast) = calibration.temperature_c, calibration.rate_dps
+    unit, model = plain(calibration.serial), plain(calibration.fitted.model.name)
+    lines = [
+        f"Gyro {unit}, calibration version {calibration.version}: model {model}",
+        f"Hash of the calibration: {calibration.hash}",
+        f"Calibrated from {low:g} to {high:g} deg C and from {slow:g} to {fast:g} deg/s.",
+        f"Carries: {carries}.",
+    ]
+    if differs_dps is not None:
+        lines.append(f"Differs from the calibration in what it carries by at most {at_most(differs_dps):.3g} deg/s.")
+    lines += [f"LOST {loss.text}." for loss in losses]
+    return lines + list(notes)
+
+
+def commented(lines: Iterable[str], sign: str = "# ") -> str:
+    """Return lines as comments, each ended."""
+    return "".join(f"{sign}{line}".rstrip() + "\n" for line in lines)

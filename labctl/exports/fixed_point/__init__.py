@@ -1,0 +1,1 @@
+"""Calibrations in whole numbers, for processors without floating point."""

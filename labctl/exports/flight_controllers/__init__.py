@@ -1,0 +1,1 @@
+"""Parameters of flight controllers: the bias of a gyro over temperature."""

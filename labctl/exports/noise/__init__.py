@@ -1,0 +1,1 @@
+"""Noise of a gyro for estimators that correct nothing by it."""

@@ -1,0 +1,22 @@
+"""The size of a calibration's correction, for formats that do not carry it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from labctl.calibration import Calibration
+from labctl.errors import BadInput
+from labctl.exports.format import Loss
+from labctl.exports.static_part import differences, static_part
+
+
+def correction_losses(calibration: Calibration, why: str) -> tuple[Loss, ...]:
+    """Return the whole correction as what is lost, with its size where it depends on output and temperature alone."""
+    what = f"the correction of bias, scale factor and misalignment ({why})"
+    if not np.isfinite(calibration.temperature_c).all():
+        return (Loss(what),)
+    try:
+        part = static_part(calibration, "", carries="")
+    except BadInput:
+        return (Loss(what),)
+    return (Loss(what, differences(part, lambda raw, _: raw).together),)

@@ -1,0 +1,143 @@
+"""Source of the functions in a Python module that a calibration becomes; `{` and `}` are doubled where it is formatted.
+
+The same numbers as the C header's, by the same steps: Horner's scheme, or Lagrange interpolation and Newton's method.
+"""
+
+from __future__ import annotations
+
+OPENING = '''"""Correct the output of one gyro. Needs nothing but Python.
+
+{head}
+
+    rates_dps, is_outside = correct(outputs_dps, temperature_c)
+
+outputs_dps: one number for each axis of CALIBRATION["axes"], the output as a rate in deg/s: (output - offset) / scale
+by CALIBRATION["output"]. Outside the calibrated range the error at its edge is taken off and is_outside is True.
+"""
+
+import math
+
+CALIBRATION = {data}
+
+
+def _held(value, low, high):
+    if low is not None and value < low:
+        return low
+    return high if high is not None and value > high else value
+
+
+def _within(value, low, high):
+    return value == value and (low is None or value >= low) and (high is None or value <= high)
+
+
+def correct(outputs_dps, temperature_c):
+    """Return the corrected rates, deg/s, and whether output or temperature was outside the calibrated range."""
+    known = CALIBRATION
+    outputs = [float(value) for value in outputs_dps]
+    if len(outputs) != len(known["axes"]):
+        raise ValueError("give one output for each axis: " + ", ".join(known["axes"]))
+    warm = 0.0 if temperature_c is None and known["temperature_c"][0] is None else float(temperature_c)
+    is_outside = not _within(warm, *known["inside_c"])
+    is_outside = is_outside or not all(_within(value, *known["output_dps"]) for value in outputs)
+    held = [_held(value, *known["output_dps"]) for value in outputs]
+    rates = _solved(held, _held(warm, *known["temperature_c"]))
+    return [rate + (value - at) for rate, value, at in zip(rates, outputs, held)], is_outside
+'''
+
+SURFACE_CORRECTION = '''
+
+def _solved(outputs, warm):
+    """error = sum of c[i][j] output^i (temperature - reference_c)^j; rate = output - error."""
+    u, rates = warm - CALIBRATION["reference_c"], []
+    for output, powers in zip(outputs, CALIBRATION["c"]):
+        error = 0.0
+        for row in reversed(powers):
+            value = 0.0
+            for coefficient in reversed(row):
+                value = value * u + coefficient
+            error = error * output + value
+        rates.append(output - error)
+    return rates
+'''
+
+LINEAR_CORRECTION = '''
+
+def _weights(warm):
+    """Lagrange weights of the nodes of temperature that the value is interpolated between: (first node, weights)."""
+    nodes, points = CALIBRATION["node_c"], CALIBRATION["points"]
+    last = points - 1
+    while last < len(nodes) - 1 and warm > nodes[last]:
+        last += 1
+    first = last - points + 1
+    used = nodes[first:last + 1]
+    weights = []
+    for i, at in enumerate(used):
+        weight = 1.0
+        for j, other in enumerate(used):
+            if j != i:
+                weight *= (warm - other) / (at - other)
+        weights.append(weight)
+    return first, weights
+
+
+def _solved(outputs, warm):
+    """output = K rate + B + (sin(c rate) / c - rate) with c^2 = k_squared, 0 for none; solved by Newton's method."""
+    first, weights = _weights(warm)
+    axes = range(len(outputs))
+
+    def at(name, *place):
+        total = 0.0
+        for weight, value in zip(weights, CALIBRATION[name][first:]):
+            for index in place:
+                value = value[index]
+            total += weight * value
+        return total
+
+    b, squared = [at("b", a) for a in axes], [at("k_squared", a) for a in axes]
+    k = [[at("k", a, other) for other in axes] for a in axes]
+    rates = [_begun(outputs[a] - b[a], squared[a]) for a in axes]
+    for _ in range(CALIBRATION["steps"]):
+        rows = []
+        for a in axes:
+            sine, slope = _sine(rates[a], squared[a])
+            left = b[a] + sine - rates[a] - outputs[a] + sum(k[a][other] * rates[other] for other in axes)
+            row = [k[a][other] for other in axes]
+            row[a] += max(slope, 1 - CALIBRATION["followed"]) - 1
+            rows.append([*row, left])
+        rates = [rate - step for rate, step in zip(rates, _eliminated(rows))]
+    return rates
+
+
+def _begun(output, squared):
+    if squared == 0:
+        return output
+    root, most = math.sqrt(max(abs(squared), 1e-12)), CALIBRATION["followed"]
+    phase = root * math.radians(output)
+    return math.degrees(math.asin(min(max(phase, -most), most)) if squared > 0 else math.asinh(phase)) / root
+
+
+def _sine(rate, squared):
+    """Return sin(c rate) / c, deg/s, and its slope."""
+    turned, root = math.radians(rate), math.sqrt(abs(squared))
+    phase = root * turned
+    if not phase * phase >= 1e-6:  # also not a number
+        return rate * (1 - squared * turned * turned / 6), 1 - squared * turned * turned / 2
+    if squared > 0:
+        return math.degrees(math.sin(phase)) / root, math.cos(phase)
+    return math.degrees(math.sinh(phase)) / root, math.cosh(phase)
+
+
+def _eliminated(rows):
+    """Solve equations [coefficients ..., right side] by Gaussian elimination with pivoting."""
+    n = len(rows)
+    for c in range(n):
+        pivot = max(range(c, n), key=lambda r: abs(rows[r][c]))
+        rows[c], rows[pivot] = rows[pivot], rows[c]
+        for r in range(c + 1, n):
+            factor = rows[r][c] / rows[c][c]
+            rows[r] = [a - factor * b for a, b in zip(rows[r], rows[c])]
+    found = [0.0] * n
+    for r in reversed(range(n)):
+        found[r] = (rows[r][n] - sum(rows[r][c] * found[c] for c in range(r + 1, n))) / rows[r][r]
+    return found
+'''

@@ -1,0 +1,151 @@
+"""What a calibration does to output and temperature alone, and how far another formula is from it."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from labctl.calibration import Calibration
+from labctl.compensator import correction
+from labctl.errors import BadInput
+from labctl.exports.format import Loss
+from labctl.fitting.models.memory import Memory, split_memory
+from labctl.fitting.numeric.arrays import Array
+
+#: Points of a range at which a difference is looked for.
+RATES, TEMPERATURES = 41, 81
+#: Outputs of each axis and temperatures at which all axes turn at once.
+CORNERS, CORNER_TEMPERATURES = 5, 21
+NEWTON_STEPS, SLOPE_STEP_DPS = 4, 1.0
+#: The loss of a lag is said for this change of temperature, K/min.
+WARMING_K_MIN = 1.0
+
+
+@dataclass(frozen=True)
+class StaticPart:
+    """A calibration without lag and hysteresis: corrected rates of outputs (n, axes) at temperatures (n,)."""
+
+    calibration: Calibration
+    rate: Callable[[Array, Array], Array]
+    memory: Memory | None
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """The axes that are corrected."""
+        return self.calibration.axes
+
+    @property
+    def has_rates(self) -> bool:
+        """Whether a range of rates was calibrated; not where the model is a bias alone."""
+        return bool(np.isfinite(self.calibration.rate_dps).all())
+
+    def temperatures(self, n: int = TEMPERATURES) -> Array:
+        """Return n temperatures from end to end, (n,) deg C; raises BadInput where none was calibrated."""
+        return np.linspace(*self.calibration.temperature_c, n)
+
+    def outputs(self, n: int = RATES) -> Array:
+        """Return n outputs of one axis from end to end of the calibrated rates, (n,) deg/s; one, 0, without rates."""
+        return np.linspace(*self.calibration.rate_dps, n) if self.has_rates else np.zeros(1)
+
+    def bias_dps(self, temperature_c: Array) -> Array:
+        """Return the output at true rate 0, (n, axes) deg/s, by Newton's method on the correction."""
+        n, axes = len(temperature_c), len(self.axes)
+        found = np.zeros((n, axes))
+        for _ in range(NEWTON_STEPS):
+            left = self.rate(found, temperature_c)
+            slope = np.empty((n, axes, axes))
+            for column in range(axes):
+                moved = found.copy()
+                moved[:, column] += SLOPE_STEP_DPS
+                slope[:, :, column] = (self.rate(moved, temperature_c) - left) / SLOPE_STEP_DPS
+            found = found - np.linalg.solve(slope, left[:, :, None])[:, :, 0]
+        return found
+
+    def memory_losses(self) -> tuple[Loss, ...]:
+        """Return what is lost where lag and hysteresis are not carried."""
+        return follower_losses(self.memory)
+
+
+def follower_losses(memory: Memory | None) -> tuple[Loss, ...]:
+    """Return what is lost where a memory, if there is one, is not carried."""
+    found: dict[str, float] = {}
+    for each in memory.followers if memory is not None else ():
+        size = float(np.abs(each.size).max())
+        if each.kind == "play":
+            what = "hysteresis of the bias"
+        else:
+            what, size = (
+                f"thermal lag of the bias, at {WARMING_K_MIN:g} K/min",
+                size * each.parameter / 60 * WARMING_K_MIN,
+            )
+        found[what] = found.get(what, 0.0) + size
+    return tuple(Loss(what, size) for what, size in found.items())
+
+
+def static_part(calibration: Calibration, format_name: str, *, carries: str) -> StaticPart:
+    """Return the part that a format of output and temperature can carry; raises BadInput where there is none.
+
+    `carries` is what the format has, and ends the message.
+    """
+    rest, memory = split_memory(calibration.fitted, calibration.axes)
+    if rest.model.needs:
+        raise BadInput(
+            f"format {format_name}: model {rest.model.name} needs {', '.join(rest.model.needs)} beside output and "
+            f"temperature; {carries}; use the JSON file with labctl's Compensator"
+        )
+    law = correction(rest, calibration.axes)
+    return StaticPart(calibration, lambda raw, warm: law(raw, warm, {}), memory)
+
+
+def needs_thermometer(calibration: Calibration, format_name: str, advice: str) -> None:
+    """Raise BadInput for a calibration that was made without a thermometer."""
+    if not np.isfinite(calibration.temperature_c).all():
+        raise BadInput(f"format {format_name}: {calibration.serial} was calibrated without a thermometer; {advice}")
+
+
+@dataclass(frozen=True)
+class Differences:
+    """How far a formula is from a calibration over its whole range, deg/s, (axes,) each."""
+
+    at_rest: Array  #: at true rate 0
+    own: Array  #: while the axis itself turns
+    cross: Array  #: by the other axes' rates, all of them together
+    corners: Array  #: while all axes turn at once
+
+    @property
+    def together(self) -> float:
+        """The largest, at all rates of all axes together."""
+        return float(np.maximum(np.maximum(self.own, self.at_rest) + self.cross, self.corners).max())
+
+
+def differences(part: StaticPart, formula: Callable[[Array, Array], Array]) -> Differences:
+    """Compare corrected rates by a formula, (n, axes) of outputs (n, axes) and temperatures (n,), with a calibration's.
+
+    One axis turns at a time, through its calibrated rates; what several do at once is the sum in models whose axes act
+    through a matrix, and is evaluated in the corners of the range for the others.
+    """
+    axes = len(part.axes)
+    dense_c = part.temperatures(1 + 8 * (TEMPERATURES - 1))
+    still = part.bias_dps(dense_c)
+    at_rest = np.abs(formula(still, dense_c) - part.rate(still, dense_c)).max(axis=0)
+    warm = np.repeat(part.temperatures(), len(part.outputs()))
+    base = np.repeat(still[::8], len(part.outputs()), axis=0)
+    apart = np.zeros((axes, axes))
+    for turning in range(axes):
+        raw = base.copy()
+        raw[:, turning] = np.tile(part.outputs(), TEMPERATURES)
+        apart[:, turning] = np.abs(formula(raw, warm) - part.rate(raw, warm)).max(axis=0)
+    own = np.maximum(np.diag(apart), at_rest)
+    raw, warm = all_turning(part)
+    corners = np.abs(formula(raw, warm) - part.rate(raw, warm)).max(axis=0)
+    return Differences(at_rest, own, apart.sum(axis=1) - np.diag(apart), corners)
+
+
+def all_turning(part: StaticPart) -> tuple[Array, Array]:
+    """Return outputs (n, axes) and temperatures (n,) of all axes turning at once: a coarse grid with its corners."""
+    corners = np.array(list(itertools.product(part.outputs(CORNERS), repeat=len(part.axes))))
+    at = part.temperatures(CORNER_TEMPERATURES)
+    return np.repeat(corners, len(at), axis=0), np.tile(at, len(corners))

@@ -1,0 +1,129 @@
+"""The Q31 header: compiled, it gives bit by bit what was measured when it was written; so does a Cortex-M4."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from labctl.calibration import Calibration
+from labctl.compensator import Compensator
+from labctl.exports import export_calibration
+from labctl.exports.c_header import c_name
+from labctl.exports.fixed_point.whole_numbers import fixed_point
+from labctl.exports.static_part import static_part
+from tests.helpers.cortex_m import INSTRUCTIONS_PER_TICK, TICKS, on_cortex_m
+from tests.helpers.exported import exported, stated, whole_range
+
+STRICT = ["-std=c99", "-O1", "-Wall", "-Wextra", "-pedantic", "-Wconversion", "-Werror"]
+MAIN = """
+#include <stdio.h>
+#include "calibration.h"
+int main(void) {{
+    int32_t w[{axes}], rate[{axes}]; int t, a, in;
+    while (scanf("%d", &t) == 1) {{
+        for (a = 0; a < {axes}; a++) {{ if (scanf("%d", &in) != 1) return 1; w[a] = in; }}
+        printf("%d", {name}_q31_correct(w, t, rate));
+        for (a = 0; a < {axes}; a++) printf(" %d", (int)rate[a]);
+        printf("\\n");
+    }}
+    return 0;
+}}
+"""
+
+
+def compiled(folder: Path, calibration: Calibration, rows: np.ndarray) -> np.ndarray:
+    """Return flag and rates, (n, 1 + axes), of rows of temperature and outputs in whole numbers."""
+    compiler = shutil.which("cc")
+    assert compiler is not None
+    (folder / "calibration.h").write_bytes(export_calibration(calibration.to_bytes(), "c-q31")[0])
+    (folder / "main.c").write_text(MAIN.format(axes=len(calibration.axes), name=c_name(calibration.serial)))
+    subprocess.run([compiler, *STRICT, "main.c", "-o", "main"], cwd=folder, check=True, capture_output=True)
+    given = "\n".join(" ".join(map(str, row)) for row in rows.tolist())
+    said = subprocess.run([folder / "main"], input=given, text=True, check=True, capture_output=True).stdout
+    return np.array([[int(word) for word in line.split()] for line in said.splitlines()])
+
+
+@pytest.mark.needs_cc
+def test_the_code_gives_the_stated_numbers_bit_by_bit(any_calibration: Calibration, tmp_path: Path) -> None:
+    text, _ = exported(any_calibration, "c-q31")
+    fixed = fixed_point(static_part(any_calibration, "c-q31", carries=""), 65, "c-q31")
+    raw, warm = whole_range(any_calibration)
+    inputs, hot = fixed.as_q31(raw), np.rint(warm * 65536).astype(np.int64)
+    inside = len(inputs)
+    ends = [2**31 - 1, -(2**31), 0, 1]
+    inputs = np.vstack([inputs, np.repeat(np.array(ends)[:, None], inputs.shape[1], axis=1)])
+    hot = np.append(hot, [2**31 - 1, -(2**31), 2**31 - 1, -(2**31)])
+    found = compiled(tmp_path, any_calibration, np.column_stack([hot, inputs]))
+    rates, outside = fixed.corrected(inputs, hot)
+    assert np.array_equal(found[:, 1:], rates)
+    assert np.array_equal(found[:, 0].astype(bool), outside)
+    assert not outside[:inside].any()
+    assert outside[inside:].all()
+    apart = (
+        found[:inside, 1:] * fixed.full_scale_dps / 2**31 - Compensator(any_calibration).compensate(raw, warm).rate_dps
+    )
+    assert np.abs(apart).max() <= stated(text, "Differs from the calibration in what it carries")
+
+
+def test_the_tables_are_nearer_with_more_temperatures(mems: Calibration) -> None:
+    sizes = [exported(mems, "c-q31", temperatures=n)[1].differs_dps or 0.0 for n in ("9", "129")]
+    assert sizes[1] < 0.1 * sizes[0]
+
+
+ON_ARM = """
+#include <stdio.h>
+{ticks}
+#define LABCTL_REAL float
+#include "float.h"
+#include "q31.h"
+static const int32_t in[{n}][{axes} + 1] = {{{rows}}};
+static float real[{n}][{axes}], hot[{n}], real_rate[{n}][{axes}];
+static int32_t rate[{n}][{axes}];
+int main(void) {{
+    uint32_t begun, took[2]; int i, a, flags = 0;
+    for (i = 0; i < {n}; i++) {{
+        hot[i] = (float)in[i][0] / 65536.0f;
+        for (a = 0; a < {axes}; a++) real[i][a] = (float)in[i][a + 1] * {scale:.9g}f;
+    }}
+    ticks_begin();
+    begun = ticks();
+    for (i = 0; i < {n}; i++) flags += {name}_q31_correct(in[i] + 1, in[i][0], rate[i]);
+    took[0] = ticks() - begun;
+    begun = ticks();
+    for (i = 0; i < {n}; i++) flags += {name}_correct(real[i], hot[i], real_rate[i]);
+    took[1] = ticks() - begun;
+    printf("ticks %u %u %d\\n", (unsigned)took[0], (unsigned)took[1], flags);
+    for (i = 0; i < {n}; i++) for (a = 0; a < {axes}; a++)
+        printf("%d %.9g\\n", (int)rate[i][a], (double)real_rate[i][a]);
+    return 0;
+}}
+"""
+SAMPLES = 40
+
+
+@pytest.mark.needs_cortex_m
+@pytest.mark.parametrize("which", ["fog", "mems"])
+def test_a_cortex_m4_computes_the_same(request: pytest.FixtureRequest, tmp_path: Path, which: str) -> None:
+    calibration: Calibration = request.getfixturevalue(which)
+    for name, file in (("c", "float.h"), ("c-q31", "q31.h")):
+        (tmp_path / file).write_bytes(export_calibration(calibration.to_bytes(), name)[0])
+    fixed = fixed_point(static_part(calibration, "c-q31", carries=""), 65, "c-q31")
+    raw, warm = (values[-SAMPLES:] for values in whole_range(calibration))
+    inputs, hot = fixed.as_q31(raw), np.rint(warm * 65536).astype(np.int64)
+    rows = ", ".join("{" + ", ".join(map(str, row)) + "}" for row in np.column_stack([hot, inputs]).tolist())
+    source = ON_ARM.format(ticks=TICKS, n=SAMPLES, axes=raw.shape[1], rows=rows, name=c_name(calibration.serial),
+                           scale=fixed.full_scale_dps / 2**31)  # fmt: skip
+    (tmp_path / "main.c").write_text(source)
+    lines = on_cortex_m(tmp_path).splitlines()
+    found = np.array([[float(word) for word in line.split()] for line in lines[1:]]).reshape(SAMPLES, -1, 2)
+    assert np.array_equal(found[:, :, 0], fixed.corrected(inputs, hot)[0])
+    expected = Compensator(calibration).compensate(raw, warm).rate_dps
+    assert np.abs(found[:, :, 1] - expected).max() < 2e-3
+    whole, single, flags = (int(word) for word in lines[0].split()[1:])
+    assert flags == 0
+    instructions = [INSTRUCTIONS_PER_TICK * count / SAMPLES for count in (whole, single)]
+    assert all(20 < each < 20_000 for each in instructions), instructions
