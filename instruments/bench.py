@@ -6,8 +6,7 @@ Drivers and simulators are imported here; once a bench is open, none is imported
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
 
 from instruments.bench_config import BenchFile
 from instruments.clock import Clock, SystemClock
@@ -16,13 +15,11 @@ from instruments.drivers.unit_handlers import ManualUnitHandler, RemoteUnitHandl
 from instruments.errors import InstrumentError, WrongSimulation
 from instruments.interfaces.chamber import Chamber
 from instruments.interfaces.gyro import Gyro
+from instruments.interfaces.reference import Reference
 from instruments.interfaces.table import RateTable
 from instruments.interfaces.unit_handler import UnitHandler
 from instruments.simulation import Simulation, open_simulation, simulated_links, simulated_unit_handler
 from instruments.transport.factory import Ports
-
-#: How long the readings of a unit are counted in a check, s.
-LISTEN_S = 5.0
 
 
 @dataclass(frozen=True)
@@ -34,10 +31,12 @@ class Bench:
     gyros: dict[str, Gyro]
     unit_handler: UnitHandler
     simulation: Simulation | None = None  #: the simulated instruments of this process, where the bench has any
+    references: dict[str, Reference] = field(default_factory=dict)  #: by name
 
     def close(self) -> None:
         """Close every link, also after one cannot be closed; raises the first InstrumentError or OSError at the end."""
         closers: list[Callable[[], None]] = [each.close for each in (self.table, self.chamber) if each is not None]
+        closers += [each.close for each in self.references.values()]
         failures: list[Exception] = []
         for close in [*(gyro.stop for gyro in self.gyros.values()), *closers]:
             try:
@@ -61,13 +60,14 @@ def open_bench(bench: BenchFile, clock: Clock, simulation: Simulation | None = N
             simulation = open_simulation(bench, clock)
         except ValueError as error:
             raise WrongSimulation("simulation", str(error)) from error
-    ports = Ports(clock, None if simulation is None else simulated_links(simulation, clock))
+    ports = Ports(clock, None if simulation is None else simulated_links(simulation, clock), bench.adapters)
     return Bench(
         None if bench.table is None else driver_of(bench.table).make(bench.table, ports, clock),
         None if bench.chamber is None else driver_of(bench.chamber).make(bench.chamber, ports, clock),
         {gyro.name: driver_of(gyro).make(gyro, ports, clock) for gyro in bench.gyros},
         _unit_handler(bench, simulation, clock),
         simulation,
+        {each.name: driver_of(each).make(each, ports, clock) for each in bench.references},
     )
 
 
@@ -81,44 +81,6 @@ def checked_settings(bench: BenchFile) -> BenchFile:
     for gyro in resolved.gyros:
         driver_of(gyro).make(gyro, Ports(clock), clock)
     return resolved
-
-
-def check(bench: BenchFile, clock: Clock) -> list[tuple[str, bool, str]]:
-    """Ask every instrument for its identity; nothing moves. Returns (device, whether it answered, text)."""
-    opened = open_bench(bench, clock)
-    fixed = {"table": opened.table, "chamber": opened.chamber}
-    devices: dict[str, Any] = {**{name: each for name, each in fixed.items() if each is not None}, **opened.gyros}
-    results = []
-    try:
-        for name, device in devices.items():
-            try:
-                text = _gyro_text(device) if name in opened.gyros else device.identify()
-                results.append((name, True, text))
-            except InstrumentError as error:
-                results.append((name, False, str(error)))
-    finally:
-        opened.close()
-    return results
-
-
-def _gyro_text(gyro: Gyro) -> str:
-    """Return what a unit says of itself, and how its readings come."""
-    found = gyro.identify()
-    said = "".join(f", {name.replace('_', ' ')} {value}" for name, value in found.reported.items())
-    gyro.start()
-    gyro.read_latest()
-    readings = gyro.read(LISTEN_S)
-    gyro.stop()
-    text = f"{found.model}, serial {found.serial}"
-    if said:
-        text += f"; the unit says{said[1:]}"
-    if len(readings) < 2:
-        return f"{text}; {len(readings)} readings in {LISTEN_S:g} s"
-    rate_hz = (len(readings) - 1) / float(readings.t_s[-1] - readings.t_s[0])
-    off_ppm = 1e6 * (rate_hz / gyro.sample_rate_hz - 1.0)
-    text += f"; {rate_hz:.6g} readings/s ({off_ppm:+.0f} ppm), {readings.lost} lost, {readings.damaged} damaged"
-    invalid = int((~readings.valid).sum())
-    return f"{text}, {invalid} marked bad" if invalid else text
 
 
 def _unit_handler(bench: BenchFile, simulation: Simulation | None, clock: Clock) -> UnitHandler:

@@ -10,6 +10,7 @@ model.
 
 from __future__ import annotations
 
+import tomllib
 from importlib import resources
 from pathlib import Path
 from typing import Literal, TypeVar
@@ -44,6 +45,7 @@ class DeviceSettings(BaseModel):
     port: str | None = None  #: serial devices
     host: str | None = None  #: devices on the network
     tcp_port: int = 502
+    adapter: str | None = None  #: serial number of the USB adapter that it hangs on; another one is refused
 
 
 class TableSettings(DeviceSettings):
@@ -77,6 +79,7 @@ class GyroSettings(DeviceSettings):
 
     name: str
     serial: str = Field(pattern=SERIAL)
+    own_serial: str | None = None  #: what the unit says of itself, where it does; another one is refused
     model: str = ""
     technology: Literal["fog", "mems", "piezo", ""] = ""
     axes: tuple[Literal["x", "y", "z"], ...] = ("z",)
@@ -85,6 +88,21 @@ class GyroSettings(DeviceSettings):
     max_c: float = 85.0
     sample_rate_hz: float | None = None
     datasheet: dict[str, float] = Field(default_factory=dict)
+
+
+class ReferenceSettings(DeviceSettings):
+    """A reference thermometer or hygrometer: an instrument of its own, whose value is traceable by itself."""
+
+    name: str = "reference"
+    serial: str = ""  #: of the readout; compared with what it says of itself, where it says something
+    certificate: str = ""  #: of its calibration: number, laboratory and date
+    u_c: float | None = Field(default=None, gt=0)  #: standard uncertainty of its temperature, K
+    #: Whether its temperature is the one by which the units' readings are fitted.
+    is_temperature: bool = False
+    #: Column of the driver -> column of the recording, where two instruments would have the same.
+    columns: dict[str, str] = Field(default_factory=dict)
+    #: Column of the driver -> what the certificate adds to a reading, in the unit of the column.
+    corrections: dict[str, float] = Field(default_factory=dict)
 
 
 SettingsT = TypeVar("SettingsT", bound=BaseModel)
@@ -132,11 +150,13 @@ class BenchFile(Strict):
     table: SerializeAsAny[TableSettings] | None = None  #: absent: the units are turned by hand
     chamber: SerializeAsAny[ChamberSettings] | None = None  #: absent: the units are at room temperature
     gyros: tuple[SerializeAsAny[GyroSettings], ...] = Field(min_length=1)
+    references: tuple[SerializeAsAny[ReferenceSettings], ...] = ()
     simulation: SimulationSettings | None = None
     #: "table", "chamber" or gyro name -> its driver's release, filled in when the drivers are found; what a file says
     #: here is not used.
     drivers: dict[str, DriverRelease] = Field(default_factory=dict)
-    #: gyro name -> what the unit and its USB adapter say of themselves, filled in when a campaign is prepared.
+    #: "table", "chamber" or gyro name -> what the instrument and its USB adapter say of themselves (serial, firmware,
+    #: adapter ...), filled in when a campaign is prepared.
     reported: dict[str, dict[str, str]] = Field(default_factory=dict)
 
     @model_validator(mode="after")
@@ -146,6 +166,18 @@ class BenchFile(Strict):
             given = [value for unit in self.gyros if (value := getattr(unit, what)) is not None]
             if twice := next((value for value in given if given.count(value) > 1), None):
                 raise ValueError(f"two gyros have the {what} {twice!r}; each needs its own")
+        return self
+
+    @model_validator(mode="after")
+    def _references_are_distinct(self) -> BenchFile:
+        """Reject instruments of one name: what is said of one would be said of another."""
+        names = ["table", "chamber", *(unit.name for unit in self.gyros)]
+        for reference in self.references:
+            if reference.name in names:
+                raise ValueError(f"two instruments have the name {reference.name!r}; give [[references]] another name")
+            names.append(reference.name)
+        if len(chosen := [each.name for each in self.references if each.is_temperature]) > 1:
+            raise ValueError(f"is_temperature is set for {' and '.join(chosen)}; the fit takes one temperature")
         return self
 
     @property
@@ -167,8 +199,19 @@ class BenchFile(Strict):
     @property
     def links(self) -> list[str]:
         """Every port and host."""
-        devices = (*self.instruments.values(), *self.gyros)
+        devices = (*self.instruments.values(), *self.gyros, *self.references)
         return [link for device in devices for link in (device.port, device.host) if link is not None]
+
+    @property
+    def adapters(self) -> dict[str, str]:
+        """Device -> serial number of the USB adapter that the file says it hangs on."""
+        return {name: section.adapter for name, section in self.sections.items() if section.adapter is not None}
+
+    @property
+    def sections(self) -> dict[str, DeviceSettings]:
+        """Every device, by its name: table, chamber, references, gyros."""
+        references = {each.name: each for each in self.references}
+        return {**self.instruments, **references, **{gyro.name: gyro for gyro in self.gyros}}
 
     @property
     def instruments(self) -> dict[str, DeviceSettings]:
@@ -189,4 +232,21 @@ def read_bench(source: str | Path) -> BenchFile:
     Raises FileNotFoundError, tomllib.TOMLDecodeError, pydantic.ValidationError.
     """
     path = shipped_benches().get(str(source), Path(source))
-    return BenchFile.model_validate(read_toml(path))
+    return BenchFile.model_validate(_with_formats(read_toml(path), path.parent))
+
+
+def _with_formats(document: dict[str, object], folder: Path) -> dict[str, object]:
+    """Return a document whose gyros have their stream formats in place of the names of files beside it.
+
+    A campaign keeps its bench file, and so the format. The name of a file that is not there stays: its driver says so.
+    Raises tomllib.TOMLDecodeError naming the file.
+    """
+    gyros = document.get("gyros")
+    for gyro in gyros if isinstance(gyros, list) else ():
+        given = gyro.get("format") if isinstance(gyro, dict) else None
+        if isinstance(given, str) and given.endswith(".toml") and (folder / given).is_file():
+            try:
+                gyro["format"] = read_toml(folder / given)
+            except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+                raise tomllib.TOMLDecodeError(f"stream format {folder / given}: {error}") from error
+    return document

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 from instruments.clock import Clock, sleep_until
 from instruments.drivers import arrick_c4_checks as checks
+from instruments.drivers import probes
 from instruments.drivers.arrick_c4_link import LATE_LETTERS, C4Link
 from instruments.drivers.driver import TableDriver
 from instruments.errors import LimitError, MalformedReply, NoReply, RequestRejected, WrongInstrument
@@ -75,7 +76,8 @@ class ArrickC4:
         self._command(lines.IDENTIFY)
         text = self._link.read_line()
         if not text.startswith(lines.IDENTITY_PREFIX):
-            raise WrongInstrument(self.name, f"{self.settings.port} answered {text!r}, not a C4; check the port's name")
+            advice = lines.ECHO_ADVICE if lines.is_echo(text) else "check the port's name and the baud rate"
+            raise WrongInstrument(self.name, f"{self.settings.port} answered {text!r}, not a C4; {advice}")
         return text
 
     def achievable_dps(self, rate_dps: float) -> float:
@@ -210,6 +212,10 @@ class ArrickC4:
         steady_s = self._active.steady_elapsed_s(self._clock.now_s())
         return (self._steps + math.copysign(move.ramp_steps + steady_s * move.step_hz, move.steps)) * self._step_deg
 
+    def shortcomings(self) -> tuple[str, ...]:
+        """Get why no rate can be turned; nothing is sent."""
+        return (checks.NO_SPEED,) if self.settings.speed_template is None else ()
+
     def close(self) -> None:
         """Control the link: close it; safe to call twice."""
         self._link.close()
@@ -252,11 +258,7 @@ class ArrickC4:
     def _program(self, move: Move) -> None:
         """Set ramp and speed by the templates of the bench file; each is written on change only."""
         if self.settings.speed_template is None:
-            raise RequestRejected(
-                self.name,
-                "no constant rate: the C4's speed command is not public; set speed_template of the table in the bench "
-                "file from your controller's manual",
-            )
+            raise RequestRejected(self.name, checks.NO_SPEED)
         if self.settings.ramp_template and not self._ramp_set:
             acceleration = round(self.settings.acceleration_dps2 / self._step_deg)
             self._link.send(self.settings.ramp_template.format(acceleration=acceleration))
@@ -281,7 +283,7 @@ class ArrickC4:
         deadline_s = self._clock.now_s() + ramp_s + END_TOLERANCE_S
         while self.is_moving():
             if self._clock.now_s() > deadline_s:
-                raise NoReply(self.name, "the table still turns after an abort; switch its power off by hand")
+                raise NoReply(self.name, "the table still turns after an abort; switch the table's power off by hand")
             self._clock.sleep(POLL_S)
 
     def _command(self, body: str) -> None:
@@ -293,4 +295,4 @@ class ArrickC4:
             self._link.discard_input()
 
 
-DRIVER = TableDriver(ArrickC4Settings, ArrickC4)
+DRIVER = TableDriver(ArrickC4Settings, ArrickC4, probe=probes.C4)

@@ -20,6 +20,11 @@ LARGEST_DEVIATION = 0.2
 #: Share of a table's turn that the homing is measured over, and its rate, deg/s.
 LEARNING_TURN, SLOW_DPS = 16, 22.5
 POLL_S = 0.5
+NO_SPEED = (
+    "no constant rate: the C4's speed command is not public; set speed_template of the table in the bench file from "
+    "your "
+    "controller's manual"
+)
 
 
 def measured_clock(

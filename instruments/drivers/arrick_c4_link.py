@@ -11,11 +11,17 @@ from instruments.protocols import arrick_c4_lines as lines
 from instruments.protocols.arrick_c4_settings import ArrickC4Settings
 from instruments.transport.factory import Ports
 from instruments.transport.serial import BROKEN, SerialPort
+from instruments.transport.serial_stream import line_of
 
 REPLY_S = 1.0
 #: Replies of an earlier move that can arrive before the reply to the present command.
 LATE_LETTERS = lines.ACCEPTED + lines.FINISHED
 LINE_END = b"\r\n"
+#: More of them belong to no earlier move.
+MOST_LATE_LETTERS = 20
+LINE_IS_BUSY = (
+    "letters come that answer nothing; find what else sends on this line, or switch the controller off and on"
+)
 
 
 class C4Link:
@@ -40,8 +46,9 @@ class C4Link:
         if self._port is None:
             settings = self._settings
             self._port = self._ports.serial(
-                settings.port, device=self._device, baudrate=settings.baudrate, timeout_s=REPLY_S
-            )
+                settings.port, device=self._device, baudrate=settings.baudrate, timeout_s=REPLY_S,
+                line=line_of(settings.line),
+            )  # fmt: skip
             self._initialised = False
             self._opened()
         return self._port
@@ -70,17 +77,17 @@ class C4Link:
         """Return the next letter that is neither a line end nor one of `skip`; raises NoReply or LinkError."""
         port = self.open()
         deadline_s = self._clock.now_s() + timeout_s
+        skipped = 0
         try:
             while True:
                 port.timeout = self._port_timeout_s(deadline_s)
                 found = bytes(port.read(1))
                 if found and found not in LINE_END and found.decode("latin-1") not in skip:
                     return found.decode("latin-1")
-                if not found and self._clock.now_s() >= deadline_s - 1e-9:
-                    raise NoReply(
-                        self._device,
-                        f"{self._settings.port} gave no answer in {timeout_s:.1f} s; check power, cable and baud rate",
-                    )
+                skipped += len(found)
+                if self._clock.now_s() >= deadline_s - 1e-9 and (not found or skipped > MOST_LATE_LETTERS):
+                    advice = LINE_IS_BUSY if skipped > MOST_LATE_LETTERS else "check power, cable and baud rate"
+                    raise NoReply(self._device, f"{self._settings.port} gave no answer in {timeout_s:.1f} s; {advice}")
         except BROKEN as error:
             self._fail(error)
 

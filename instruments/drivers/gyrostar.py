@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from instruments.clock import Clock, sleep_until
+from instruments.drivers import probes
 from instruments.drivers.driver import GyroDriver
 from instruments.errors import LinkError, WrongInstrument
 from instruments.interfaces.gyro import Channel, GyroIdentity, GyroLimits, Readings
@@ -157,4 +158,4 @@ class Gyrostar:
         return Readings(np.asarray(times, dtype=np.float64), raw, valid, lost)
 
 
-DRIVER = GyroDriver(GyrostarSettings, Gyrostar)
+DRIVER = GyroDriver(GyrostarSettings, Gyrostar, probe=probes.ADAM_6017)

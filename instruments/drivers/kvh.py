@@ -9,9 +9,11 @@ from functools import partial
 import numpy as np
 
 from instruments.clock import Clock
-from instruments.drivers.driver import GyroDriver
+from instruments.drivers import probes
+from instruments.drivers.driver import GyroDriver, Trial
 from instruments.errors import LimitError, NoReply
 from instruments.interfaces.gyro import Channel, GyroIdentity, GyroLimits, Readings
+from instruments.interfaces.self_checks import StreamPeriod
 from instruments.protocols.kvh_lines import (
     C_PER_COUNT,
     DPS_PER_COUNT,
@@ -114,7 +116,7 @@ class KvhGyro:
         readings = self._decode(self._stream.read_for(duration_s, EMPTY_EVERY_S))
         now_s = self._clock.now_s()
         if len(readings):
-            self._last_line_s = now_s
+            self._last_line_s, self._stream.unused = now_s, 0
         elif now_s - self._last_line_s > max(SILENCE_S, 5 / self.sample_rate_hz):
             raise self._no_line(now_s - self._last_line_s)
         return readings
@@ -127,13 +129,23 @@ class KvhGyro:
             self._clock.sleep(FRESH_PERIODS / self.sample_rate_hz)
             data = self._stream.read_available()
             if data and len(readings := self._decode(data)):
-                self._last_line_s = self._clock.now_s()
+                self._last_line_s, self._stream.unused = self._clock.now_s(), 0
                 return readings.newest()
         raise self._no_line(SILENCE_S)
 
     def stop(self) -> None:
         """Control the stream: close the port; safe to call twice."""
         self._stream.close()
+
+    @property
+    def period(self) -> StreamPeriod:
+        """Get what is known of the period since the start."""
+        return self._time.known
+
+    @property
+    def counter_step(self) -> None:
+        """Get None: a line has no counter."""
+        return
 
     def _compile(self, pattern: str) -> re.Pattern[str]:
         try:
@@ -150,11 +162,8 @@ class KvhGyro:
         self._time.drop()
 
     def _no_line(self, silence_s: float) -> NoReply:
-        return NoReply(
-            self.name,
-            f"no whole line on {self.settings.port} for {silence_s:.1f} s; check power, cable and baud rate "
-            f"{self._baudrate}",
-        )
+        advice = self._stream.advice(f"baud rate {self._baudrate} and options.pattern")
+        return NoReply(self.name, f"no whole line on {self.settings.port} for {silence_s:.1f} s: {advice}")
 
     def _decode(self, data: bytes) -> Readings:
         pieces = (self._unfinished + data).split(b"\n")
@@ -162,7 +171,8 @@ class KvhGyro:
         if pieces and not self._in_line:
             pieces.pop(0)  # the first line after opening is usually cut
             self._in_line = True
-        lines = [self._parse(piece) for piece in pieces]
+        stripped = [piece.strip(b"\r") for piece in pieces]
+        lines = [self._parse(piece) for piece in stripped if piece]
         good = [line for line in lines if line is not None]
         damaged = len(lines) - len(good)
         codes = np.asarray([self._counts(line) for line in good], dtype=np.int64).reshape(-1, len(self.channels))
@@ -178,12 +188,17 @@ class KvhGyro:
         return Readings(times, raw, valid, lost, damaged)
 
     def _parse(self, piece: bytes) -> Line | None:
-        line = parse_line(piece.rstrip(b"\r").decode("latin-1"), self._pattern, self._length)
+        line = parse_line(piece.decode("latin-1"), self._pattern, self._length)
         return None if line is None or (self._model.has_temperature and line.temperature is None) else line
 
     def _counts(self, line: Line) -> list[int]:
         return [line.rate, line.temperature or 0] if self._model.has_temperature else [line.rate]
 
 
-DSP3000_DRIVER = GyroDriver(KvhSettings, partial(KvhGyro, model=KVH_DSP3000))
-RD2100_DRIVER = GyroDriver(KvhSettings, partial(KvhGyro, model=KVH_RD2100))
+DSP3000_DRIVER = GyroDriver(
+    KvhSettings,
+    partial(KvhGyro, model=KVH_DSP3000),
+    Trial(section={"driver": "kvh-dsp3000", "port": "sim://kvh-dsp3000/fog", "sample_rate_hz": 100}),
+    probe=probes.DSP_3000,
+)
+RD2100_DRIVER = GyroDriver(KvhSettings, partial(KvhGyro, model=KVH_RD2100), probe=probes.RD_2100)

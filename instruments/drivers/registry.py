@@ -4,22 +4,25 @@ from __future__ import annotations
 
 from typing import Any
 
-from instruments.bench_config import ChamberSettings, DeviceSettings, GyroSettings, TableSettings
-from instruments.drivers.driver import ChamberDriver, GyroDriver, TableDriver
+from instruments.bench_config import ChamberSettings, DeviceSettings, GyroSettings, ReferenceSettings, TableSettings
+from instruments.drivers.driver import ChamberDriver, GyroDriver, ReferenceDriver, TableDriver
 from instruments.plugins import PluginGroup
 
-Driver = TableDriver[Any] | ChamberDriver[Any] | GyroDriver[Any]
+Driver = TableDriver[Any] | ChamberDriver[Any] | GyroDriver[Any] | ReferenceDriver[Any]
 #: Kind of driver -> what it drives, and the model that its settings extend.
 KINDS: dict[type[Driver], tuple[str, type[DeviceSettings]]] = {
     TableDriver: ("table", TableSettings),
     ChamberDriver: ("chamber", ChamberSettings),
     GyroDriver: ("gyro", GyroSettings),
+    ReferenceDriver: ("reference", ReferenceSettings),
 }
 
 
 def _checked(found: Any) -> Driver:
-    if not isinstance(found, TableDriver | ChamberDriver | GyroDriver):
-        raise TypeError(f"{found!r} is no TableDriver, ChamberDriver or GyroDriver of instruments.drivers.driver")
+    if not isinstance(found, TableDriver | ChamberDriver | GyroDriver | ReferenceDriver):
+        raise TypeError(
+            f"{found!r} is no TableDriver, ChamberDriver, GyroDriver or ReferenceDriver of instruments.drivers.driver"
+        )
     _, base = KINDS[type(found)]
     if not (isinstance(found.settings, type) and issubclass(found.settings, base)):
         raise TypeError(f"its settings {found.settings!r} do not extend instruments.bench_config.{base.__name__}")

@@ -9,7 +9,7 @@ from pydantic import ValidationError
 from pydantic_core import InitErrorDetails, PydanticCustomError
 
 from instruments.bench_config import BenchFile, DeviceSettings, DriverRelease
-from instruments.drivers.driver import ChamberDriver, GyroDriver, TableDriver
+from instruments.drivers.driver import ChamberDriver, GyroDriver, ReferenceDriver, TableDriver
 from instruments.drivers.registry import DRIVERS, KINDS, Driver, names_of
 from instruments.plugins import PluginError, UnknownPlugin
 
@@ -26,11 +26,16 @@ def resolve(bench: BenchFile) -> BenchFile:
     kinds: dict[str, type[Driver]] = {"table": TableDriver, "chamber": ChamberDriver}
     fixed = {name: _section(section, (name,), kinds[name], wrong) for name, section in bench.instruments.items()}
     gyros = [_section(gyro, ("gyros", number), GyroDriver, wrong) for number, gyro in enumerate(bench.gyros)]
+    references = [
+        _section(each, ("references", number), ReferenceDriver, wrong) for number, each in enumerate(bench.references)
+    ]
     if wrong:
         raise ValidationError.from_exception_data(type(bench).__name__, wrong)
-    used = {**fixed, **{gyro.name: gyro for gyro in bench.gyros}}
+    used = {**fixed, **{each.name: each for each in bench.gyros}, **{each.name: each for each in bench.references}}
     drivers = {device: _release(section.driver) for device, section in used.items()}
-    return bench.model_copy(update={**fixed, "gyros": tuple(gyros), "drivers": drivers})
+    return bench.model_copy(
+        update={**fixed, "gyros": tuple(gyros), "references": tuple(references), "drivers": drivers}
+    )
 
 
 def driver_of(section: DeviceSettings) -> Any:

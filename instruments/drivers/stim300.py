@@ -6,9 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from instruments.clock import Clock
+from instruments.drivers import probes
 from instruments.drivers.driver import GyroDriver
 from instruments.errors import NoReply, WrongInstrument
 from instruments.interfaces.gyro import Channel, GyroIdentity, GyroLimits, Readings
+from instruments.interfaces.self_checks import StreamPeriod
 from instruments.protocols.stim300.checks import DEFAULT_RATE_HZ, differences, is_other_serial
 from instruments.protocols.stim300.datagrams import (
     ASK_CONFIGURATION,
@@ -32,10 +34,12 @@ from instruments.protocols.stim300.frames import (
 from instruments.protocols.stim300.settings import Stim300Settings
 from instruments.transport.adapters import require_adapter
 from instruments.transport.factory import Ports
+from instruments.transport.sample_counter import SampleCounter
 from instruments.transport.sample_timing import FRESH_PERIODS, StreamTime, refuse_other_rate
 from instruments.transport.serial_stream import SerialStream, line_of
 
 SILENCE_S = 2.0
+COUNTER_WRAP = 256
 #: Least size of a port's input buffer; the port is emptied when half of it can be full, and at least every second.
 PORT_BUFFER_BYTES = 4096
 EMPTY_EVERY_S = 1.0
@@ -67,7 +71,10 @@ class Stim300:
             line=line_of(self.options),
         )  # fmt: skip
         self._unfinished = b""
-        self._counter: int | None = None
+        self._counter = SampleCounter(
+            self.name, settings.port, step=round(COUNTS_PER_S / self.sample_rate_hz), wrap=COUNTER_WRAP
+        )
+        self._steps: int | None = None  #: usual step of the counter
         self._time = StreamTime(1.0 / self.sample_rate_hz, 0.0)
         self._last_frame_s = 0.0
         self._set: Configuration | None = None  # as the unit says
@@ -113,7 +120,7 @@ class Stim300:
         readings = self._decode(self._stream.read_for(duration_s, self._empty_every_s))
         now_s = self._clock.now_s()
         if len(readings):
-            self._last_frame_s = now_s
+            self._last_frame_s, self._stream.unused = now_s, 0
         elif now_s - self._last_frame_s > SILENCE_S:
             raise self._no_datagram(f"for {now_s - self._last_frame_s:.1f} s")
         return readings
@@ -133,7 +140,7 @@ class Stim300:
             self._clock.sleep(FRESH_PERIODS / self.sample_rate_hz)
             data = self._stream.read_available()
             if data and len(readings := self._decode(data)):
-                self._last_frame_s = self._clock.now_s()
+                self._last_frame_s, self._stream.unused = self._clock.now_s(), 0
                 newest = readings.newest()
             if newest is not None and not self._is_unknown:
                 return newest
@@ -143,24 +150,33 @@ class Stim300:
         """Control the stream: close the port; safe to call twice."""
         self._stream.close()
 
+    @property
+    def period(self) -> StreamPeriod:
+        """Get what is known of the period since the start."""
+        return self._time.known
+
+    @property
+    def counter_step(self) -> tuple[int, int] | None:
+        """Get the usual step of the counter, and that of the bench file's rate; None before two datagrams came."""
+        return None if self._steps is None else (self._steps, round(COUNTS_PER_S / self.sample_rate_hz))
+
     def _discard(self) -> None:
         self._stream.discard_input()
-        self._unfinished, self._counter = b"", None
+        self._unfinished = b""
+        self._counter.drop()
         self._time.drop()
 
     def _no_datagram(self, when: str) -> NoReply:
-        return NoReply(
-            self.name,
-            f"no intact datagram on {self.settings.port} {when}; check power, cable, "
-            f"bit rate {self.options.baudrate} and datagram 0x{self.options.datagram:02X}",
-        )
+        options = self.options
+        advice = self._stream.advice(f"bit rate {options.baudrate}, datagram 0x{options.datagram:02X} and crlf")
+        return NoReply(self.name, f"no intact datagram on {self.settings.port} {when}: {advice}")
 
     def _no_answer(self) -> NoReply:
         return NoReply(
             self.name,
             f"sends datagrams on {self.settings.port} but does not answer the commands C and I within "
-            f"{START_WITHIN_S:g} s; check the wire to the unit's receiver, or set options.ask = false where there is "
-            "none",
+            f"{START_WITHIN_S:g} s; check the wire to the unit's receiver, or set options.ask = false if there is no "
+            "such wire",
         )
 
     @property
@@ -179,13 +195,23 @@ class Stim300:
                 )
             self._set = found
         elif (serial := parse_serial_number(special)) is not None:
-            if is_other_serial(serial, self.settings.serial):
-                raise WrongInstrument(
-                    self.name,
-                    f"the unit on {self.settings.port} has serial number {serial}, bench file {self.settings.serial}; "
-                    "connect the right unit or correct port or serial",
-                )
+            self._refuse_other_unit(serial)
             self._serial = serial
+
+    def _refuse_other_unit(self, serial: str) -> None:
+        settings = self.settings
+        if settings.own_serial not in {None, serial}:
+            wanted = settings.own_serial
+        elif is_other_serial(serial, settings.serial):
+            wanted = settings.serial
+        else:
+            return
+        raise WrongInstrument(
+            self.name,
+            f"the unit on {settings.port} has serial number {serial}, bench file or campaign says {wanted}; connect "
+            "the "
+            "right unit, or correct port, serial or own_serial",
+        )
 
     def _reported(self) -> dict[str, str]:
         """Return what the unit has said of itself."""
@@ -201,10 +227,15 @@ class Stim300:
         for special in found.specials:
             self._hear(special)
         frames, layout = found.frames, self.layout
+        damaged = found.damaged
+        if len(frames):
+            new = self._counter.is_new(frames[:, layout.counter].astype(np.int64), frames)
+            if not new.all():
+                frames, damaged = frames[new], damaged + len(new) - int(new.sum())
         if len(frames) == 0:
             return Readings(
                 np.zeros(0), {c.name: np.zeros(0, dtype=np.int64) for c in self.channels}, np.zeros(0, bool), 0,
-                found.damaged,
+                damaged,
             )  # fmt: skip
         rates = int24(frames, 1).astype(np.int64)
         status = frames[:, layout.status].astype(np.int64)
@@ -217,20 +248,19 @@ class Stim300:
             valid &= (frames[:, layout.temperature_status] & BAD_STATUS) == 0
         raw["status"] = status
         times, lost = self._times(frames[:, layout.counter].astype(np.int64))
-        return Readings(times, raw, valid, lost, found.damaged)
+        return Readings(times, raw, valid, lost, damaged)
 
     def _times(self, counter: NDArray[np.int64]) -> tuple[NDArray[np.float64], int]:
         """Return the clock times of frames, (n,) s, and the number of frames missing by counter and by clock."""
-        step = round(COUNTS_PER_S / self.sample_rate_hz)
-        wrap = 256 // step if 256 % step == 0 else 256
-        before = counter[0] - step if self._counter is None else self._counter
-        advance = (np.diff(counter, prepend=before) % 256) // step
-        advance[advance == 0] = wrap
-        self._counter = int(counter[-1])
+        if len(counter) > 1:
+            self._steps = int(np.median(np.diff(counter) % COUNTER_WRAP))
+        advance = self._counter.advance(counter)
         came = self._stream.last
-        times, uncounted = self._time.times(advance, came.now_s, wrap, newest_s=came.newest_s, width_s=came.width_s)
+        times, uncounted = self._time.times(
+            advance, came.now_s, self._counter.readings_per_turn, newest_s=came.newest_s, width_s=came.width_s
+        )
         refuse_other_rate(self.name, self.settings.port, self._time.line)
         return times, int(advance.sum() - len(advance)) + uncounted
 
 
-DRIVER = GyroDriver(Stim300Settings, Stim300)
+DRIVER = GyroDriver(Stim300Settings, Stim300, probe=probes.STIM300)

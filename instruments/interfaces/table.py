@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
+from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
+
+#: What a reference rate is known from: the table's own step clock, the rate that a servo was asked for, or its encoder.
+Reference = Literal["computed", "demanded", "measured"]
 
 
 @dataclass(frozen=True)
@@ -21,6 +24,7 @@ class TableLimits:
         0.0  #: by how much the longer of two runs is longer that measure the step clock; 0: not measured
     )
     checks_home: bool = False  #: whether missed steps are looked for at the home switch
+    reference: Reference = "computed"  #: what the rate of a data set is known from
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,16 @@ class StepClock:
     def limit_ppm(self) -> float:
         """Largest deviation that the two uncertainties explain, at three standard deviations."""
         return float(3 * np.hypot(self.u_ppm, self.nominal_u_ppm))
+
+
+@dataclass(frozen=True)
+class AngleReading:
+    """One reading of a table's encoder."""
+
+    t_s: float  #: clock time
+    angle_deg: float  #: unwrapped within a run
+    u_deg: float  #: standard uncertainty of the angle against another one
+    u_s: float  #: standard uncertainty of the time, without what all readings have in common
 
 
 @dataclass(frozen=True)
@@ -151,4 +165,15 @@ class OpenLoopTable(Protocol):
 
     def check_home(self, wait: Wait) -> HomeCheck | None:
         """Measure whether home is where it was left, and home; None where the position is not known."""
+        ...
+
+
+@runtime_checkable
+class EncoderTable(Protocol):
+    """A table that reads its own angle: the mean rate of a data set is measured."""
+
+    rate_u_ppm: float  #: standard uncertainty of a computed rate, parts per million of it
+
+    def read_angle(self) -> AngleReading:
+        """Get the angle and when it was read; raises NoReply, MalformedReply or LinkError."""
         ...

@@ -22,6 +22,15 @@ PARAMETER = re.compile(r"w[a-z].*")
 MOVE = re.compile(r"m1([fr])(\d+)n")
 
 
+#: What to do where the answer is the command itself.
+ECHO_ADVICE = "the line sends back what is sent: switch the adapter's local echo off, and check the wires and power"
+
+
+def is_echo(text: str) -> bool:
+    """Return whether a line that came is a command."""
+    return text.startswith(PREFIX)
+
+
 def command(body: str) -> str:
     """Return the command line of a body, without its terminator."""
     return PREFIX + body

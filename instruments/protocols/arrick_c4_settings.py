@@ -7,6 +7,7 @@ from typing import Literal
 from pydantic import Field
 
 from instruments.bench_config import Strict, TableSettings
+from instruments.protocols.serial_options import SerialOptions
 
 
 class StepperSettings(TableSettings):
@@ -28,6 +29,7 @@ class ArrickC4Settings(StepperSettings):
     #: Required here; a frozen model is never assigned to, so a narrower type is sound.
     port: str  # pyright: ignore[reportGeneralTypeIssues, reportIncompatibleVariableOverride]
     baudrate: int = 9600
+    line: SerialOptions = Field(default_factory=SerialOptions)  #: parity, echo, RS-485 direction
     direction: Literal[1, -1] = 1  #: 1: `f` turns the table counter-clockwise seen from above
     clock_u_ppm: float = Field(default=50.0, ge=0)  #: standard uncertainty of the step clock
     #: The C4's speed command is not public. Without the manual's template the driver refuses a constant rate.

@@ -13,12 +13,12 @@ ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ILLEGAL_VALUE, DEVICE_FAILURE, ACKNOWLEDGED, 
 MEMORY_PARITY, GATEWAY_PATH, GATEWAY_TARGET = 8, 10, 11
 #: Modbus Application Protocol V1.1b3, section 7.
 EXCEPTIONS = {
-    ILLEGAL_FUNCTION: "it does not know the function",
-    ILLEGAL_ADDRESS: "it has no such register, or the register cannot be written",
-    ILLEGAL_VALUE: "it does not accept the value",
-    DEVICE_FAILURE: "it failed inside",
-    ACKNOWLEDGED: "it needs more time",
-    BUSY: "it is busy",
+    ILLEGAL_FUNCTION: "it does not know the function; check driver and address in the bench file",
+    ILLEGAL_ADDRESS: "it has no such register, or the register cannot be written; check model and driver",
+    ILLEGAL_VALUE: "it does not accept the value; check the limits that are set on it",
+    DEVICE_FAILURE: "it failed inside; read its panel, and switch it off and on",
+    ACKNOWLEDGED: "it needs more time; try again later",
+    BUSY: "it is busy; end at its panel what it does, or try again later",
     MEMORY_PARITY: "memory parity error; switch it off and on, and have it repaired if that stays",
     GATEWAY_PATH: "gateway path unavailable; check the gateway's serial port settings",
     GATEWAY_TARGET: "gateway target device failed to respond; check address, power and cable behind the gateway",

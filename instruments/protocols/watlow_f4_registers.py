@@ -18,7 +18,10 @@ LOWEST_COUNT = -31999
 
 MODEL = Register(0, "model", source="pymodbus driver of an F4 chamber")
 #: Then the error of input 1 (101), alarm 1 (102), the outputs, input 2 and alarm 2 (106), where the model has them.
-AIR = Register(100, "air temperature", "int16", "counts", low=LOWEST_COUNT, source=FIELD)
+AIR = Register(
+    100, "air temperature", "int16", "counts", low=LOWEST_COUNT, source=FIELD,
+    below="the code of a sensor break",
+)  # fmt: skip
 #: Then the state of digital input 1 (201).
 MODE = Register(200, "mode", low=0, high=3, source=CCL)
 INPUT_STATE = Register(201, "state of digital input", source=CCL)

@@ -7,12 +7,14 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from instruments.bench_config import ChamberSettings
+from instruments.protocols.serial_options import SerialOptions
 
 
 class WatlowSettings(ChamberSettings):
     """Line, addressing and wiring of both controllers: a serial port for the F4, a host for the F4T."""
 
     baudrate: int = 19200
+    line: SerialOptions = Field(default_factory=SerialOptions)  #: parity, echo, RS-485 direction (watlow-f4)
     address: int = Field(default=1, ge=1, le=247)
     word_order: Literal["little", "big"] = "little"  #: of 32-bit floats (watlow-f4t): low word first by default
     write_function: Literal[6, 16] = 6  #: tried first (watlow-f4); the other one follows an "illegal function"

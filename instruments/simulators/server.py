@@ -37,7 +37,7 @@ class SimulationServer:
         """Open every port; returns the bench file with the real addresses. Raises OSError, LinkError."""
         record = self._bench.model_dump(exclude_none=True)  # a bench file has no null, nor have a driver's own settings
         devices = {name: record[name] for name in ("table", "chamber") if name in record}
-        devices |= {gyro["name"]: gyro for gyro in record["gyros"]}
+        devices |= {each["name"]: each for each in (*record["gyros"], *record["references"])}
         for name, settings in devices.items():
             self._serve_device(name, settings)
         self.addresses["control"] = f"{LOCALHOST}:{self._ports.open_line_server(self._control)}"
@@ -75,7 +75,7 @@ class SimulationServer:
 
     def _log_message(self, name: str, data: bytes, t_s: float) -> None:
         if self._log is not None:
-            turning = self._simulated.world.table.moving(t_s)
+            turning = self._simulated.world.table_turns(t_s)
             line = {"t_s": round(t_s, 3), "device": name, "heard": data.decode("latin-1"), "table_turns": turning}
             self._log.write(json.dumps(line) + "\n")
             self._log.flush()

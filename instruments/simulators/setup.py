@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from instruments.bench_config import BenchFile, DeviceSettings, GyroSettings
+from instruments.bench_config import BenchFile, DeviceSettings, GyroSettings, ReferenceSettings
 from instruments.errors import LinkError
 from instruments.simulators.links.faults import Faults
 from instruments.simulators.physics.world import SimulatedGyro, World
@@ -30,6 +30,16 @@ class InstrumentSetup:
     def gyro(self) -> GyroSettings:
         """Settings of the gyro at the instrument's address; raises StopIteration where the bench has none so named."""
         return next(gyro for gyro in self.bench.gyros if gyro.name == self.gyro_name)
+
+    @property
+    def reference(self) -> ReferenceSettings:
+        """Settings of the reference instrument that the address names, else of the first; raises LinkError."""
+        found = {each.name: each for each in self.bench.references}
+        if not found:
+            raise LinkError(
+                "reference", f"bench {self.bench.name} has no [[references]]; add one, or correct the address"
+            )
+        return found.get(self.gyro_name, next(iter(found.values())))
 
     @property
     def unit(self) -> SimulatedGyro:

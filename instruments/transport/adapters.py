@@ -14,14 +14,23 @@ from instruments.errors import WrongInstrument
 
 
 def adapter_of(port: str | None) -> str:
-    """Return the serial number of the USB adapter of a port; empty where it has none, or is simulated."""
+    """Return the serial number of the USB adapter of a port; empty where it has none, or is simulated.
+
+    Of an adapter with several ports the number of the port follows: `FT4XYZ:1.2`.
+    """
     if not port or "://" in port:
         return ""
     real = os.path.realpath(port)
     for found in list_ports.comports():
         if os.path.realpath(found.device) == real:
-            return found.serial_number or ""
+            _, several, interface = (found.location or "").partition(":")
+            return f"{found.serial_number}{several}{interface}" if found.serial_number else ""
     return ""
+
+
+def is_adapter(wanted: str, found: str) -> bool:
+    """Return whether an adapter is the wanted one, named with or without the number of its port."""
+    return wanted in (found, found.partition(":")[0])
 
 
 def require_adapter(device: str, port: str | None, wanted: str | None) -> dict[str, str]:
@@ -30,10 +39,11 @@ def require_adapter(device: str, port: str | None, wanted: str | None) -> dict[s
     Raises WrongInstrument where the bench file names another adapter.
     """
     found = adapter_of(port)
-    if wanted is not None and wanted != found:
+    if wanted is not None and not is_adapter(wanted, found):
         raise WrongInstrument(
             device,
-            f"port {port} is on USB adapter {found or 'without a serial number'}, bench file {wanted}; two adapters "
-            "may have changed places: give the port's path in /dev/serial/by-id",
+            f"port {port} is on USB adapter {found or 'without a serial number'}, bench file or campaign says "
+            f"{wanted}; "
+            "two adapters may have changed places: give the port's path in /dev/serial/by-id",
         )
     return {"adapter": found} if found else {}

@@ -6,20 +6,20 @@ imports no simulator.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Protocol
 
-import serial
-from pymodbus import FramerType
 from pymodbus.client import ModbusSerialClient, ModbusTcpClient
 
 from instruments.bench_config import is_simulated_address
 from instruments.clock import Clock
 from instruments.errors import LinkError
-from instruments.transport.port_failures import remedy
-from instruments.transport.serial import BROKEN, EIGHT_N_1, PARITIES, Line, SerialPort
+from instruments.transport.adapters import require_adapter
+from instruments.transport.opened_port import open_port
+from instruments.transport.port_failures import reason, remedy
+from instruments.transport.rtu.client import NOT_OPENED, RtuClient
+from instruments.transport.serial import EIGHT_N_1, Line, SerialPort
 from instruments.transport.stream_reader import PolledReader, StreamReader, ThreadedReader
-
-NOT_OPENED: tuple[type[Exception], ...] = (*BROKEN, ValueError)
 
 
 class LinkFactory(Protocol):
@@ -37,8 +37,8 @@ class LinkFactory(Protocol):
         """Return a Modbus TCP client that is not connected yet."""
         ...
 
-    def rtu_client(self, url: str, *, baudrate: int, timeout_s: float) -> ModbusSerialClient:
-        """Return a Modbus RTU client (8N1) that is not connected yet."""
+    def rtu_client(self, url: str, *, baudrate: int, timeout_s: float, line: Line = EIGHT_N_1) -> ModbusSerialClient:
+        """Return a Modbus RTU client, 8 data bits, that is not connected yet."""
         ...
 
 
@@ -50,17 +50,7 @@ class HardwareLinks:
 
     def serial_port(self, url: str, *, baudrate: int, timeout_s: float, line: Line = EIGHT_N_1) -> SerialPort:
         """Return an open port, locked for this process; raises what pyserial raises."""
-        wall_s = self._clock.wall_s(timeout_s)
-        port = serial.serial_for_url(
-            url, do_not_open=True, baudrate=baudrate, parity=PARITIES[line.parity], stopbits=line.stop_bits,
-            timeout=wall_s, write_timeout=wall_s, exclusive=True,
-        )  # fmt: skip
-        if line.dtr is not None:
-            port.dtr = line.dtr
-        if line.rts is not None:
-            port.rts = line.rts
-        port.open()
-        return port
+        return open_port(url, baudrate=baudrate, timeout_s=self._clock.wall_s(timeout_s), line=line)
 
     def port_timeout_s(self, timeout_s: float) -> float:
         """Return the seconds of real time of a time-out in seconds of the bench clock."""
@@ -70,29 +60,38 @@ class HardwareLinks:
         """Return a client of a real host, not connected yet."""
         return ModbusTcpClient(host, port=tcp_port, timeout=self._clock.wall_s(timeout_s), retries=0)
 
-    def rtu_client(self, url: str, *, baudrate: int, timeout_s: float) -> ModbusSerialClient:
+    def rtu_client(self, url: str, *, baudrate: int, timeout_s: float, line: Line = EIGHT_N_1) -> ModbusSerialClient:
         """Return a client on a real port, not connected yet."""
-        wall_s = self._clock.wall_s(timeout_s)
-        return ModbusSerialClient(url, framer=FramerType.RTU, baudrate=baudrate, timeout=wall_s, retries=0)
+        return RtuClient(url, baudrate=baudrate, timeout_s=self._clock.wall_s(timeout_s), line=line)
 
 
 class Ports:
-    """Opens the links of one bench; `simulated` makes the links of `sim://` addresses, where the bench has any."""
+    """Opens the links of one bench; `simulated` makes the links of `sim://` addresses, where the bench has any.
 
-    def __init__(self, clock: Clock, simulated: LinkFactory | None = None) -> None:
+    `adapters`: device -> serial number of the USB adapter that each of its serial ports must be on, at every opening.
+    """
+
+    def __init__(
+        self, clock: Clock, simulated: LinkFactory | None = None, adapters: Mapping[str, str] | None = None
+    ) -> None:
         self._clock = clock
+        self._adapters = dict(adapters or {})
         self._hardware = HardwareLinks(clock)
         self._simulated = simulated
 
     def serial(self, url: str, *, device: str, baudrate: int, timeout_s: float, line: Line = EIGHT_N_1) -> SerialPort:
         """Open a serial port, 8 data bits, locked for this process.
 
-        Raises LinkError with port and remedy, also while another process has the port open.
+        Raises LinkError with port and remedy, also while another process has the port open, and WrongInstrument on
+        another USB adapter than the bench file names.
         """
+        self._require_adapter(url, device)
         try:
             return self._links(url, device).serial_port(url, baudrate=baudrate, timeout_s=timeout_s, line=line)
         except NOT_OPENED as error:
-            raise LinkError(device, f"port {url} cannot be opened ({error}); check {remedy(url, error)}") from error
+            raise LinkError(
+                device, f"port {url} cannot be opened ({reason(error)}); check {remedy(url, error)}"
+            ) from error
 
     def stream_reader(self, url: str, port: SerialPort) -> StreamReader:
         """Return what empties an open port: a thread for a real one, which does not wait for its reader."""
@@ -111,14 +110,22 @@ class Ports:
             )
         return client
 
-    def modbus_rtu(self, url: str, *, device: str, baudrate: int, timeout_s: float) -> ModbusSerialClient:
-        """Open a Modbus RTU link on a serial port; raises LinkError with port and remedy."""
-        client = self._links(url, device).rtu_client(url, baudrate=baudrate, timeout_s=timeout_s)
+    def modbus_rtu(
+        self, url: str, *, device: str, baudrate: int, timeout_s: float, line: Line = EIGHT_N_1
+    ) -> ModbusSerialClient:
+        """Open a Modbus RTU link on a serial port; raises LinkError with port and remedy, and as `serial` does."""
+        self._require_adapter(url, device)
+        client = self._links(url, device).rtu_client(url, baudrate=baudrate, timeout_s=timeout_s, line=line)
         if not client.connect():
+            error = getattr(client, "failure", None) or OSError("for no reason that is known")
             raise LinkError(
-                device, f"serial port {url} cannot be opened; check its name, the cable and who else uses it"
-            )
+                device, f"port {url} cannot be opened ({reason(error)}); check {remedy(url, error)}"
+            ) from error
         return client
+
+    def _require_adapter(self, url: str, device: str) -> None:
+        if device in self._adapters:
+            require_adapter(device, url, self._adapters[device])
 
     def _links(self, address: str, device: str) -> LinkFactory:
         if not is_simulated_address(address):

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from pymodbus.framer import FramerRTU
 
+from instruments.errors import one_line
 from instruments.protocols.modbus_codes import TCP_PREFIX_BYTES
 
 SHORTEST_RTU_BYTES = 5
+#: So many printable characters in a row are the greeting of another kind of server; it is shown up to here.
+LEAST_TEXT, LONGEST_TEXT = 6, 40
 LINE = "check line settings and cable"
+ADDRESS = "check host and tcp_port in the bench file"
 
 
 def explain_rtu(received: bytes, address: int) -> str:
@@ -19,18 +23,28 @@ def explain_rtu(received: bytes, address: int) -> str:
 
 def explain_tcp(received: bytes, sent: bytes, address: int) -> str:
     """Return why bytes on a TCP link are no reply to a request of unit `address`, and what to do."""
-    if received.startswith(b"HTTP/") or b"<html" in received[:200].lower():
-        return "an HTTP server answered, no Modbus instrument; check host and tcp_port in the bench file"
+    if other := other_server(received):
+        return other
     if len(received) <= TCP_PREFIX_BYTES:
         return _bytes(received, LINE)
     if protocol := int.from_bytes(received[2:4], "big"):
-        return f"protocol number {protocol} came, Modbus TCP has 0; check host and tcp_port in the bench file"
+        return f"protocol number {protocol} came, Modbus TCP has 0; {ADDRESS}"
     if received[:2] != sent[:2]:
         number, asked = (int.from_bytes(each[:2], "big") for each in (received, sent))
         return f"the reply to request {number} came, not to request {asked}; find the second master of this link"
     if received[TCP_PREFIX_BYTES] != address:
         return _other_unit(received[TCP_PREFIX_BYTES], address)
     return _bytes(received, LINE)
+
+
+def other_server(received: bytes) -> str:
+    """Return what answered where bytes begin as those of no Modbus instrument do; empty where they may be of one."""
+    if received.startswith(b"HTTP/") or b"<html" in received[:200].lower():
+        return f"an HTTP server answered, no Modbus instrument; {ADDRESS}"
+    beginning = received[:LEAST_TEXT]
+    if len(beginning) == LEAST_TEXT and beginning.isascii() and beginning.decode().isprintable():
+        return f"text came ({one_line(received[:LONGEST_TEXT].decode('latin-1'))}), no Modbus; {ADDRESS}"
+    return ""
 
 
 def _is_frame(data: bytes) -> bool:

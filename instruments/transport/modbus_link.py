@@ -18,8 +18,8 @@ from pymodbus.pdu import ModbusPDU
 from instruments.clock import Clock, sleep_until
 from instruments.errors import InstrumentError, LinkError, MalformedReply, NoReply, RequestRejected, one_line
 from instruments.protocols.modbus_codes import ACKNOWLEDGED, BUSY, EXCEPTIONS, ends_at_a_frame_end
-from instruments.transport.modbus_diagnosis import explain_rtu, explain_tcp
-from instruments.transport.rtu_line import RtuLine
+from instruments.transport.modbus_diagnosis import explain_rtu, explain_tcp, other_server
+from instruments.transport.rtu.line import NeverSilent, RtuLine
 from instruments.transport.serial import BROKEN, SerialPort
 
 #: Failures are raised, not logged; without a handler pymodbus would write them to standard error.
@@ -36,6 +36,8 @@ TRIES = 1 + len(RETRY_PAUSES_S)
 #: Exceptions that pymodbus's decoders do not catch when bytes are malformed.
 UNDECODABLE = (IndexError, KeyError, ValueError, struct.error)
 CHECK = "check power, cable and address"
+#: Bytes that come without end are no reply: no more are awaited after this, clock s.
+LONGEST_REPLY_S = 5.0
 
 
 class RefusedRegister(RequestRejected):
@@ -66,6 +68,7 @@ class ModbusLink:
         self._client: Client | None = None
         self._earliest_request_s = 0.0
         self._sent = self._received = b""
+        self._sent_s = 0.0
         self._line = RtuLine(device, clock)
 
     @property
@@ -120,6 +123,8 @@ class ModbusLink:
             client = self._connected()
             reply = ask(client)
         except DISCONNECTED as error:
+            if not self._is_serial and (advice := other_server(self._received)):  # which closed what it does not know
+                raise MalformedReply(self.device, f"cannot {what}, {advice}") from error
             # pymodbus's own text is the client's address in memory
             detail = "" if isinstance(error, ConnectionException) else f" ({one_line(error)})"
             text = f"cannot {what}, the link is gone{detail}; check cable and power"
@@ -156,10 +161,15 @@ class ModbusLink:
         return isinstance(self._client, ModbusSerialClient)
 
     def _give_up(self, error: LinkError) -> None:
-        """Close the link after a failed try; a port that was gone has lost what was still to come."""
+        """Close the link after a failed try; a port that was gone has lost what was still to come.
+
+        Raises NeverSilent again: no further try helps.
+        """
         if isinstance(error, NoReply | MalformedReply):
             self._doubt()
         self.close()
+        if isinstance(error, NeverSilent):
+            raise error
 
     def _doubt(self, asked_s: float | None = None) -> None:
         if self._is_serial:
@@ -172,10 +182,15 @@ class ModbusLink:
         return explain_tcp(self._received, self._sent, self.address)
 
     def _trace(self, sending: bool, data: bytes) -> bytes:
-        """Keep what was sent and what came since: it distinguishes silence from malformed bytes."""
+        """Keep what was sent and what came since: it distinguishes silence from malformed bytes.
+
+        Raises TimeoutError, as pymodbus does for silence, where bytes come without end.
+        """
         if sending:
-            self._sent, self._received = data, b""
+            self._sent, self._received, self._sent_s = data, b"", self._clock.now_s()
             self._line.send(data)
             return data
         self._received = self._line.clean(data) if self._is_serial else data
+        if self._clock.now_s() > self._sent_s + LONGEST_REPLY_S:
+            raise TimeoutError
         return self._received

@@ -3,21 +3,76 @@
 from __future__ import annotations
 
 import errno
+import os
 from pathlib import Path
 
-#: Folder in which Linux names serial ports by their USB adapters.
-BY_ID = Path("/dev/serial/by-id")
+#: Folders in which Linux names serial ports by their USB adapters, and by the sockets that these are plugged into.
+BY_ID, BY_PATH = Path("/dev/serial/by-id"), Path("/dev/serial/by-path")
+PROCESSES = Path("/proc")
+#: The end of a pseudo-terminal that its maker keeps.
+MASTERS = frozenset({"/dev/ptmx", "/dev/pts/ptmx"})
+
+
+def reason(error: Exception) -> str:
+    """Return why a port cannot be opened, in the system's words where it gave a number."""
+    number = getattr(error, "errno", None)
+    return os.strerror(number) if isinstance(number, int) else str(error)
 
 
 def remedy(url: str, error: Exception) -> str:
     """Return what to check of a port that cannot be opened."""
     number = getattr(error, "errno", None)
     if number == errno.EACCES:
-        return "that this user may use it: run `sudo usermod -aG dialout $USER`, then log in again"
+        return f"that this user may use it: {permission_command(url)}"
     if number in (errno.EBUSY, errno.EAGAIN) or "exclusively lock" in str(error):
+        if found := users_of(url):
+            return f"which other process has it open: {', '.join(found)}; end it"
         return f"which other process has it open: run `fuser -v {url}`, and end that one"
     if number == errno.ENOENT:
         there = sorted(str(path) for path in BY_ID.glob("*")) if BY_ID.is_dir() else []
-        found = f"; there are {', '.join(there)}" if there else f"; `ls {BY_ID}` lists those that are there"
-        return f"the cable and the port's name{found}"
+        found_text = f"; there are {', '.join(there)}" if there else f"; `ls {BY_ID}` lists those that are there"
+        return f"the cable and the port's name{found_text}"
     return "the cable, the port's name and who else uses it"
+
+
+def permission_command(url: str) -> str:
+    """Return what gives this user the right to use a port: membership in the port's group, `dialout` on Debian."""
+    try:
+        group = Path(url).group()
+    except (OSError, KeyError):
+        group = "dialout"
+    return f"run `sudo usermod -aG {'dialout' if group == 'root' else group} $USER`, then log in again"
+
+
+def users_of(url: str) -> list[str]:
+    """Return the other processes that have a port open, each as `process 812 (ModemManager)`, as far as may be seen.
+
+    The process that made a pseudo-terminal has both of its ends open: it is the device, and no other user of the port.
+    """
+    real, own = os.path.realpath(url), str(os.getpid())
+    found = []
+    for process in PROCESSES.glob("[0-9]*"):
+        if process.name == own:
+            continue
+        try:
+            open_files = {os.path.realpath(link) for link in (process / "fd").iterdir()}
+            has_open = real in open_files and MASTERS.isdisjoint(open_files)
+            name = (process / "comm").read_text(encoding="utf-8", errors="replace").strip() if has_open else ""
+        except OSError:  # another user's, or over
+            continue
+        if has_open:
+            found.append(f"process {process.name} ({name})")
+    return sorted(found)
+
+
+def stable_name(url: str) -> str:
+    """Return a port's path that does not depend on the order of plugging; empty where there is none.
+
+    That is its path by USB adapter where the adapter has one of its own, else by the socket.
+    """
+    real = os.path.realpath(url)
+    for folder in (BY_ID, BY_PATH):
+        for link in sorted(folder.glob("*")) if folder.is_dir() else []:
+            if os.path.realpath(link) == real:
+                return str(link)
+    return ""

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from instruments.errors import WrongInstrument
-from instruments.transport.stream_period import TOLERANCE, UNKNOWN, PeriodLine
+from instruments.interfaces.self_checks import StreamPeriod
+from instruments.transport.stream_period import COVERAGE, TOLERANCE, UNKNOWN, PeriodLine
 
 #: Share of the distance to the clock that each read makes up: small, so that the times do not take on wire jitter.
 FOLLOW = 0.02
@@ -40,6 +41,12 @@ class StreamTime:
     def line(self) -> PeriodLine:
         """What is known of the period."""
         return self._line
+
+    @property
+    def known(self) -> StreamPeriod:
+        """What is known of the period, with its standard uncertainty."""
+        line = self._line
+        return StreamPeriod(line.nominal_s, line.measured_s, line.u_share / COVERAGE)
 
     def drop(self) -> None:
         """Expect any number of missing readings before the next ones, which must be passed on as soon as they come.

@@ -8,6 +8,8 @@ from typing import Literal, Protocol, runtime_checkable
 
 import serial
 
+from instruments.protocols.serial_options import Rs485Options
+
 #: Names of pyserial's parities.
 PARITIES: dict[str, str] = {"none": serial.PARITY_NONE, "odd": serial.PARITY_ODD, "even": serial.PARITY_EVEN}
 
@@ -20,6 +22,8 @@ class Line:
     stop_bits: Literal[1, 2] = 1
     dtr: bool | None = None
     rts: bool | None = None
+    echo: bool = False  #: what is sent comes back, and is dropped
+    rs485: Rs485Options | None = None  #: None: the adapter switches the direction
 
 
 #: 8 data bits, no parity, one stop bit.

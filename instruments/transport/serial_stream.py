@@ -17,7 +17,7 @@ TINY_S = 1e-9
 
 def line_of(options: SerialOptions) -> Line:
     """Return the electrical settings that a bench file gives."""
-    return Line(options.parity, options.stop_bits, options.dtr, options.rts)
+    return Line(options.parity, options.stop_bits, options.dtr, options.rts, options.echo, options.rs485)
 
 
 class SerialStream:
@@ -43,6 +43,7 @@ class SerialStream:
         self._port: SerialPort | None = None
         self._reader: StreamReader | None = None
         self.last = Received(b"", clock.now_s())  #: what was read last: its time is that of the bytes returned last
+        self.unused = 0  #: bytes that came since the last reading; the driver sets it to 0
 
     @property
     def is_open(self) -> bool:
@@ -77,6 +78,7 @@ class SerialStream:
 
     def discard_input(self) -> None:
         """Drop every byte that was not read yet; raises LinkError."""
+        self.unused = 0
         try:
             self._reading().discard()
         except BROKEN as error:
@@ -89,7 +91,14 @@ class SerialStream:
             self.last = reader.take()
         except BROKEN as error:
             self._fail(error)
+        self.unused += len(self.last.data)
         return self.last.data
+
+    def advice(self, sent_as: str) -> str:
+        """Return what came where a reading should have, and what to check; `sent_as` names what readings depend on."""
+        if not self.unused:
+            return f"nothing came; check power, cable and {sent_as}"
+        return f"{self.unused} bytes came that are none; check {sent_as}, and what else sends on this line"
 
     def read_for(self, duration_s: float, every_s: float) -> bytes:
         """Return the bytes of the next `duration_s` clock seconds; the port is emptied every `every_s` seconds.

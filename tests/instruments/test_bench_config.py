@@ -11,9 +11,9 @@ from pydantic import Field, ValidationError
 from instruments.bench import checked_settings, open_bench
 from instruments.bench_config import BenchFile, ChamberSettings, DriverRelease, read_bench
 from instruments.clock import VirtualClock
+from instruments.drivers.chambers.watlow_f4 import WatlowF4
 from instruments.drivers.driver import ChamberDriver
 from instruments.drivers.registry import DRIVERS
-from instruments.drivers.watlow_f4 import WatlowF4
 from tests.helpers.plugins import register
 
 
@@ -38,8 +38,8 @@ def test_two_units_are_never_taken_for_one(what: str) -> None:
 @pytest.mark.parametrize(
     ("device", "place", "known"),
     [
-        ("table", ("table", "driver"), "arrick-c4"),
-        ("chamber", ("chamber", "driver"), "watlow-f4 (labctl {version}), watlow-f4t"),
+        ("table", ("table", "driver"), "acutrol-3000 (labctl {version}), arrick-c4"),
+        ("chamber", ("chamber", "driver"), "binder (labctl {version}), espec"),
         ("gyros", ("gyros", 0, "driver"), "gyrostar (labctl {version}), kvh-dsp3000"),
     ],
 )
@@ -69,7 +69,7 @@ def with_driver(device: str, name: str, **settings: Any) -> BenchFile:
 
 def test_a_driver_of_another_kind_of_instrument_is_refused() -> None:
     with pytest.raises(
-        ValidationError, match=r"driver 'stim300' is of a gyro, not of a chamber \(there are watlow-f4, "
+        ValidationError, match=r"driver 'stim300' is of a gyro, not of a chamber \(there are binder, espec, "
     ):
         checked_settings(with_driver("chamber", "stim300"))
 
@@ -87,7 +87,7 @@ def test_a_driver_that_is_registered_needs_no_other_list(monkeypatch: pytest.Mon
 
 
 #: What every chamber has.
-KNOWN = "driver, port, host, tcp_port, min_c, max_c, safe_c, ramp_c_per_min"
+KNOWN = "driver, port, host, tcp_port, adapter, min_c, max_c, safe_c, ramp_c_per_min"
 
 
 class HeaterSettings(ChamberSettings):

@@ -67,10 +67,11 @@ def test_once_a_bench_is_open_no_driver_and_no_simulator_is_imported() -> None:
 def test_only_the_drivers_that_a_bench_names_are_imported() -> None:
     assert loaded_by("example-real", "instruments.drivers") == [
         "instruments.drivers",
-        *(f"instruments.drivers.{name}" for name in ("arrick_c4", "arrick_c4_checks", "arrick_c4_link", "driver")),
+        *(f"instruments.drivers.{name}" for name in ("arrick_c4", "arrick_c4_checks", "arrick_c4_link", "chambers")),
+        *(f"instruments.drivers.chambers.{name}" for name in ("setpoint_chamber", "watlow", "watlow_f4")),
         *(
             f"instruments.drivers.{name}"
-            for name in ("kvh", "registry", "resolution", "unit_handlers", "watlow", "watlow_f4")
+            for name in ("driver", "kvh", "probe", "probes", "registry", "resolution", "unit_handlers")
         ),
     ]
 
@@ -86,6 +87,6 @@ def test_a_simulated_address_that_no_simulator_knows_is_named() -> None:
     record["table"]["port"] = "sim://turntable"
     bench = open_bench(BenchFile.model_validate(record), VirtualClock())
     with pytest.raises(
-        LinkError, match=r"no simulated instrument 'turntable' is installed \(there are adam-6017 \(labctl "
+        LinkError, match=r"no simulated instrument 'turntable' is installed \(there are acutrol-3000 \(labctl "
     ):
         bench.table.identify()

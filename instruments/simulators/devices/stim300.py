@@ -89,7 +89,8 @@ class SimulatedStim300:
         self._unit, self._faults = setup.unit, setup.faults
         self._columns = [AXES.index(axis) for axis in setup.gyro.axes]
         self._rate_hz = float(device.sample_rate_hz or self._unit.sample_rate_hz)
-        self._step = round(COUNTS_PER_S / self._rate_hz)
+        nominal_hz = device.sample_rate_hz or setup.gyro.sample_rate_hz or self._rate_hz
+        self._step = round(COUNTS_PER_S / nominal_hz)  # by its own clock, however fast that is
         self._device = device
         self._angle_deg = np.zeros(3)
         self._sent = 0  #: index of the newest frame sent
@@ -98,9 +99,9 @@ class SimulatedStim300:
         self._replies: dict[int, bytes] = {}  #: index of the frame that it replaces -> datagram
         self._silent_until = self._starts_until = 0  #: indices of frames, after a reset
         content, has_pps = content_of_datagram(options.datagram)
-        nominal_hz = round(COUNTS_PER_S / self._step)
+        set_hz = round(COUNTS_PER_S / self._step)
         configuration = Configuration(
-            REVISION, FIRMWARE, nominal_hz if nominal_hz in SAMPLE_RATES_HZ else None, content, options.crlf,
+            REVISION, FIRMWARE, set_hz if set_hz in SAMPLE_RATES_HZ else None, content, options.crlf,
             options.baudrate, options.stop_bits, options.parity, "xyz", device.output_unit, False, has_pps, 10,
         )  # fmt: skip
         self._says = {

@@ -30,8 +30,9 @@ class SimulatedLinks:
         wall_s = self._clock.wall_s(timeout_s)
         return SimulatedTcpClient(self._device(host), self._clock, timeout_s, timeout=wall_s, retries=0)
 
-    def rtu_client(self, url: str, *, baudrate: int, timeout_s: float) -> SimulatedRtuClient:
+    def rtu_client(self, url: str, *, baudrate: int, timeout_s: float, line: object = None) -> SimulatedRtuClient:
         """Return a Modbus RTU client that is not connected yet; raises LinkError for an unknown address."""
+        del line
         wall_s = self._clock.wall_s(timeout_s)
         return SimulatedRtuClient(
             self._device(url), self._clock, timeout_s, baudrate=baudrate, timeout=wall_s, retries=0

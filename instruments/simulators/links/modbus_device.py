@@ -82,6 +82,22 @@ def float32(order: WordOrder, get: Callable[[float], float], put: Callable[[floa
     return Cell(read, write if put else None, words=2)
 
 
+def uint32(order: WordOrder, get: Callable[[float], float], put: Callable[[int, float], bool] | None = None) -> Cell:
+    """Return an unsigned 32-bit number in two registers."""
+    way = 1 if order == "big" else -1
+
+    def read(t_s: float) -> tuple[int, ...]:
+        value = int(get(t_s))
+        return (value >> 16, value & 0xFFFF)[::way]
+
+    def write(words: list[int], t_s: float) -> bool:
+        assert put is not None
+        high, low = words[::way]
+        return put(high << 16 | low, t_s)
+
+    return Cell(read, write if put else None, words=2)
+
+
 class ModbusDevice:
     """Bytes in, bytes out, on a map of cells by their first register.
 

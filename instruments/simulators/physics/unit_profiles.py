@@ -124,9 +124,16 @@ PROFILES: dict[str, Callable[[tuple[str, ...], np.random.Generator], UnitTruth]]
 }
 
 #: Profile of a unit without one in the bench file, by driver.
-DEFAULT_PROFILES = {"stim300": "mems-triaxial", "kvh-rd2100": "rd2100", "kvh-dsp3000": "rd2100", "gyrostar": "gyrostar"}
+DEFAULT_PROFILES = {
+    "stim300": "mems-triaxial",
+    "kvh-rd2100": "rd2100",
+    "kvh-dsp3000": "rd2100",
+    "gyrostar": "gyrostar",
+    "labjack-t": "gyrostar",
+    "stream-format": "mems-triaxial",
+}
 #: Sampling rate of a unit, Hz, where the bench file gives none: the rate of the wire.
-USUAL_RATE_HZ = {"stim300": 125.0, "kvh-dsp3000": 100.0, "kvh-rd2100": 10.0, "gyrostar": 10.0}
+USUAL_RATE_HZ = {"stim300": 125.0, "kvh-dsp3000": 100.0, "kvh-rd2100": 10.0, "gyrostar": 10.0, "labjack-t": 1000.0}
 
 
 def usual_rate_hz(driver: str) -> float:

@@ -20,6 +20,7 @@ from instruments.simulators.physics.hand_motion import HandMotion
 from instruments.simulators.physics.instability import BiasInstability
 from instruments.simulators.physics.motion import TableMotion
 from instruments.simulators.physics.profile_motion import ProfileMotion
+from instruments.simulators.physics.servo_motion import ServoMotion
 from instruments.simulators.physics.thermal import Body, Heat
 from instruments.simulators.physics.unit_profiles import UnitTruth, make_unit, usual_rate_hz
 
@@ -61,6 +62,7 @@ class World:
             gear_error_deg=number(settings.table, "gear_error_deg", 0.0),
         )
         self.hand = HandMotion(settings.hand, self.table, [settings.seed, settings.noise_seed, zlib.crc32(b"hand")])
+        self.servo: ServoMotion | None = None  #: instead of the stepper, on a bench with a servo table
         self._profile: ProfileMotion | None = None
         self._encoder_noise_deg = number(settings.table, "encoder_noise_deg", 0.0)
         self._encoder_late_s = number(settings.table, "encoder_late_s", 0.0)
@@ -102,11 +104,17 @@ class World:
         self._profile = None
 
     @property
-    def motion(self) -> TableMotion | ProfileMotion | HandMotion:
-        """What moves the units: the stepper, a course of rates that the table follows, or a hand."""
+    def motion(self) -> TableMotion | ServoMotion | ProfileMotion | HandMotion:
+        """What moves the units: the stepper or servo, a course of rates that the table follows, or a hand."""
         if self._profile is not None:
             return self._profile
+        if self.servo is not None:
+            return self.servo
         return self.hand if self.hand.has_turned else self.table
+
+    def table_turns(self, t_s: float) -> bool:
+        """Return whether the table turns at a time, s."""
+        return (self.servo or self.table).moving(t_s)
 
     def encoder_rates_dps(self, t_s: Array, period_s: float) -> Array:
         """Return the mean rates by the table's encoder over the periods that end at times (n,) s, in one row.

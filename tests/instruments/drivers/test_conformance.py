@@ -1,186 +1,98 @@
-"""What every driver must do, whichever it is: the protocols of table, chamber and gyro, and how they fail."""
+"""What every driver must do, whichever it is: the checks of `labctl driver test`, on all of labctl's own drivers."""
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pytest
 
 from instruments.bench_config import read_bench, shipped_benches
-from instruments.drivers.driver import ChamberDriver, GyroDriver, TableDriver
-from instruments.drivers.registry import names_of
-from instruments.errors import InstrumentError, LimitError, LinkError
-from instruments.interfaces.chamber import Chamber
-from instruments.interfaces.gyro import Gyro
-from instruments.interfaces.table import RateTable
+from instruments.conformance import checks_of, try_driver
+from instruments.conformance.by_kind import OF_KIND
+from instruments.conformance.checks import COMMON, PROTOCOLS
+from instruments.conformance.stand import Stand, open_stand, place_of
+from instruments.drivers.driver import GyroDriver, Trial
+from instruments.drivers.kvh import KVH_DSP3000, KvhGyro
+from instruments.drivers.registry import DRIVERS, names_of
+from instruments.errors import NoReply
+from instruments.interfaces.gyro import Readings
+from instruments.protocols.kvh_lines import KvhSettings
 
-Make = Callable[..., Any]
-PROTOCOLS: dict[str, type] = {"table": RateTable, "chamber": Chamber, "gyro": Gyro}
-GYROS = names_of(GyroDriver)
-DRIVERS = [
-    *(("table", name) for name in names_of(TableDriver)),
-    *(("chamber", name) for name in names_of(ChamberDriver)),
-    *(("gyro", name) for name in GYROS),
-]
-PLACES = {
-    "arrick-c4": ("single-axis-sim", {}),
-    "watlow-f4": ("single-axis-sim", {}),
-    "watlow-f4t": ("triaxial-sim", {}),
-    "kvh-rd2100": ("single-axis-sim", {}),
-    "kvh-dsp3000": (
-        "single-axis-sim",
-        {"driver": "kvh-dsp3000", "port": "sim://kvh-dsp3000/fog", "sample_rate_hz": 100},
-    ),
-    "stim300": ("triaxial-sim", {}),
-    "gyrostar": ("gyrostar-sim", {}),
-}
+#: Drivers on another library: no bytes pass here that a simulator could answer; they have tests of their own.
+ON_A_LIBRARY = {"nidaq", "library-chamber", "library-reference"}
+OWN = [name for name in DRIVERS.names if DRIVERS.plugin(name).is_own and name not in ON_A_LIBRARY]
+CHECKS = [(name, check) for name in OWN for check in checks_of(name)]
 #: The first word of a method's docstring says whether it asks, acts, or changes a setting.
 FIRST_WORDS = ("Get", "Control", "Measure", "Set", "What")
 
 
-@pytest.fixture(params=DRIVERS, ids=[driver for _, driver in DRIVERS])
-def one(request: pytest.FixtureRequest, stand: Make) -> Any:
-    """A driver on its bench: stand, kind, driver, url."""
-    return placed(stand, *request.param)
+def test_every_driver_has_a_place() -> None:
+    used = {gyro.driver for name in shipped_benches() for gyro in read_bench(name).gyros}
+    assert used <= set(names_of(GyroDriver))
+    assert all(place_of(name).is_simulated for name in OWN)
 
 
-@pytest.fixture(params=GYROS)
-def gyro(request: pytest.FixtureRequest, stand: Make) -> Any:
-    """A gyro driver on its bench."""
-    return placed(stand, "gyro", request.param)
+@pytest.mark.parametrize(("name", "check"), CHECKS, ids=[f"{name}-{check.__name__}" for name, check in CHECKS])
+def test_a_driver_does_what_every_driver_must(name: str, check: Any) -> None:
+    stand = open_stand(name, place_of(name))
+    assert check(stand) is None  # raises what the driver does otherwise
+    stand.bench.close()
 
 
-def placed(stand: Make, kind: str, name: str) -> Any:
-    bench, changes = PLACES[name]
-    s = stand(bench, **{kind: changes})
-    s.kind = kind
-    s.driver = {"table": s.bench.table, "chamber": s.bench.chamber, "gyro": s.gyro}[kind]
-    place = {"table": s.file.table, "chamber": s.file.chamber, "gyro": s.file.gyros[0]}[kind]
-    s.url = getattr(place, "port", None) or place.host
-    return s
+@pytest.fixture(params=OWN)
+def stand(request: pytest.FixtureRequest) -> Iterator[Stand]:
+    opened = open_stand(request.param, place_of(request.param))
+    yield opened
+    opened.bench.close()
 
 
-def talk(s: Any) -> None:
-    """Ask something that needs an answer."""
-    if s.kind == "gyro":
-        s.driver.start()
-        s.driver.read_latest()
-    else:
-        s.driver.identify()
-
-
-def test_every_driver_is_on_a_shipped_bench_or_named_here() -> None:
-    assert set(PLACES) == {driver for _, driver in DRIVERS}
-    used = {g.driver for name in shipped_benches() for g in read_bench(name).gyros}
-    assert used <= set(GYROS)
-
-
-def test_every_method_of_the_protocol_is_there_and_says_what_it_does(one: Any) -> None:
-    protocol, driver = PROTOCOLS[one.kind], type(one.driver)
-    for name, member in inspect.getmembers(protocol):
+def test_every_method_says_what_it_does(stand: Stand) -> None:
+    driver = type(stand.driver)
+    for name, member in inspect.getmembers(PROTOCOLS[stand.kind]):
         if name.startswith("_") or not (inspect.isfunction(member) or isinstance(member, property)):
             continue
         if isinstance(member, property) and not hasattr(driver, name):
-            assert hasattr(one.driver, name)  # a plain attribute will do for what never changes
-            continue
-        own = getattr(driver, name)
-        text = inspect.getdoc(own)
+            continue  # a plain attribute will do for what never changes
+        text = inspect.getdoc(getattr(driver, name))
         assert text, f"{driver.__name__}.{name} has no docstring"
         assert text.split()[0] in FIRST_WORDS, f"{driver.__name__}.{name}: {text!r}"
-        if inspect.isfunction(member):
-            assert list(inspect.signature(own).parameters) == list(inspect.signature(member).parameters), name
 
 
-def test_making_a_driver_sends_nothing(one: Any) -> None:
-    assert one.clock.now_s() == 0
+class Crooked(KvhGyro):
+    """A driver that does some of it wrong."""
 
+    def identify(self) -> Any:
+        raise ValueError("no\nidentity")
 
-def test_it_says_who_it_is(one: Any) -> None:
-    found = one.driver.identify()
-    if one.kind == "gyro":
-        assert found.serial == one.file.gyros[0].serial
-        assert found.technology
-    else:
-        assert found
+    def read(self, duration_s: float) -> Readings:
+        good = super().read(duration_s)
+        return Readings(good.t_s, {name: -values for name, values in good.raw.items()}, good.valid)
 
-
-def test_silence_is_a_link_error_that_names_the_device(one: Any) -> None:
-    one.faults(one.url).arm("silence")
-    with pytest.raises(LinkError) as caught:
-        talk(one)
-    assert str(caught.value).startswith(f"{one.driver.name}: ")
-    assert caught.value.device == one.driver.name
-    assert one.clock.now_s() < 60, "a silent device must not hold the bench up"
-
-
-def test_a_dropped_link_is_said_and_can_be_opened_again(one: Any) -> None:
-    talk(one)
-    # Modbus drivers open the link again by themselves; streams and the table say that it broke
-    one.faults(one.url).arm("dropped_link", count=1)
-    try:
-        talk(one)
-    except LinkError as error:
-        assert error.device == one.driver.name  # noqa: PT017  either outcome is right; a wrong one is not
-    talk(one)
-
-
-@pytest.mark.parametrize("fault", ["split", "noise", "merge"])
-def test_a_bad_wire_gives_a_right_answer_or_an_instrument_error(one: Any, fault: str) -> None:
-    talk(one)
-    faults = one.faults(one.url)
-    for trial in range(12):
-        now = one.clock.now_s()
-        armed = faults.arm(fault, from_s=now, until_s=now + 0.5, count=1, value=3)
+    def read_latest(self, fresh: bool = True) -> Readings:
         try:
-            talk(one)
-        except InstrumentError as error:
-            assert error.device == one.driver.name, f"trial {trial}"  # noqa: PT017  either outcome is right
-        armed.count = 0
-        one.clock.sleep(1.0)
-    talk(one)
+            return super().read_latest()
+        except NoReply:
+            return Readings(np.zeros(1), {}, np.zeros(1, dtype=bool))
 
 
-def test_closing_twice_does_no_harm(one: Any) -> None:
-    talk(one)
-    identity = one.driver.identify()
-    close = one.driver.stop if one.kind == "gyro" else one.driver.close
-    close()
-    close()
-    talk(one)
-    assert one.driver.identify() == identity
+def test_what_a_driver_does_wrong_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    def make(*given: Any) -> Crooked:
+        return Crooked(*given, model=KVH_DSP3000)
+
+    trial = Trial(section={"port": "sim://kvh-dsp3000/fog", "sample_rate_hz": 100})
+    monkeypatch.setitem(DRIVERS._loaded, "kvh-dsp3000", GyroDriver(KvhSettings, make, trial))
+    found = {outcome.check: outcome.problem for outcome in try_driver("kvh-dsp3000")}
+    assert found["has every method"] == "Crooked.read_latest takes ['fresh']; Gyro says []"
+    assert found["says who it is"] == ("raised ValueError: no; every failure of a driver must be an InstrumentError")
+    assert found["reports silence"] == "Crooked answers, but the instrument is silent; raise NoReply after a time-out"
+    assert found["sees the rate of the table"].startswith("gyro_z follows a table rate of 20")
+    assert found["gives whole numbers at rising times"] == ""
+    assert found["sends nothing when it is made"] == ""
 
 
-def test_limits_are_refused_before_anything_moves(one: Any) -> None:
-    if one.kind == "table":
-        with pytest.raises(LimitError):
-            one.driver.spin(one.driver.limits.max_rate_dps * 1.01, 1.0)
-        assert not one.world.table.moving(one.clock.now_s())
-    elif one.kind == "chamber":
-        before = one.driver.read().setpoint_c
-        for wrong in (one.driver.limits.max_c + 1, one.driver.limits.min_c - 1):
-            with pytest.raises(LimitError):
-                one.driver.set_temperature_c(wrong)
-        assert one.driver.read().setpoint_c == before
-    else:
-        limits = one.driver.limits
-        assert limits.max_rate_dps > 0
-        assert limits.min_c < limits.max_c
-
-
-def test_a_gyro_gives_whole_numbers_at_rising_times(gyro: Any) -> None:
-    gyro.driver.start()
-    parts = [gyro.driver.read(1.0) for _ in range(4)]
-    times = np.concatenate([p.t_s for p in parts])
-    assert np.all(np.diff(times) > 0)
-    assert len(times) == pytest.approx(4 * gyro.driver.sample_rate_hz, abs=3)
-    names = {channel.name for channel in gyro.driver.channels}
-    for part in parts:
-        assert set(part.raw) == names
-        assert all(values.dtype == np.int64 for values in part.raw.values())
-        assert part.valid.dtype == bool
-    glanced = gyro.driver.read_latest()
-    assert len(glanced) == 1
-    assert gyro.clock.now_s() - glanced.t_s[0] <= 2 / gyro.driver.sample_rate_hz + 0.1
+def test_every_check_says_what_it_checks() -> None:
+    for check in (*COMMON, *(each for checks in OF_KIND.values() for each in checks)):
+        assert check.__doc__

@@ -85,7 +85,9 @@ def test_the_unit_says_who_it_is(stand: Make) -> None:
 def test_the_serial_number_of_the_bench_file_is_held_against_the_units(stand: Make, written: str) -> None:
     assert unit(stand, serial=written).gyro.identify().serial == written
     other = unit(stand, {"serial": "N25582405002003"}, serial=written)
-    with pytest.raises(WrongInstrument, match=f"has serial number N25582405002003, bench file {written}; connect the"):
+    with pytest.raises(
+        WrongInstrument, match=f"has serial number N25582405002003, bench file or campaign says {written}; connect the"
+    ):
         other.gyro.identify()
 
 

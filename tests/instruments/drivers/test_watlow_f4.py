@@ -222,7 +222,7 @@ def test_an_f4p_in_manual_mode_runs_no_profile(f4: Any, absent: int | None) -> N
     del f4.simulated._cells[4100]
     f4.simulated.absent, f4.simulated.mode = absent, 2
     for act in (lambda: f4.driver.set_temperature_c(40.0), f4.driver.make_safe):
-        with pytest.raises(RequestRejected, match=r"is in manual mode, .* set it to auto at its panel"):
+        with pytest.raises(RequestRejected, match=r"is in manual mode, .* set the controller to auto at its panel"):
             act()
     assert TERMINATE_FRAME not in sent(f4)
     f4.simulated.mode = 1

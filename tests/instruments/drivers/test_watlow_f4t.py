@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from instruments.drivers.watlow_f4t import ALARMS_EVERY_S
+from instruments.drivers.chambers.watlow_f4t import ALARMS_EVERY_S
 from instruments.errors import LimitError, LinkError, MalformedReply, NoReply, RequestRejected, WrongInstrument
 from instruments.interfaces.chamber import ChamberLimits
 

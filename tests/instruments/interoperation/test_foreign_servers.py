@@ -18,10 +18,10 @@ from pyModbusTCP.server import DataBank, ModbusServer
 
 from instruments.bench_config import BenchFile, read_bench
 from instruments.clock import ScaledClock, SystemClock
+from instruments.drivers.chambers.watlow_f4 import WatlowF4
+from instruments.drivers.chambers.watlow_f4t import WatlowF4T
 from instruments.drivers.gyrostar import Gyrostar
 from instruments.drivers.resolution import resolve
-from instruments.drivers.watlow_f4 import WatlowF4
-from instruments.drivers.watlow_f4t import WatlowF4T
 from instruments.errors import LinkError
 from instruments.simulators.links.real_ports import RealPorts
 from instruments.transport.factory import Ports

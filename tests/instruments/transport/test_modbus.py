@@ -19,7 +19,7 @@ from instruments.simulators.links.modbus_device import ModbusDevice, constant, i
 from instruments.transport.factory import Ports
 from instruments.transport.modbus import Registers
 from instruments.transport.modbus_link import RETRY_PAUSES_S, Client, RefusedRegister
-from instruments.transport.rtu_line import LEAST_LATENCY_S, SILENCE_FACTOR
+from instruments.transport.rtu.line import LEAST_LATENCY_S, SILENCE_FACTOR
 
 AIR = Register(100, "air temperature", "int16", "counts")
 SETPOINT = Register(300, "set point", "int16", "counts", low=-400, high=1500, access="rw")
@@ -371,5 +371,8 @@ def test_a_real_host_that_refuses_is_named() -> None:
 
 
 def test_a_real_port_that_is_not_there_is_named() -> None:
-    with pytest.raises(LinkError, match="chamber: serial port /dev/no-such-port cannot be opened; check its name"):
+    with pytest.raises(
+        LinkError,
+        match=r"chamber: port /dev/no-such-port cannot be opened \(No such file or directory\); check the cable",
+    ):
         Ports(VirtualClock()).modbus_rtu("/dev/no-such-port", device="chamber", baudrate=9600, timeout_s=1.0)

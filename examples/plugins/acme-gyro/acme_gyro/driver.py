@@ -8,7 +8,7 @@ from pydantic import Field
 from acme_gyro.protocol import C_PER_COUNT, COUNTER_WRAP, DPS_PER_COUNT, decode
 from instruments.bench_config import GyroSettings
 from instruments.clock import Clock
-from instruments.drivers.driver import GyroDriver
+from instruments.drivers.driver import GyroDriver, Trial
 from instruments.errors import NoReply
 from instruments.interfaces.gyro import Channel, GyroIdentity, GyroLimits, Readings
 from instruments.transport.factory import Ports
@@ -119,4 +119,4 @@ class G1:
         return Readings(times, raw, np.ones(len(good), dtype=bool), lost, damaged)
 
 
-DRIVER = GyroDriver(G1Settings, G1)
+DRIVER = GyroDriver(G1Settings, G1, Trial(section={"port": "sim://acme-g1"}, unit={"profile": "rd2100"}))

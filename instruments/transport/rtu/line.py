@@ -27,6 +27,10 @@ POLL_S = 0.02
 STRAY_BYTES = b"\x00\xff"
 
 
+class NeverSilent(MalformedReply):
+    """Something sends on the line all the time: no further try helps."""
+
+
 class RtuLine:
     """What is known of one line. `remarks` tells a technician what was survived."""
 
@@ -56,7 +60,7 @@ class RtuLine:
     def await_silence(self, port: SerialPort) -> None:
         """Read and drop until the line was silent for longer than the longest latency; at once when nothing is due.
 
-        Raises MalformedReply for a line that is never silent, and an error of `BROKEN`.
+        Raises NeverSilent for such a line, and an error of `BROKEN`.
         """
         if self._doubtful_since_s is None:
             return
@@ -71,7 +75,7 @@ class RtuLine:
             elif now_s >= silent_until_s - 1e-9:
                 break
             if now_s - begun_s >= LONGEST_DRAIN_S:
-                raise MalformedReply(
+                raise NeverSilent(
                     self._device,
                     f"the line was never silent for {SILENCE_FACTOR * self._latency_s:.2g} s in {LONGEST_DRAIN_S:g} s "
                     "without a request; find the second master, or the device that sends by itself, on this line",

@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 
 from instruments.clock import Clock
+from instruments.drivers import probes
+from instruments.drivers.chambers.watlow import REPLY_S, Watlow
 from instruments.drivers.driver import ChamberDriver
-from instruments.drivers.watlow import REPLY_S, Watlow
 from instruments.errors import MalformedReply, RequestRejected
 from instruments.protocols import watlow_f4t_registers as f4t
 from instruments.protocols.modbus_codes import DEVICE_FAILURE, ILLEGAL_ADDRESS
@@ -161,4 +162,4 @@ class WatlowF4T(Watlow):
             return None
 
 
-DRIVER = ChamberDriver(WatlowSettings, WatlowF4T)
+DRIVER = ChamberDriver(WatlowSettings, WatlowF4T, probe=probes.F4T)

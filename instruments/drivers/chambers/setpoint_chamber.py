@@ -1,22 +1,29 @@
-"""Base of the Watlow chamber drivers: a set point is limited, rounded, written on change only and read back."""
+"""Base of the chamber drivers: a set point is limited, rounded, written on change only and read back."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from typing import Protocol
 
+from instruments.bench_config import ChamberSettings
 from instruments.clock import Clock
 from instruments.errors import LimitError, RequestRejected, WrongInstrument
 from instruments.interfaces.chamber import ChamberLimits, ChamberState
-from instruments.protocols.watlow_settings import WatlowSettings
-from instruments.transport.modbus import Registers
 
-REPLY_S = 1.0
 #: Rounding of counts and floats; far below any set point's resolution.
 TINY_C = 1e-6
 
 
-class Watlow(ABC):
-    """A chamber on a Watlow controller.
+class Link(Protocol):
+    """The part of a link that every chamber uses."""
+
+    def close(self) -> None:
+        """Close the link; safe to call twice."""
+        ...
+
+
+class SetpointChamber(ABC):
+    """A chamber whose controller is given set points.
 
     The controller's limits are read once; the narrower of controller and bench file apply. A profile on the controller
     belongs to a person: the driver does not end it in favour of its own set point. Only `make_safe` ends a profile, and
@@ -25,10 +32,10 @@ class Watlow(ABC):
 
     name = "chamber"
 
-    def __init__(self, settings: WatlowSettings, registers: Registers, clock: Clock) -> None:
-        self.settings = settings
+    def __init__(self, settings: ChamberSettings, link: Link, clock: Clock) -> None:
+        self._own_settings = settings
         self.safe_c = settings.safe_c
-        self._registers, self._clock = registers, clock
+        self._link, self._clock = link, clock
         self._limits: ChamberLimits | None = None
         self._has_controlled = False
 
@@ -37,7 +44,7 @@ class Watlow(ABC):
         """Get the narrower limits of controller and bench file; the first use reads the controller and may raise."""
         if self._limits is None:
             low, high = self._controller_limits()
-            settings = self.settings
+            settings = self._own_settings
             self._limits = ChamberLimits(
                 max(low, settings.min_c), min(high, settings.max_c), self._resolution_c(), settings.ramp_c_per_min
             )
@@ -87,7 +94,7 @@ class Watlow(ABC):
         """Control the set point: limited, rounded, written on change only (EEPROM wear); returns the value read back.
 
         Raises LimitError (nothing was written), RequestRejected while a profile runs or when another value is read
-        back, and what a register access raises.
+        back, and what an exchange with the controller raises.
         """
         rounded = self._checked(temperature_c)
         self._refuse_without_effect()
@@ -107,12 +114,16 @@ class Watlow(ABC):
         return self._write_and_verify(rounded)
 
     def read(self) -> ChamberState:
-        """Get air temperature, set point (deg C) and alarms; raises what a register read raises."""
+        """Get air temperature, set point (deg C) and alarms; raises what an exchange with the controller raises."""
         return ChamberState(self._clock.now_s(), self._read_air(), self._read_setpoint(), self._alarms())
+
+    def shortcomings(self) -> tuple[str, ...]:
+        """Get why a set point would have no effect, and what to do; raises what a read of the controller raises."""
+        return tuple(filter(None, [self._hindrance()]))
 
     def close(self) -> None:
         """Control the link: close it. The controller keeps its set point."""
-        self._registers.close()
+        self._link.close()
 
     def _checked(self, temperature_c: float) -> float:
         limits = self.limits

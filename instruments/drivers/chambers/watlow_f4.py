@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from instruments.clock import Clock
+from instruments.drivers import probes
+from instruments.drivers.chambers.watlow import REPLY_S, Watlow
 from instruments.drivers.driver import ChamberDriver
-from instruments.drivers.watlow import REPLY_S, Watlow
 from instruments.errors import RequestRejected
 from instruments.protocols import watlow_f4_registers as f4
 from instruments.protocols.modbus_codes import ILLEGAL_ADDRESS
@@ -13,6 +14,7 @@ from instruments.protocols.watlow_settings import WatlowSettings
 from instruments.transport.factory import Ports
 from instruments.transport.modbus import Registers
 from instruments.transport.modbus_link import Client, RefusedRegister
+from instruments.transport.serial_stream import line_of
 
 
 class WatlowF4(Watlow):
@@ -21,8 +23,9 @@ class WatlowF4(Watlow):
     def __init__(self, settings: WatlowSettings, ports: Ports, clock: Clock) -> None:
         def link() -> Client:
             return ports.modbus_rtu(
-                settings.port or "", device=self.name, baudrate=settings.baudrate, timeout_s=REPLY_S
-            )
+                settings.port or "", device=self.name, baudrate=settings.baudrate, timeout_s=REPLY_S,
+                line=line_of(settings.line),
+            )  # fmt: skip
 
         registers = Registers(
             self.name, settings.address, clock, link, pause_s=f4.PAUSE_S, write_function=settings.write_function
@@ -73,7 +76,10 @@ class WatlowF4(Watlow):
 
     def _hindrance(self) -> str:
         if self._is_manual(self._mode()):
-            return "the controller is in manual mode, a set point would have no effect; set it to auto at its panel"
+            return (
+                "the controller is in manual mode, a set point would have no effect; set the controller to auto at "
+                "its panel"
+            )
         return super()._hindrance()
 
     def _is_manual(self, mode: int) -> bool:
@@ -127,4 +133,4 @@ class WatlowF4(Watlow):
         return state == self._registers.get_int(f4.INPUT_ACTIVE.nth(number, f4.INPUT_SETUP_STRIDE))
 
 
-DRIVER = ChamberDriver(WatlowSettings, WatlowF4)
+DRIVER = ChamberDriver(WatlowSettings, WatlowF4, probe=probes.F4)

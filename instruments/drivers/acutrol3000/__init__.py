@@ -1,0 +1,1 @@
+"""Driver of a servo table on an ACUTROL 3000."""

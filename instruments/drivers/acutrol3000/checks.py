@@ -1,0 +1,82 @@
+"""What the driver of an ACUTROL 3000 finds out before a motion and after one failed: interlocks, faults and limits."""
+
+from __future__ import annotations
+
+import re
+
+from instruments.clock import Clock
+from instruments.drivers.acutrol3000.link import AcutrolLink
+from instruments.errors import MalformedReply, RequestRejected, WrongInstrument
+from instruments.protocols.acutrol3000 import commands as acl
+from instruments.protocols.acutrol3000.settings import Acutrol3000Settings
+
+#: An interlock closes within this time, s: drives are enabled after a delay that the controller is configured for.
+CLOSE_S, POLL_S = 15.0, 0.2
+
+
+def numbers(device: str, text: str, least: int) -> list[float]:
+    """Return the numbers of a reply, separated by commas or semicolons; raises MalformedReply for fewer or others."""
+    try:
+        found = [float(part) for part in re.split("[;,]", text) if part.strip()]
+    except ValueError:
+        found = []
+    if len(found) < least:
+        raise MalformedReply(device, f"answered {text!r} where {least} numbers were expected; check axis and cable")
+    return found
+
+
+def check_factory_limits(device: str, settings: Acutrol3000Settings, found: list[float]) -> None:
+    """Compare rate and acceleration of the bench file with the controller's absolute limits; raises WrongInstrument."""
+    wanted = {"max_rate_dps": settings.max_rate_dps, "acceleration_dps2": settings.acceleration_dps2}
+    for (key, value), limit in zip(wanted.items(), found, strict=False):
+        if value > limit * (1 + 1e-9):
+            raise WrongInstrument(
+                device,
+                f"{key} = {value:g} of the bench file is beyond the controller's absolute limit {limit:g}; lower it",
+            )
+
+
+def interlock(axis: int, link: AcutrolLink) -> str:
+    """Return the state of the interlock by its first letter: closed, open or fault."""
+    return link.ask(f":Interlock? {axis}")[:1].upper()
+
+
+def interlock_cause(device: str, axis: int, link: AcutrolLink) -> str:
+    """Return why the interlock is not closed, to append to a message; empty while it is."""
+    state = interlock(axis, link)
+    if state == acl.CLOSED:
+        return ""
+    found = [
+        name
+        for register, names in (("INTLK", acl.INTERLOCKS), ("SWFLT", acl.SOFTWARE_FAULTS))
+        for name in acl.named_bits(int(numbers(device, link.ask(acl.register(f"A{axis}{register}")), 1)[0]), names)
+    ]
+    named = f" ({', '.join(found)})" if found else ""
+    return f"; its interlock is {'at fault' if state == acl.FAULT else 'open'}{named}"
+
+
+def close_interlock(device: str, settings: Acutrol3000Settings, link: AcutrolLink, clock: Clock) -> None:
+    """Close the interlock where it is open; a fault is reset only where the bench file says so.
+
+    Raises RequestRejected with what is at fault.
+    """
+    axis = settings.axis
+    state = interlock(axis, link)
+    if state == acl.CLOSED:
+        return
+    if state == acl.FAULT:
+        cause = interlock_cause(device, axis, link)
+        if not settings.reset_interlocks:
+            raise RequestRejected(
+                device,
+                f"cannot move{cause}; find out why, then reset it at the controller, or set reset_interlocks = true",
+            )
+        link.ask(":Interlock:Reset")
+    link.ask(acl.off(axis))  # no demand of before may move the table when it is servoed
+    link.ask(f":Interlock:Close {axis}")
+    deadline_s = clock.now_s() + CLOSE_S
+    while interlock(axis, link) != acl.CLOSED:
+        if clock.now_s() > deadline_s:
+            cause = interlock_cause(device, axis, link)
+            raise RequestRejected(device, f"does not close its interlock within {CLOSE_S:g} s{cause}; check the wiring")
+        clock.sleep(POLL_S)

@@ -1,0 +1,1 @@
+"""Drivers of analog gyros on fast inputs."""

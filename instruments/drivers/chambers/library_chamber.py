@@ -1,0 +1,77 @@
+"""Chambers of PyMeasure and MSL-Equipment."""
+
+from __future__ import annotations
+
+from instruments.clock import Clock
+from instruments.drivers.chambers.setpoint_chamber import SetpointChamber
+from instruments.drivers.driver import ChamberDriver
+from instruments.drivers.library_instrument import LibraryInstrument
+from instruments.errors import RequestRejected
+from instruments.protocols.library_settings import LibraryChamberSettings
+from instruments.transport.factory import Ports
+
+
+class LibraryChamber(SetpointChamber):
+    """Driver of a chamber that another library drives. Limits are those of the bench file, and the library's own."""
+
+    def __init__(self, settings: LibraryChamberSettings, ports: Ports, clock: Clock) -> None:
+        self._instrument = LibraryInstrument(self.name, settings, ports, clock)
+        super().__init__(settings, self._instrument, clock)
+        self._names = settings
+
+    def identify(self) -> str:
+        """Get what the instrument says of itself, after its air temperature was read; raises InstrumentError."""
+        said = f" {self._instrument.get(self._names.identity)}" if self._names.identity else ""
+        self._read_air()
+        return f"{self._names.instrument} of {self._names.library}{said}"
+
+    def make_safe(self) -> float:
+        """Control the chamber to its safe set point, and off where the bench file says so; returns the value read back.
+
+        Raises as `set_temperature_c` does.
+        """
+        found = super().make_safe()
+        if self._names.safe_state == "off":
+            self._instrument.call(self._names.stop)
+            self._has_controlled = False
+        return found
+
+    def _controller_limits(self) -> tuple[float, float]:
+        return -float("inf"), float("inf")  # the library refuses what is beyond its own
+
+    def _resolution_c(self) -> float:
+        return self._names.resolution_c
+
+    def _write_setpoint(self, temperature_c: float) -> None:
+        self._instrument.set(self._names.setpoint, temperature_c)
+        if self._has_controlled and self._names.start:
+            self._instrument.call(self._names.start)  # some take a set point over only then
+
+    def _read_setpoint(self) -> float:
+        return round(self._instrument.number(self._names.setpoint), 4)
+
+    def _read_air(self) -> float:
+        return self._instrument.number(self._names.temperature)
+
+    def _alarms(self) -> tuple[str, ...]:
+        found = self._instrument.get(self._names.alarms) if self._names.alarms else 0
+        return (f"{self._names.alarms} {found}",) if found else ()
+
+    def _profile_runs(self) -> bool:
+        if not self._names.program:
+            return False
+        if (mask := self._names.program_mask) is None:
+            return bool(self._instrument.get(self._names.program))
+        return bool(int(self._instrument.number(self._names.program)) & mask)
+
+    def _end_profile(self) -> None:
+        if not self._names.stop:
+            raise RequestRejected(self.name, "a program runs, and the bench file names no stop; end it at its panel")
+        self._instrument.call(self._names.stop)
+
+    def _switch_on(self) -> None:
+        if self._names.start and not self._has_controlled:
+            self._instrument.call(self._names.start)
+
+
+DRIVER = ChamberDriver(LibraryChamberSettings, LibraryChamber)

@@ -1,0 +1,159 @@
+"""Chambers that are spoken to in lines of text: one driver, and the lines of each maker as data."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from instruments.clock import Clock
+from instruments.drivers.chambers.setpoint_chamber import SetpointChamber
+from instruments.drivers.driver import ChamberDriver, Trial
+from instruments.protocols.text_lines.chamber_dialects import ESPEC, SIMSERV, THERMOTRON, Dialect
+from instruments.protocols.text_lines.chamber_settings import (
+    EspecSettings,
+    LineChamberSettings,
+    SimServSettings,
+    ThermotronSettings,
+)
+from instruments.protocols.text_lines.line_syntax import LineSyntax, Question
+from instruments.transport.factory import Ports
+from instruments.transport.line_link import LineLink
+from instruments.transport.serial_stream import line_of
+
+
+def open_link(device: str, settings: LineChamberSettings, ports: Ports, clock: Clock, syntax: LineSyntax) -> LineLink:
+    """Return the link of a chamber; nothing is opened yet."""
+    return LineLink(
+        device, settings.address_url, ports, clock, syntax, baudrate=settings.baudrate, line=line_of(settings.options)
+    )
+
+
+class TextChamber(SetpointChamber):
+    """A chamber on a line link, with a safe state that may be "off"."""
+
+    def __init__(self, settings: LineChamberSettings, ports: Ports, clock: Clock, syntax: LineSyntax) -> None:
+        self._lines = open_link(self.name, settings, ports, clock, syntax)
+        super().__init__(settings, self._lines, clock)
+        self._ends_off = settings.safe_state == "off"
+
+    def make_safe(self) -> float:
+        """Control the chamber to its safe set point, and off where the bench file says so; returns the value read back.
+
+        Raises as `set_temperature_c` does.
+        """
+        found = super().make_safe()
+        if self._ends_off:
+            self._switch_off()
+            self._has_controlled = False  # off is right from now on
+        return found
+
+    def _switch_off(self) -> None:
+        """Switch heating and cooling off."""
+        raise NotImplementedError
+
+
+class LineChamber(TextChamber):
+    """Driver of a chamber whose requests and replies are a dialect. `names` fills the braces of its requests."""
+
+    def __init__(
+        self,
+        settings: LineChamberSettings,
+        ports: Ports,
+        clock: Clock,
+        dialect: Dialect,
+        names: dict[str, object],
+        *,
+        acknowledges: bool = True,
+    ) -> None:
+        super().__init__(settings, ports, clock, dialect.syntax)
+        self._dialect, self._names, self._acknowledges = dialect, names, acknowledges
+
+    def identify(self) -> str:
+        """Get type and maker; raises RequestRejected, MalformedReply, NoReply or LinkError for another device."""
+        text = self._ask(self._dialect.identity)
+        self._read_air()
+        return f"{self._dialect.maker} {text}"
+
+    def _controller_limits(self) -> tuple[float, float]:
+        low, high = self._dialect.low, self._dialect.high
+        return (
+            -float("inf") if low is None else self._ask_c(low),
+            float("inf") if high is None else self._ask_c(high),
+        )
+
+    def _resolution_c(self) -> float:
+        return self._dialect.resolution_c
+
+    def _write_setpoint(self, temperature_c: float) -> None:
+        self._command(self._dialect.write, "set the set point", c=temperature_c)
+
+    def _read_setpoint(self) -> float:
+        return self._ask_c(self._dialect.setpoint)
+
+    def _read_air(self) -> float:
+        return self._ask_c(self._dialect.air)
+
+    def _alarms(self) -> tuple[str, ...]:
+        found = self._dialect.alarm_texts(self._ask(self._dialect.alarms))
+        if self._has_controlled and not self._runs():
+            found = (*found, "the chamber does not run")
+        return found
+
+    def _profile_runs(self) -> bool:
+        return self._dialect.runs_program(self._ask(self._dialect.program))
+
+    def _end_profile(self) -> None:
+        self._command(self._dialect.end_program, "end the program")
+
+    def _runs(self) -> bool:
+        return self._dialect.is_running(self._ask(self._dialect.running))
+
+    def _switch_on(self) -> None:
+        if not self._runs():
+            self._command(self._dialect.start, "start")
+
+    def _switch_off(self) -> None:
+        self._command(self._dialect.stop, "stop")
+
+    def _ask(self, question: Question) -> str:
+        return self._lines.ask(question.send.format(**self._names), question.reply, question.what)["text"].strip()
+
+    def _ask_c(self, question: Question) -> float:
+        return float(self._lines.ask(question.send.format(**self._names), question.reply, question.what)["c"])
+
+    def _command(self, command: str, what: str, **values: float) -> None:
+        line = command.format(**self._names, **values)
+        if self._acknowledges:
+            self._lines.ask(line, self._dialect.acknowledged, what)
+        else:
+            self._lines.tell(line, what)
+
+
+class Espec(LineChamber):
+    """Driver of a chamber on an Espec P-300 or SCP-220."""
+
+    def __init__(self, settings: EspecSettings, ports: Ports, clock: Clock) -> None:
+        prefix = "" if settings.unit is None else f"{settings.unit},"
+        super().__init__(settings, ports, clock, ESPEC, {"prefix": prefix})
+
+
+class SimServ(LineChamber):
+    """Driver of a Weiss or Votsch chamber with SimServ."""
+
+    def __init__(self, settings: SimServSettings, ports: Ports, clock: Clock) -> None:
+        names: dict[str, object] = {"index": settings.chamber_index, "variable": settings.variable}
+        super().__init__(settings, ports, clock, SIMSERV, names)
+
+
+class Thermotron(LineChamber):
+    """Driver of a Thermotron 3800, 8200 or 8800."""
+
+    def __init__(self, settings: ThermotronSettings, ports: Ports, clock: Clock) -> None:
+        syntax = replace(THERMOTRON.syntax, pause_s=settings.command_pause_s)
+        dialect = replace(THERMOTRON, syntax=syntax)
+        names: dict[str, object] = {"channel": settings.channel}
+        super().__init__(settings, ports, clock, dialect, names, acknowledges=settings.acknowledges)
+
+
+ESPEC_DRIVER = ChamberDriver(EspecSettings, Espec, Trial(section={"port": "sim://espec"}))
+SIMSERV_DRIVER = ChamberDriver(SimServSettings, SimServ, Trial(section={"port": "sim://weiss-simserv"}))
+THERMOTRON_DRIVER = ChamberDriver(ThermotronSettings, Thermotron, Trial(section={"port": "sim://thermotron"}))

@@ -1,0 +1,1 @@
+"""Drivers of reference thermometers and hygrometers."""

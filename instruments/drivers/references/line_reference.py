@@ -1,0 +1,92 @@
+"""Reference thermometers and hygrometers that are asked by lines of text."""
+
+from __future__ import annotations
+
+from instruments.clock import Clock
+from instruments.drivers.driver import ReferenceDriver, Trial
+from instruments.errors import MalformedReply, WrongInstrument
+from instruments.interfaces.gyro import Channel
+from instruments.interfaces.reference import ReferenceState
+from instruments.protocols.text_lines.line_syntax import LineSyntax
+from instruments.protocols.text_lines.reference_lines import LineReferenceSettings, Quantity
+from instruments.transport.factory import Ports
+from instruments.transport.line_link import LineLink
+from instruments.transport.serial_stream import line_of
+
+#: A precision readout averages for seconds before it answers.
+REPLY_S = 3.0
+
+
+def column_of(settings: LineReferenceSettings, column: str) -> str:
+    """Return the column of the recording that a quantity goes to."""
+    return settings.columns.get(column, column)
+
+
+class LineReference:
+    """Driver of a readout. A reading is a whole number of its resolution; the certificate's correction is added."""
+
+    def __init__(self, settings: LineReferenceSettings, ports: Ports, clock: Clock) -> None:
+        self.name = settings.name
+        self.settings = settings
+        self._clock, self._model = clock, settings.known
+        self.channels: tuple[Channel, ...] = tuple(
+            Channel(column_of(settings, name), each.unit, each.resolution, settings.corrections.get(name, 0.0))
+            for name, each in self._model.quantities.items()
+        )
+        self._lines = LineLink(
+            self.name, settings.address_url, ports, clock, LineSyntax(end=self._model.end),
+            baudrate=self._model.baudrate, timeout_s=REPLY_S, line=line_of(settings.options),
+        )  # fmt: skip
+
+    def identify(self) -> str:
+        """Get model, serial number and certificate, after a reading.
+
+        Raises WrongInstrument for another serial number than the bench file's, MalformedReply, NoReply, LinkError.
+        """
+        said = ""
+        if self._model.identity:
+            reply = self._lines.ask(self._model.identity, r".*\S.*", "say what it is")[0]
+            said = self._checked_serial(reply)
+        self.read()
+        certificate = f"; certificate {self.settings.certificate}" if self.settings.certificate else ""
+        return f"{said or self._model.title}{certificate}"
+
+    def _checked_serial(self, reply: str) -> str:
+        parts = [part.strip() for part in reply.split(",")]
+        wanted = self.settings.serial
+        if wanted and wanted not in parts:
+            raise WrongInstrument(
+                self.name,
+                f"says that it is {reply!r}, and the bench file names serial number {wanted!r}; correct the port, or "
+                "serial and certificate",
+            )
+        return reply
+
+    def read(self) -> ReferenceState:
+        """Get one reading of every quantity; raises MalformedReply for another unit, NoReply, LinkError."""
+        raw = {
+            channel.name: self._raw(quantity)
+            for channel, quantity in zip(self.channels, self._model.quantities.values(), strict=True)
+        }
+        return ReferenceState(self._clock.now_s(), raw)
+
+    def _raw(self, quantity: Quantity) -> int:
+        request = quantity.ask.replace("{input}", str(self.settings.input))
+        found = self._lines.ask(request, quantity.pattern, f"read by {request!r}")
+        unit = found.groupdict().get("unit")
+        if unit is not None and unit != quantity.says_unit:
+            raise MalformedReply(
+                self.name, f"answers in {unit!r} instead of {quantity.says_unit!r}; set its unit at its panel"
+            )
+        return round(float(found["value"]) / quantity.resolution)
+
+    def close(self) -> None:
+        """Control the link: close it; safe to call twice."""
+        self._lines.close()
+
+
+DRIVER = ReferenceDriver(
+    LineReferenceSettings,
+    LineReference,
+    Trial(section={"port": "sim://line-reference/reference", "model": "fluke-1529"}),
+)

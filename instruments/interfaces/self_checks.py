@@ -1,0 +1,39 @@
+"""What a driver may have beside its interface for a check of the bench: what keeps it from work, and its period."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+
+@runtime_checkable
+class SelfChecking(Protocol):
+    """An instrument that can say why it could not do its work although it answers."""
+
+    def shortcomings(self) -> tuple[str, ...]:
+        """Get what keeps the instrument from its work, each with what to do; nothing is changed. Raises as `read`."""
+        ...
+
+
+@dataclass(frozen=True)
+class StreamPeriod:
+    """Period of a stream by the clock of the computer, from the arrivals of its readings."""
+
+    nominal_s: float  #: of the bench file
+    measured_s: float | None  #: None where it is not known to half a per cent
+    u_share: float  #: standard uncertainty as a share of the period
+
+
+@runtime_checkable
+class StreamingGyro(Protocol):
+    """A gyro that sends readings by itself, at a period of its own clock."""
+
+    @property
+    def period(self) -> StreamPeriod:
+        """Get what is known of the period since the stream was started."""
+        ...
+
+    @property
+    def counter_step(self) -> tuple[int, int] | None:
+        """Get the usual step of the counter of its frames, and the one that the bench file means; None without."""
+        ...

@@ -1,0 +1,32 @@
+"""Settings of a table on an ACUTROL 3000, as a bench file gives them."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field, model_validator
+
+from instruments.bench_config import TableSettings
+
+
+class Acutrol3000Settings(TableSettings):
+    """Address, axis and reference of a servo table."""
+
+    tcp_port: int = 9878  #: with `host`; a serial `port` leads to the same stream through a device server
+    baudrate: int = 9600
+    axis: int = Field(default=1, ge=1, le=6)
+    direction: Literal[1, -1] = 1  #: -1 where a positive rate turns the table clockwise, seen from above
+    #: Of readings: what the encoder measured, or the rate that was demanded; the encoder's angles are kept in both.
+    reference: Literal["measured", "demanded"] = "measured"
+    rate_u_ppm: float = Field(default=20.0, ge=0)  #: standard uncertainty of a demanded rate
+    encoder_u_deg: float = Field(default=3e-4, gt=0)  #: standard uncertainty of an angle against another one
+    time_u_s: float = Field(default=5e-4, gt=0)  #: standard uncertainty of an angle's time, without what is common
+    still_dps: float = Field(default=0.01, gt=0)  #: the estimated rate of a table at rest is below
+    home_dps: float = Field(default=30.0, gt=0)  #: rate of homing; never beyond max_rate_dps
+    reset_interlocks: bool = False  #: a frozen interlock fault is reset by labctl; else a person does so
+
+    @model_validator(mode="after")
+    def _one_address(self) -> Acutrol3000Settings:
+        if (self.port is None) == (self.host is None):
+            raise ValueError("give either host (Ethernet) or port (serial) of the controller")
+        return self

@@ -1,0 +1,81 @@
+"""A gyro whose output is a voltage, read by fast analog inputs: wiring and averaging, as a bench file gives them."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field, model_validator
+
+from instruments.bench_config import GyroSettings, Strict
+
+#: Rates of the inputs, scans per second.
+DEFAULT_SCANS_PER_S = 1000.0
+
+
+class AnalogOptions(Strict):
+    """One input for each axis, and one for a thermometer where there is one."""
+
+    inputs: tuple[int, ...] = (0,)  #: of the axes, in their order
+    rest_v: float = 2.5
+    v_per_dps: float = 0.022
+    range_v: float = Field(default=10.0, gt=0)  #: largest voltage of the inputs
+    differential: bool = False
+    #: Scans whose mean is one reading; the reading's time is that of the last of them.
+    average: int = Field(default=1, ge=1, le=10000)
+    thermometer_input: int | None = None
+    thermometer_c_per_v: float = 20.0
+    thermometer_zero_c: float = -25.0  #: temperature at 0 V
+
+    @property
+    def all_inputs(self) -> tuple[int, ...]:
+        """Every input that is scanned, the thermometer's last."""
+        return self.inputs if self.thermometer_input is None else (*self.inputs, self.thermometer_input)
+
+
+class AnalogSettings(GyroSettings):
+    """`sample_rate_hz` is the rate of the inputs, scans per second; a reading is the mean of `average` of them."""
+
+    options: AnalogOptions = Field(default_factory=AnalogOptions)
+
+    @model_validator(mode="after")
+    def _wired(self) -> AnalogSettings:
+        inputs = self.options.all_inputs
+        if len(self.options.inputs) != len(self.axes):
+            raise ValueError(
+                f"options.inputs has {len(self.options.inputs)} inputs for {len(self.axes)} axes; one each"
+            )
+        if len(set(inputs)) < len(inputs):
+            raise ValueError(f"options.inputs {inputs}: an input carries two signals; give each its own")
+        return self
+
+    @property
+    def scans_per_s(self) -> float:
+        """Rate of the inputs."""
+        return self.sample_rate_hz or DEFAULT_SCANS_PER_S
+
+
+class LabJackSettings(AnalogSettings):
+    """A LabJack T7 or T4. `port` is where its stream comes from: by default TCP port 702 of `host`."""
+
+    tcp_port: int = 502
+    stream_port: int = 702
+    resolution_index: int = Field(default=0, ge=0, le=8)  #: of the stream; 0: the device's own choice
+    settling_us: float = Field(default=0.0, ge=0)
+
+    @model_validator(mode="after")
+    def _has_host(self) -> LabJackSettings:
+        if self.host is None:
+            raise ValueError("give host, the LabJack's address on the network")
+        return self
+
+    @property
+    def stream_url(self) -> str:
+        """Address of the stream."""
+        return self.port or f"socket://{self.host}:{self.stream_port}"
+
+
+class NidaqSettings(AnalogSettings):
+    """A device of National Instruments, by the name that its driver software gives it."""
+
+    device: str = "Dev1"
+    terminals: Literal["default", "rse", "nrse", "differential"] = "default"

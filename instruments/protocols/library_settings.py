@@ -1,0 +1,78 @@
+"""Instruments that another library drives: PyMeasure's or MSL-Equipment's classes, named in the bench file."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel, Field, JsonValue, model_validator
+
+from instruments.bench_config import ChamberSettings, ReferenceSettings, Strict
+from instruments.protocols.serial_options import SerialOptions
+from instruments.protocols.text_lines.chamber_settings import line_address
+
+
+class LibraryOptions(BaseModel):
+    """Which class, and how it is reached."""
+
+    library: Literal["pymeasure", "msl-equipment"] = "pymeasure"
+    #: Of pymeasure: module and class. Of msl-equipment: manufacturer and model, as its registry spells them.
+    instrument: str = Field(pattern=r"^[^:]+:[^:]+$")
+    baudrate: int = Field(default=9600, gt=0)
+    tcp_port: int = 0
+    options: SerialOptions = Field(default_factory=SerialOptions)
+    end: str = "\r\n"  #: line end of a request (pymeasure)
+    timeout_s: float = Field(default=3.0, gt=0)
+    address: str = ""  #: of msl-equipment, in its own words: "TCP::10.0.0.7::2000", "ASRL/dev/ttyUSB0"
+    #: Further arguments of the class (pymeasure), or properties of the connection (msl-equipment).
+    arguments: dict[str, JsonValue] = Field(default_factory=dict)
+    identity: str = ""  #: attribute that says who it is
+
+    @model_validator(mode="after")
+    def _has_address(self) -> LibraryOptions:
+        if self.library == "msl-equipment":
+            if not self.address:
+                raise ValueError('give address, in the words of msl-equipment: "TCP::10.0.0.7::2000"')
+        elif (getattr(self, "port", None) is None) == (getattr(self, "host", None) is None):
+            raise ValueError("give either port (a serial port) or host and tcp_port, one of the two")
+        return self
+
+    @property
+    def address_url(self) -> str:
+        """Address of the port (pymeasure)."""
+        return line_address(getattr(self, "port", None), getattr(self, "host", None), self.tcp_port)
+
+
+class LibraryChamberSettings(LibraryOptions, ChamberSettings):
+    """A chamber: names of the attributes or methods of its class."""
+
+    temperature: str = "temperature"
+    setpoint: str = "setpoint"
+    start: str = ""  #: called after each set point; empty: it needs no start
+    stop: str = ""  #: switches heating and cooling off
+    program: str = ""  #: other than 0 while a program runs; empty: the class does not tell
+    program_mask: int | None = None  #: bits of `program` that count
+    alarms: str = ""  #: other than 0 while there is an alarm
+    resolution_c: float = Field(default=0.1, gt=0)
+    safe_state: Literal["setpoint", "off"] = "setpoint"
+
+    @model_validator(mode="after")
+    def _can_be_off(self) -> LibraryChamberSettings:
+        if self.safe_state == "off" and not self.stop:
+            raise ValueError('safe_state = "off" needs stop, the method that switches heating and cooling off')
+        return self
+
+
+class LibraryQuantity(Strict):
+    """One quantity: an attribute, or a method without arguments."""
+
+    attribute: str
+    unit: str = "deg C"
+    resolution: float = Field(default=1e-4, gt=0)
+
+
+class LibraryReferenceSettings(LibraryOptions, ReferenceSettings):
+    """A thermometer or hygrometer: column -> attribute."""
+
+    reads: dict[str, LibraryQuantity] = Field(
+        default_factory=lambda: {"reference_c": LibraryQuantity(attribute="temperature")}, min_length=1
+    )

@@ -1,0 +1,1 @@
+"""Formats of gyro streams as data: lines of text and binary frames, from a TOML document to readings."""

@@ -1,0 +1,1 @@
+"""Devices that speak lines of text: what is asked, how a reply reads, and their settings."""

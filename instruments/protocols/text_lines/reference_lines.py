@@ -1,0 +1,126 @@
+"""Reference thermometers and hygrometers that are asked by lines of text: what to ask each model, as data.
+
+Any other instrument of the kind needs no code: a bench file gives `identity` and `quantities` itself.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+from pydantic import Field, field_validator, model_validator
+
+from instruments.bench_config import ReferenceSettings, Strict
+from instruments.protocols.serial_options import SerialOptions
+from instruments.protocols.text_lines.chamber_settings import line_address
+
+NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+VALUE = rf"\s*(?P<value>{NUMBER})\s*"
+#: Extended replies of Hart and Fluke readouts name the unit: `t: 25.587 C`.
+CELSIUS = rf"\s*t:\s*(?P<value>{NUMBER})\s*(?P<unit>[A-Z])\b.*"
+
+
+class Quantity(Strict):
+    """One quantity: how it is asked for, and how its reply is read."""
+
+    ask: str  #: the request, without its line end
+    pattern: str = VALUE  #: of the whole reply; group `value`, and `unit` where the reply names it
+    unit: str = "deg C"
+    says_unit: str = "C"  #: what the reply's group `unit` must be
+    resolution: float = Field(default=1e-4, gt=0)  #: readings are kept as whole numbers of this
+
+    @field_validator("pattern")
+    @classmethod
+    def _has_value(cls, pattern: str) -> str:
+        try:
+            groups = re.compile(pattern).groupindex
+        except re.error as error:
+            raise ValueError(f"pattern {pattern!r} is no regular expression: {error}") from error
+        if "value" not in groups:
+            raise ValueError(f"pattern {pattern!r} has no group (?P<value>...) for the number")
+        return pattern
+
+
+@dataclass(frozen=True)
+class ReferenceModel:
+    """One model of instrument."""
+
+    title: str
+    source: str
+    identity: str  #: the request; empty: it does not say who it is
+    serial: str  #: pattern of the reply; group `serial`
+    quantities: dict[str, Quantity]
+    end: str = "\r\n"
+    baudrate: int = 9600
+    tcp_port: int = 0
+
+
+#: Manufacturer, model, serial number, firmware: what SCPI instruments answer to *IDN?.
+IDN = r"[^,]*,[^,]*,\s*(?P<serial>[^,]*?)\s*(?:,.*)?"
+TEMPERATURE, HUMIDITY = "reference_c", "humidity_pct"
+PERCENT = Quantity(ask="*SRH", unit="%", resolution=1e-3)
+MODELS: dict[str, ReferenceModel] = {
+    "fluke-1529": ReferenceModel(
+        "Fluke 1529 Chub-E4", "Fluke 1529 manual p. 87 (FETCh? [<chn>]), 7.3.2", "*IDN?", IDN,
+        {TEMPERATURE: Quantity(ask="FETC? {input}")}, end="\r",
+    ),
+    "fluke-1524": ReferenceModel(
+        "Fluke 1523/1524", "as the 1529 of the same maker; its own guide was not at hand", "*IDN?", IDN,
+        {TEMPERATURE: Quantity(ask="FETC? {input}")}, end="\r",
+    ),
+    "fluke-1502a": ReferenceModel(
+        "Hart/Fluke 1502A, 1504", "Fluke 1504 manual p. 30, 7.3.1.1 (T, FETCH?, *IDN?)", "*IDN?", IDN,
+        {TEMPERATURE: Quantity(ask="T", pattern=CELSIUS)}, end="\r", baudrate=2400,
+    ),
+    "fluke-1521": ReferenceModel(
+        "Hart/Fluke 1521, 1522", "Fluke 1521 manual p. 42, 1522 manual p. 48, 8.2.1", "", "",
+        {TEMPERATURE: Quantity(ask="FETCH?", pattern=CELSIUS)}, end="\r", baudrate=2400,
+    ),
+    "omega-ithx": ReferenceModel(
+        "Omega iTHX", "MSLNZ/msl-equipment 51b9be3, omega/ithx.py (*SRTC, *SRH)", "", "",
+        {TEMPERATURE: Quantity(ask="*SRTC", resolution=1e-3), HUMIDITY: PERCENT}, end="\r", tcp_port=2000,
+    ),
+}  # fmt: skip
+
+
+class LineReferenceSettings(ReferenceSettings):
+    """A model that is known, or identity and quantities of any other."""
+
+    model: str = ""
+    baudrate: int | None = Field(default=None, gt=0)
+    tcp_port: int = 0
+    options: SerialOptions = Field(default_factory=SerialOptions)
+    input: int = Field(default=1, ge=1)  #: of a readout with several probes
+    end: str | None = None  #: line end of a request
+    identity: str | None = None
+    quantities: dict[str, Quantity] = Field(default_factory=dict)  #: column -> how it is asked for
+
+    @field_validator("model")
+    @classmethod
+    def _is_known(cls, model: str) -> str:
+        if model and model not in MODELS:
+            raise ValueError(f"model {model!r} is not known (there are {', '.join(MODELS)}); give quantities instead")
+        return model
+
+    @model_validator(mode="after")
+    def _is_complete(self) -> LineReferenceSettings:
+        if (self.port is None) == (self.host is None):
+            raise ValueError("give either port (a serial port) or host and tcp_port, one of the two")
+        if not self.model and not self.quantities:
+            raise ValueError(f"give model ({', '.join(MODELS)}), or quantities of another instrument")
+        return self
+
+    @property
+    def known(self) -> ReferenceModel:
+        """The model, with what the bench file says otherwise."""
+        known = MODELS.get(self.model) or ReferenceModel("reference", "the bench file", "", IDN, {})
+        return ReferenceModel(
+            known.title, known.source, known.identity if self.identity is None else self.identity, known.serial or IDN,
+            self.quantities or known.quantities, known.end if self.end is None else self.end,
+            self.baudrate or known.baudrate, self.tcp_port or known.tcp_port,
+        )  # fmt: skip
+
+    @property
+    def address_url(self) -> str:
+        """Address of the port."""
+        return line_address(self.port, self.host, self.known.tcp_port)

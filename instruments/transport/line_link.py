@@ -1,0 +1,143 @@
+"""Requests and replies as lines of text, over a serial port or a TCP socket: retries, reconnection, errors.
+
+A socket is a port by pyserial's address `socket://HOST:PORT`. A reply carries no number, so that after a reply that did
+not come in time the next request waits until the line was silent for longer than the longest latency.
+"""
+
+from __future__ import annotations
+
+import logging
+import re
+
+from instruments.clock import Clock
+from instruments.errors import InstrumentError, LinkError, MalformedReply, NoReply, RequestRejected
+from instruments.protocols.text_lines.line_syntax import LineSyntax
+from instruments.transport.factory import Ports
+from instruments.transport.rtu.line import RtuLine
+from instruments.transport.serial import BROKEN, EIGHT_N_1, Line, SerialPort
+
+log = logging.getLogger(__name__)
+
+#: Pauses before each further try, s.
+RETRY_PAUSES_S = (0.1, 1.0)
+TRIES = 1 + len(RETRY_PAUSES_S)
+#: A reply is never longer than this; a device that sends on without a line end is given up there.
+LONGEST_REPLY_BYTES = 4096
+#: Bytes of a reply that a message shows.
+SHOWN_BYTES = 60
+
+
+class LineLink:
+    """One device behind a port: one request at a time, bounded retries, every failure an InstrumentError."""
+
+    def __init__(
+        self, device: str, url: str, ports: Ports, clock: Clock, syntax: LineSyntax, *, baudrate: int,
+        timeout_s: float = 1.0, line: Line = EIGHT_N_1,
+    ) -> None:  # fmt: skip
+        self.device, self.url = device, url
+        self._ports, self._clock, self._syntax = ports, clock, syntax
+        self._baudrate, self._timeout_s, self._settings = baudrate, timeout_s, line
+        self._port: SerialPort | None = None
+        self._line = RtuLine(device, clock)
+        self._earliest_s = 0.0
+
+    def ask(self, request: str, reply: str, what: str) -> re.Match[str]:
+        """Return the reply to a request as the match of the pattern `reply` with the whole line; tried three times.
+
+        `what` names the request in messages. Raises the failure of the last try: NoReply, MalformedReply or LinkError;
+        RequestRejected at once where the device refuses.
+        """
+        begun_s = self._clock.now_s()
+        failure: LinkError | None = None
+        for attempt, pause_s in enumerate((0.0, *RETRY_PAUSES_S), start=1):
+            if failure is not None:
+                log.warning("link.retry", extra={"device": self.device, "attempt": attempt, "reason": str(failure)})
+            self._clock.sleep(pause_s)
+            try:
+                return self._ask_once(request, reply, what)
+            except LinkError as error:
+                failure = error
+                if isinstance(error, NoReply | MalformedReply):
+                    self._line.doubt()
+        assert failure is not None
+        text = str(failure).removeprefix(f"{self.device}: ")
+        spent_s = self._clock.now_s() - begun_s
+        raise type(failure)(self.device, f"{text} ({TRIES} tries in {spent_s:.2g} s)") from failure
+
+    def tell(self, request: str, what: str) -> None:
+        """Send a request that has no reply; raises LinkError."""
+        try:
+            self._send(request)
+        except BROKEN as error:
+            raise self._broken(what, error) from error
+        finally:
+            self._earliest_s = self._clock.now_s() + self._syntax.pause_s
+
+    def close(self) -> None:
+        """Close the port; safe to call twice. The next request opens it again."""
+        if self._port is not None:
+            self._port.close()
+            self._port = None
+
+    def _ask_once(self, request: str, reply: str, what: str) -> re.Match[str]:
+        try:
+            found = self._receive(self._send(request), what)
+        except BROKEN as error:
+            raise self._broken(what, error) from error
+        finally:
+            self._earliest_s = self._clock.now_s() + self._syntax.pause_s
+        if (match := re.fullmatch(reply, found)) is not None:
+            return match
+        if self._syntax.refusal and (refused := re.fullmatch(self._syntax.refusal, found)):
+            why = self._syntax.reason(refused["why"])
+            raise RequestRejected(self.device, f"refused to {what}: {why}; check its mode at its panel")
+        raise MalformedReply(
+            self.device,
+            f"answered {found[:SHOWN_BYTES]!r} to the request to {what}; check driver, line settings and cable",
+        )
+
+    def _send(self, request: str) -> SerialPort:
+        """Send a request on a silent line; returns the open port."""
+        self._clock.sleep(self._earliest_s - self._clock.now_s())
+        if self._port is None:
+            self._port = self._ports.serial(
+                self.url, device=self.device, baudrate=self._baudrate, timeout_s=self._timeout_s, line=self._settings
+            )
+        self._line.await_silence(self._port)
+        self._port.reset_input_buffer()
+        data = (request + self._syntax.end).encode(self._syntax.encoding)
+        self._line.send(data)
+        self._port.write(data)
+        return self._port
+
+    def _receive(self, port: SerialPort, what: str) -> str:
+        """Return the next line that is not empty, without its end; raises NoReply, MalformedReply, one of BROKEN."""
+        deadline_s = self._clock.now_s() + self._timeout_s
+        data = b""
+        while True:
+            data += port.read(max(port.in_waiting, 1))
+            lines = re.split(rb"[\r\n]+", data.lstrip(b"\r\n"))
+            if len(lines) > 1:
+                return lines[0].decode(self._syntax.encoding, errors="replace").strip()
+            if len(data) > LONGEST_REPLY_BYTES:
+                raise MalformedReply(
+                    self.device,
+                    f"sent {len(data)} bytes without a line end when asked to {what}; check the baud rate and that "
+                    f"{self.url} is this device",
+                )
+            if self._clock.now_s() >= deadline_s - 1e-9:
+                raise self._silent(data, what)
+
+    def _silent(self, data: bytes, what: str) -> LinkError:
+        if data.strip():
+            text = data.decode(self._syntax.encoding, errors="replace")[:SHOWN_BYTES]
+            return MalformedReply(
+                self.device, f"sent {text!r} without a line end when asked to {what}; check baud rate and cable"
+            )
+        return NoReply(
+            self.device, f"no answer to the request to {what} on {self.url}; check power, cable and line settings"
+        )
+
+    def _broken(self, what: str, error: Exception) -> InstrumentError:
+        self.close()
+        return LinkError(self.device, f"cannot {what}, the link {self.url} is gone ({error}); check cable and power")
