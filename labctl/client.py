@@ -7,9 +7,11 @@ Every method sends one HTTP request and returns a typed answer. Three errors are
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from datetime import datetime
 from pathlib import Path
 from types import TracebackType
 from urllib.parse import quote
@@ -19,6 +21,7 @@ from httpx_sse import ServerSentEvent, connect_sse
 
 from instruments.clock import Clock, SystemClock
 from labctl.calibration import Calibration, read_calibration
+from labctl.certification import warn
 from labctl.recording.files import recording_parts
 from labctl.service_connection import TIMEOUT_S, ServiceConnection, ServiceRefused, json_of, refusal
 from labctl.services.schemas.base import Request
@@ -68,6 +71,9 @@ class CalibrationFile:
     content: bytes
     etag: str
     media_type: str
+    state: str = ""  #: in-force, superseded, revoked or not-certified; empty: an older service does not say
+    due: datetime | None = None  #: until when it is valid, aware UTC; None: no date
+    warning: str = ""  #: that it is overdue or was revoked, in the service's words; empty: it is neither
 
     @property
     def calibration(self) -> Calibration:
@@ -106,9 +112,13 @@ class Client:
         """Close the connection."""
         self._connection.close()
 
-    def units(self) -> list[UnitResponse]:
-        """Return every unit that was measured or imported, by serial number."""
-        return self._connection.get_list("/api/units", UnitResponse)
+    def units(self, *, due_within: str | None = None) -> list[UnitResponse]:
+        """Return every unit that was measured or imported, by serial number.
+
+        With `due_within`, such as "30d", those that are due within that span or overdue, the earliest date first.
+        """
+        query = "" if due_within is None else f"?due_within={quote(due_within, safe='')}"
+        return self._connection.get_list(f"/api/units{query}", UnitResponse)
 
     def unit(self, serial: str) -> UnitResponse:
         """Return one unit: its recordings, its calibration versions, and which version is certified."""
@@ -130,16 +140,21 @@ class Client:
 
         With `held`, the file that the caller already has, its ETag is sent along; the same object is returned when it
         is still current, and nothing is downloaded. Raises ServiceRefused with slug `not-certified` when the unit has
-        no certified version, `not-found` when it does not exist.
+        no certified version, `not-found` when it does not exist. Issues a CalibrationWarning for a calibration that is
+        overdue or was revoked; the file then has the text as `warning`.
         """
         query = {"format": file_format} | ({} if version is None else {"version": str(version)})
         headers = {} if held is None else {"If-None-Match": held.etag}
         path = f"/api/units/{_part(serial)}/calibration"
         response = self._connection.request("GET", path, params=query, headers=headers)
+        due, warning = response.headers.get("x-labctl-due"), _warning(response.headers.get("warning", ""))
+        warn(warning)
         if held is not None and response.status_code == httpx.codes.NOT_MODIFIED:
-            return held
-        media_type = response.headers.get("content-type", "")
-        return CalibrationFile(serial, response.content, response.headers["etag"], media_type)
+            return held if warning == held.warning else replace(held, warning=warning)
+        return CalibrationFile(
+            serial, response.content, response.headers["etag"], response.headers.get("content-type", ""),
+            response.headers.get("x-labctl-state", ""), None if due is None else datetime.fromisoformat(due), warning,
+        )  # fmt: skip
 
     def recordings(self) -> list[RecordingResponse]:
         """Return every recording, newest first."""
@@ -244,6 +259,12 @@ class Client:
 def _update(event: ServerSentEvent) -> EventResponse | CampaignResponse:
     kind = CampaignResponse if event.event == "progress" else EventResponse
     return kind.model_validate_json(event.data)
+
+
+def _warning(field: str) -> str:
+    """Return the text of a `Warning` field as the service writes it (RFC 7234, 5.5): 299 agent "text"."""
+    found = re.fullmatch(r'299 \S+ "((?:[^"\\]|\\.)*)"', field)
+    return re.sub(r"\\(.)", r"\1", found[1]) if found else field
 
 
 def _part(serial: str) -> str:

@@ -19,6 +19,7 @@ from labctl.api.routers import (
     benches,
     calibrations,
     campaigns,
+    certification,
     effects,
     health,
     motions,
@@ -47,8 +48,8 @@ certifying and keys for an approver's.
 
 #: In the order of the API's description.
 ROUTERS = (
-    health, units, benches, effects, calibrations, plans, campaigns, schedule, recordings, motions, admin,
-    swagger_ui,
+    health, units, benches, effects, calibrations, certification, plans,
+    campaigns, schedule, recordings, motions, admin, swagger_ui,
 )  # fmt: skip
 #: Which of their routes take a key; every route of the others does.
 SAY_THEMSELVES = (health, swagger_ui)

@@ -90,7 +90,7 @@ class BoundedHttpProtocol(HttpToolsProtocol):
         elif self.phase is Phase.HEADERS and waited > self._limits.header_s:
             self._refuse(TIMED_OUT, f"the request's headers were not complete within {self._limits.header_s:g} s")
         elif self.phase is Phase.BODY and waited > self._limits.stalled_s:
-            self._refuse(TIMED_OUT, f"nothing of the request's body came for {self._limits.stalled_s:g} s")
+            self._refuse(TIMED_OUT, f"no part of the request's body arrived for {self._limits.stalled_s:g} s")
         elif self.phase is Phase.IDLE and waited > self._limits.idle_s:
             self.transport.close()
 

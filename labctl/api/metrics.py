@@ -28,6 +28,14 @@ class ServiceCollector(Collector):
         figures = self._service.metrics()
         by_state = figures.campaigns
         yield GaugeMetricFamily("labctl_units", "Units in the database", value=figures.units)
+        yield GaugeMetricFamily(
+            "labctl_units_overdue", "Units whose certification in force has ended", value=figures.overdue
+        )
+        yield GaugeMetricFamily(
+            "labctl_units_due_30d",
+            "Units whose certification ends within 30 days, or has ended",
+            value=figures.due_soon,
+        )
         yield GaugeMetricFamily("labctl_campaigns", "Campaigns in the database", value=sum(by_state.values()))
         yield GaugeMetricFamily("labctl_campaigns_failed", "Campaigns that failed", value=by_state.get("failed", 0))
         states = GaugeMetricFamily("labctl_campaigns_by_state", "Campaigns in each state", labels=["state"])
@@ -55,9 +63,13 @@ class ServiceCollector(Collector):
 def _of_the_log(of_requests: int) -> Iterator[Metric]:
     lost, repeated = held_back()
     repeated += of_requests
-    yield CounterMetricFamily("labctl_log_records_lost", "Records of the web process that were not written", value=lost)
     yield CounterMetricFamily(
-        "labctl_log_records_held_back", "Records that were held back as repetitions", value=repeated
+        "labctl_log_records_lost", "Log records of the web process that could not be written", value=lost
+    )
+    yield CounterMetricFamily(
+        "labctl_log_records_held_back",
+        "Log records that were left out because they repeat an earlier record",
+        value=repeated,
     )
 
 

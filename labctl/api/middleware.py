@@ -72,7 +72,8 @@ class AccessMiddleware:
         uploads = bool(scope["path"] in UPLOADS and not reads)
         if uploads and self._uploads >= MOST_UPLOADS:
             raise Overloaded(
-                f"{MOST_UPLOADS} recordings are being received already; send this one when one of them is complete"
+                f"{MOST_UPLOADS} recordings are being received already, the limit of this service; send this "
+                "recording again when one of the others is complete"
             )
         return uploads
 
@@ -94,7 +95,9 @@ class AccessMiddleware:
         if (authorization := headers.get("authorization")) is not None:
             return identify(self._service.store, authorization)
         if self._access.keys:
-            raise NotIdentified("this service requires a key: send `Authorization: Bearer KEY`")
+            raise NotIdentified(
+                "this service requires an API key: send `Authorization: Bearer KEY`; `labctl key create` makes one"
+            )
         self._refuse_foreign(scope, headers)
         claimed = unquote(headers.get(USER_HEADER, ""))[:100]
         return Caller(claimed if claimed.isprintable() and claimed else "local", Role.APPROVER, "loopback")
@@ -158,8 +161,8 @@ class _BoundedBody:
     def __init__(self, receive: Receive, declared: int, limit: int, held: _Held | None) -> None:
         self._receive, self._limit, self._held = receive, limit, held
         self._text = (
-            f"the request's body is larger than the limit of {limit} bytes; send less, or raise --max-upload-mib for "
-            "recordings"
+            f"the request's body is larger than the limit of {limit} bytes; send less, or for recordings start the "
+            "service with a larger --max-upload-mib"
         )
         self._taken = 0
         if declared > limit:
@@ -176,8 +179,8 @@ class _BoundedBody:
             raise HTTPException(TooLarge.status, self._text)
         if self._held is not None and size and self._held.now > self._held.limit:
             text = (
-                f"requests with {self._held.limit} bytes in all are being received already; send this one again in a "
-                "few seconds"
+                f"requests with {self._held.limit} bytes in all are being received already, the limit of this "
+                "service; send this request again in a few seconds"
             )
             raise HTTPException(Overloaded.status, text, {"Retry-After": str(Overloaded.retry_after_s)})
         return message

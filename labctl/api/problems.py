@@ -61,7 +61,9 @@ def _of_a_procedure(request: Request, error: ProcedureError) -> JSONResponse:
 
 def _of_the_request(request: Request, error: RequestValidationError) -> JSONResponse:
     places = listed(f"{'.'.join(str(p)[:LONGEST_KEY] for p in e['loc'])}: {e['msg']}" for e in error.errors())
-    return problem(422, "bad-request", "The request does not fit its description", places, request.url.path)
+    return problem(
+        422, "bad-request", "The request does not match the API description (api-docs)", places, request.url.path
+    )
 
 
 def _of_a_number(request: Request, error: OverflowError) -> JSONResponse:
@@ -70,7 +72,7 @@ def _of_a_number(request: Request, error: OverflowError) -> JSONResponse:
 
 
 def _of_a_text(request: Request, error: UnicodeEncodeError) -> JSONResponse:
-    text = f"a text has an incomplete character at position {error.start}; send valid Unicode"
+    text = f"a text value has an incomplete character at position {error.start}; send valid Unicode"
     return problem(400, "bad-input", "A text is not valid Unicode", text, request.url.path)
 
 

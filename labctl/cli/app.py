@@ -41,6 +41,7 @@ app = typer.Typer(
     help="Calibrate gyroscopes: run the bench, fit a model, compare it with the measurements, serve the calibration.",
 )
 app.add_typer(bench.app, name="bench")
+app.add_typer(plugins.driver_app, name="driver")
 app.add_typer(campaign.app, name="campaign")
 campaign.app.add_typer(schedule.app, name="schedule")
 campaign_control.add_to(campaign.app)
@@ -54,6 +55,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "simulate": recordings.simulate,
     "import": recordings.import_,
     "allan": noise.allan,
+    "orientation": noise.orientation,
     "fit": calibrations.fit,
     "effects": effects.effects,
     "plugins": plugins.plugins,
@@ -62,6 +64,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "improve": criticism.improve,
     "ladder": criticism.ladder,
     "trend": trend.trend,
+    "units": trend.units,
     "certify": calibrations.certify,
     "revoke": calibrations.revoke,
     "certifications": calibrations.certifications,

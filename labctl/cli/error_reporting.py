@@ -48,7 +48,7 @@ def _errors_as_lines() -> Iterator[None]:
         option = "--" + "-".join(str(part) for part in first["loc"]).replace("_", "-")
         raise _exit(f"{option} {first['input']!r}: {first['msg'][0].lower()}{first['msg'][1:]}", 2) from error
     except OverflowError as error:
-        raise _exit(f"a number is out of range ({error}); send a smaller one", 2) from error
+        raise _exit(f"a number is too large ({error}); give a smaller number", 2) from error
     except OSError as error:
         raise _exit(
             f"{error.filename or 'output'}: {error.strerror or error}; nothing was written; check path, permissions "

@@ -87,10 +87,10 @@ class Acceptance:
 
         lines = list(found.problems)
         if self.out is not None:
-            hint = f"the map is in {self.out}: correct it and import with --map {self.out}"
+            hint = f"the map was written to {self.out}: correct that file and import with --map {self.out}"
         elif not self.given and any("[" in line or "sample_rate_hz" in line for line in lines):
             hint = (
-                f"labctl import {self.path} --write-map MAP.toml writes the map so far, to correct and give with --map"
+                f"labctl import {self.path} --write-map MAP.toml writes the map so far; correct and give it with --map"
             )
         else:
             raise BadFile.of(self.path, lines)
@@ -100,11 +100,12 @@ class Acceptance:
         from labctl.errors import BadInput
 
         advice = (
-            "add --accept-map to import by it, or --write-map MAP.toml to write it, and give it with --map MAP.toml"
+            "add --accept-map to import with this map, or write it with --write-map MAP.toml, correct it and give it "
+            "with --map MAP.toml"
         )
         if self.quiet or not sys.stdin.isatty():
             raise BadInput(f"{self.path}: this map is proposed and not yet accepted; {advice}")
-        if not typer.confirm("import by this map?", default=False, err=True):
+        if not typer.confirm("import with this map?", default=False, err=True):
             stderr.print(f"nothing was imported; {advice}", style="dim")
             raise typer.Exit(1)
 

@@ -14,7 +14,7 @@ Database = Annotated[
     typer.Option(
         "--database",
         metavar="URL_OR_PATH",
-        help="The database; default: $LABCTL_DATABASE, else the one in the user's data folder.",
+        help="Database file or URL; default: $LABCTL_DATABASE if set, else a file in the user's data folder.",
     ),
 ]
 Serial = Annotated[str, typer.Argument(metavar="SERIAL", help="Serial number of the unit.")]
@@ -28,15 +28,17 @@ BenchName = Annotated[
     str | None,
     typer.Option("--bench", metavar="FILE", help="Bench file, or the name of a bench that ships with labctl."),
 ]
-CampaignId = Annotated[int | None, typer.Argument(metavar="ID", help="Campaign; default: the newest.")]
+CampaignId = Annotated[int | None, typer.Argument(metavar="ID", help="Number of the campaign; default: the newest.")]
 RecordingIds = Annotated[
     str | None,
     typer.Option(
-        "--recording", metavar="ID[,ID...]", help="Recording, or several as one: 1,2,3; default: the unit's newest."
+        "--recording",
+        metavar="ID[,ID...]",
+        help="Number of the recording, or of several to be used together: 1,2,3; default: the unit's newest.",
     ),
 ]
 RecordingId = Annotated[
-    int | None, typer.Option("--recording", metavar="ID", help="Recording; default: the unit's newest.")
+    int | None, typer.Option("--recording", metavar="ID", help="Number of the recording; default: the unit's newest.")
 ]
 
 
@@ -45,6 +47,9 @@ def recording_numbers(given: str | None) -> list[int]:
     found: list[int] = []
     for text in (given or "").split(",") if given is not None else ():
         if not text.strip().isdecimal() or not text.isascii():
-            raise BadInput(f"--recording {given!r}: {text!r} is no number of a recording; write 3, or several as 1,2,3")
+            raise BadInput(
+                f"--recording {given!r}: {text!r} is not a recording number; write one number such as 3, "
+                "or several as 1,2,3"
+            )
         found.append(int(text))
     return found

@@ -58,7 +58,11 @@ class TerminalOperator:
         line = sys.stdin.readline()
         if not line:  # end of input: no person is at the terminal
             limit = "" if prompt.within_s is None else f" within {prompt.within_s:g} s"
-            stderr.print(f"labctl: end of input: no answer comes from here; the campaign waits{limit}", markup=False)
+            stderr.print(
+                "labctl: the input of this terminal has ended, so no answer can be typed here; the "
+                f"campaign waits{limit}",
+                markup=False,
+            )
             return
         try:
             why = line.strip()

@@ -16,4 +16,4 @@ def turn_text(answer: CampaignResponse) -> str:
     if turn.phase == "rest":
         return f"keep the unit still, {turn.position} up"
     came = ", ".join(f"{deg:.0f}" for deg in turn.came_deg.values()) or "nothing"
-    return f"so far {came} deg of {turn.asked_deg:g} about {turn.position}"
+    return f"turned so far: {came} of {turn.asked_deg:g} deg about {turn.position}"

@@ -22,7 +22,7 @@ BEAT_S = 1.0
 #: and of changes at most this often, s.
 LEAST_BEAT_S = 0.1
 #: Acts of a person on a campaign; each is a method of CampaignControl.
-CONTROL = frozenset({"start", "schedule", "resume", "pause", "abort", "confirm"})
+CONTROL = frozenset({"start", "schedule", "resume", "pause", "abort", "confirm", "check"})
 
 
 @dataclass(frozen=True)

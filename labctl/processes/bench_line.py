@@ -8,8 +8,11 @@ import select
 import signal
 import threading
 from multiprocessing.connection import Connection
+from typing import NoReturn
 
 from instruments.clock import WallClock
+from labctl.errors import BenchSilent
+from labctl.log import get_logger
 from labctl.processes.calls import Call, Caller
 from labctl.processes.children import Child
 from labctl.processes.liveness import Elapsed
@@ -19,6 +22,8 @@ from labctl.services.benches.lease import driver_of, this_machine
 from labctl.services.planning.loading import load_bench
 from labctl.store import Holder, holder_of, is_url, open_store
 
+log = get_logger()
+
 ANSWER_S = 10.0
 
 
@@ -26,24 +31,54 @@ class BenchLine:
     """A bench process that this supervisor is in charge of."""
 
     def __init__(self, settings: BenchSettings, pid: int, child: Child | None = None) -> None:
-        """Take charge. Raises Conflict while another supervisor is, or for another bench; BenchSilent."""
+        """Take charge. Raises Conflict while another supervisor is, or for another bench; BenchSilent.
+
+        A process that accepts the call and does not answer within `ANSWER_S` is ended: it hangs, perhaps with a table
+        that turns, and the next one begins with the safe state.
+        """
         self.pid, self._child = pid, child
         self._handle = os.pidfd_open(pid)
         self._closed = False
         self.left: BenchLeft | None = None  #: how the bench was left, once the process has said so
-        self._line = self._take_charge(settings)
+        try:
+            self._line = self._take_charge(settings)
+        except BaseException:
+            os.close(self._handle)
+            raise
         self._heard = Elapsed()
         self._thread = threading.Thread(target=self._hear, name="bench-line", daemon=True)
         self._thread.start()
 
     def _take_charge(self, settings: BenchSettings) -> Connection:
         line = Caller(settings.folder / CALLS, ANSWER_S).connect()
-        line.send(Call("supervise", (settings,)))
-        said = line.recv()
+        try:
+            line.send(Call("supervise", (settings,)))
+            if not line.poll(ANSWER_S):
+                self._end_silent()
+            said = line.recv()
+        except (EOFError, OSError) as error:
+            line.close()
+            raise BenchSilent(
+                f"the bench process {self.pid} ended before it answered ({error or type(error).__name__}); read the "
+                "log for the cause, then start the service again"
+            ) from error
+        except BaseException:
+            line.close()
+            raise
         if said != "beat":
             line.close()
             raise said.raised
         return line
+
+    def _end_silent(self) -> NoReturn:
+        """End a process that does not answer, so that another one can drive the bench. Raises BenchSilent."""
+        log.error("child.silent", child="bench", child_pid=self.pid, silent_s=ANSWER_S)
+        self.signal(signal.SIGKILL)
+        select.select([self._handle], [], [], ANSWER_S)
+        raise BenchSilent(
+            f"the bench process {self.pid} has not answered within {ANSWER_S:g} s and was ended; start the "
+            "service again, and read the log for the cause"
+        )
 
     def _hear(self) -> None:
         with contextlib.suppress(EOFError, OSError):

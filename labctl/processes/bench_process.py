@@ -116,7 +116,7 @@ class BenchProcess:
 
     def _close(self) -> None:
         log.info("process.ending", running=self._local.running)
-        left = BenchLeft("how the bench was left is not known; inspect it", unconfirmed=True)
+        left = BenchLeft("the state of the bench is not known; inspect the bench", unconfirmed=True)
         try:
             left = self._local.close()
         finally:

@@ -99,10 +99,17 @@ def begin_child_log(name: str, location: str) -> None:
 
 
 def line_to_parent() -> tuple[Line, Any]:
-    """Return the line to the process that started this one, and the settings that came over it."""
+    """Return the line to the process that started this one, and the settings that came over it.
+
+    Raises SystemExit where that process ended before it sent settings: no process is left to report to, and nothing
+    was begun.
+    """
     line = Connection(int(sys.argv[1]))
     os.set_inheritable(line.fileno(), False)
-    return line, line.recv()
+    try:
+        return line, line.recv()
+    except (EOFError, ConnectionError):
+        sys.exit(1)
 
 
 def tell(line: Line, what: object) -> None:

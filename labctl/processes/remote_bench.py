@@ -18,8 +18,8 @@ from labctl.processes.settings import CALLS, STOP
 from labctl.services.benches.bench_left import BenchLeft
 from labctl.services.campaigns.listeners import ChangeListeners
 from labctl.services.commands.context import CommandContext
-from labctl.services.commands.requests import CampaignResume, CampaignStart, ToCampaign
-from labctl.services.schemas.benches import BenchDescription
+from labctl.services.commands.requests import CampaignResume, CampaignStart, ToBench, ToCampaign
+from labctl.services.schemas.benches import BenchCheckResponse, BenchDescription, CheckRequest
 from labctl.services.schemas.campaigns import CampaignResponse, ConfirmRequest, ReasonRequest
 from labctl.services.schemas.schedule import ScheduledResponse
 
@@ -95,6 +95,10 @@ class RemoteControl:
     def confirm(self, _: CommandContext, asked: ToCampaign[ConfirmRequest]) -> CampaignResponse:
         """Answer the question that a campaign waits for."""
         return self._ask("confirm", asked, timeout_s=TRANSACTION_S)
+
+    def check(self, _: CommandContext, asked: ToBench[CheckRequest]) -> BenchCheckResponse:
+        """Ask every instrument of the bench what it is and how it does."""
+        return self._ask("check", asked, timeout_s=OPENING_S)
 
     def _ask(self, act: str, asked: object, timeout_s: float) -> Any:
         return self._calls.call(f"control.{act}", asked, timeout_s=timeout_s)

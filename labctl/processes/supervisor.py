@@ -64,7 +64,7 @@ class _Restarts:
         if len(self._at_s) > MOST_RESTARTS:
             raise LabctlError(
                 f"{what} ended {len(self._at_s)} times within {RESTARTS_WITHIN_S / 60:g} min; labctl stops. Read the "
-                "log for the cause, then start it again"
+                "log for the cause, then start labctl again"
             )
 
 
@@ -173,7 +173,7 @@ class Supervisor:
         shutil.rmtree(self._folder, ignore_errors=True)
         if bench.left is not None:
             return bench.left
-        text = "the bench process ended without a report: how the bench was left is not known; inspect it"
+        text = "the bench process ended without a report: the state of the bench is not known; inspect the bench"
         return BenchLeft(text, unconfirmed=self._request.bench_name is not None)
 
     # -- the web process

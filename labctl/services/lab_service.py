@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import AsyncIterator, Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
+from datetime import timedelta
 from importlib.metadata import version
 from pathlib import Path
 
@@ -29,11 +30,14 @@ from labctl.services.schemas.campaigns import (
     EventResponse,
 )
 from labctl.services.schemas.service import HealthResponse, HeartbeatResponse, PulseResponse
+from labctl.services.units import count_due
 from labctl.store import Store
 from procedures.contracts.campaign_state import ENDED
 from procedures.execution.signals import shutdown_hook
 
 VERSION = version("labctl")
+#: How far ahead the monitor counts units that are due.
+DUE_SOON = timedelta(days=30)
 
 
 @dataclass(frozen=True)
@@ -44,6 +48,8 @@ class ServiceFigures:
     campaigns: Mapping[str, int]  #: by state
     running: bool  #: whether a campaign runs on the bench of this service
     heard_s: float  #: time since the last answer of the bench, s
+    overdue: int  #: units whose certification has ended
+    due_soon: int  #: units whose certification has ended, or ends within `DUE_SOON`
 
 
 class LabService:
@@ -168,6 +174,8 @@ class LabService:
     def metrics(self) -> ServiceFigures:
         """Return figures for a monitor."""
         access = self.bench_access
+        overdue, soon = count_due(self.store, self.clock.utc(), DUE_SOON)
         return ServiceFigures(
-            self.store.units.count(), self.store.campaigns.count_by_state(), access.running is not None, access.heard_s
-        )
+            self.store.units.count(), self.store.campaigns.count_by_state(), access.running is not None, access.heard_s,
+            overdue, soon,
+        )  # fmt: skip

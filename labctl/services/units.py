@@ -1,37 +1,69 @@
-"""Units: who they are and what is known of them."""
+"""Units: who they are, what is known of them, and when they are due."""
 
 from __future__ import annotations
 
-from labctl.errors import NotCertified
+from datetime import datetime, timedelta
+
 from labctl.exports import export_formats
-from labctl.services.schemas.units import ExportFormatResponse, UnitResponse
-from labctl.store import Store, Unit
+from labctl.services.calibrations.due import campaign_of
+from labctl.services.campaigns.plan_view import recipe_text
+from labctl.services.schemas.units import ExportFormatResponse, RecalibrationResponse, UnitResponse
+from labctl.store import CertificationRow, Store, Unit
 
 
-def list_units(store: Store) -> list[UnitResponse]:
-    """Return every unit."""
-    return [_answer(store, found) for found in store.units.all()]
+def list_units(store: Store, now: datetime, due_within: timedelta | None = None) -> list[UnitResponse]:
+    """Return every unit; with a span those whose certification ends within it, or has ended: the earliest date first.
+
+    A unit without a date, or without a version in force, is never due.
+    """
+    in_force = store.certifications.in_force()
+    if due_within is None:
+        return [_answer(store, found, in_force.get(found.serial), now) for found in store.units.all()]
+    near = {
+        serial: act for serial, act in in_force.items() if act.due_at is not None and act.due_at <= now + due_within
+    }
+    found = [
+        _answer(store, each, near[each.serial], now, whole=True) for each in store.units.all() if each.serial in near
+    ]
+    return sorted(found, key=lambda unit: (unit.due or now, unit.serial))
 
 
-def unit(store: Store, serial: str) -> UnitResponse:
+def unit(store: Store, serial: str, now: datetime) -> UnitResponse:
     """Return one unit; raises NotFound."""
-    return _answer(store, store.units.get(serial))
+    found = store.units.get(serial)
+    return _answer(store, found, store.certifications.in_force().get(found.serial), now, whole=True)
 
 
-def _answer(store: Store, found: Unit) -> UnitResponse:
-    try:
-        certified = store.calibrations.certified_version(found.serial)
-    except NotCertified:
-        certified = None
+def count_due(store: Store, now: datetime, within: timedelta) -> tuple[int, int]:
+    """Return how many units are overdue, and how many are or will be within a span."""
+    dates = [act.due_at for act in store.certifications.in_force().values() if act.due_at is not None]
+    return sum(date <= now for date in dates), sum(date <= now + within for date in dates)
+
+
+def _answer(
+    store: Store, found: Unit, act: CertificationRow | None, now: datetime, *, whole: bool = False
+) -> UnitResponse:
     return UnitResponse(
         serial=found.serial,
         model=found.model,
         technology=found.technology,
         recordings=[row.id for row in store.recordings.of_unit(found.serial)],
         calibrations=store.calibrations.versions(found.serial),
-        certified_version=certified,
+        certified_version=act.version if act else None,
+        due=act.due_at if act else None,
+        overdue=bool(act and act.due_at and act.due_at <= now),
+        recalibration=_recalibration(store, act) if act and whole else None,
         formats=[
-            ExportFormatResponse(id=name, title=each.title, suffix=each.suffix)
+            ExportFormatResponse(id=name, title=each.title, suffix=each.suffix, options=dict(each.options))
             for name, each in export_formats().items()
         ],
     )
+
+
+def _recalibration(store: Store, act: CertificationRow) -> RecalibrationResponse | None:
+    campaign = campaign_of(store, act.serial, act.version)
+    if campaign is None:
+        return None
+    row = store.campaigns.get(campaign)
+    text = recipe_text(row.recipe)
+    return RecalibrationResponse(recipe=text, name=row.recipe_name, bench=row.bench_name) if text else None

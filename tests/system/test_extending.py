@@ -88,6 +88,8 @@ def test_a_driver_with_its_simulator(outside: Callable[[str], Outside]) -> None:
     assert "gyros.0.driver: no driver 'acme-g1' is installed (there are gyrostar (labctl " in refused.stderr
     printed = user.follow()
     assert "[acme-g1 of acme-gyro 0.1.0]" in printed["labctl bench check acme-gyro/bench.toml"]
+    tried = printed["labctl driver test acme-g1"].splitlines()
+    assert tried[-1] == "acme-g1 of acme-gyro 0.1.0: all 11 checks passed"
     bench = user.folder / "acme-gyro" / "bench.toml"
     whole = bench.read_text("utf-8")
     bench.write_text(whole.replace('profile = "rd2100"', ""), encoding="utf-8")
@@ -132,7 +134,7 @@ def test_an_export(outside: Callable[[str], Outside]) -> None:
     refused = user.labctl("labctl calibration FOG-0001 --version 2 --format lookup-csv", status=2).stderr
     assert "format lookup-csv: the model needs supply_v too; use json" in refused
     unknown = user.labctl("labctl calibration FOG-0001 --version 1 --format lookup", status=2).stderr
-    assert "no export format 'lookup' is installed (there are c (labctl " in unknown
+    assert "no export format 'lookup' is installed (there are ardupilot (labctl " in unknown
     assert "did you mean 'lookup-csv'?" in unknown
     (user.site / "acme_table" / "export.py").write_text(BROKEN_EXPORT, encoding="utf-8")
     failed = user.labctl("labctl calibration FOG-0001 --version 1 --format lookup-csv", status=2).stderr

@@ -10,9 +10,9 @@ import pytest
 from instruments.bench import checked_settings
 from instruments.bench_config import BenchFile, read_bench
 from instruments.clock import Clock, ScaledClock, VirtualClock
+from instruments.drivers.chambers.watlow_f4 import WatlowF4
+from instruments.drivers.chambers.watlow_f4t import WatlowF4T
 from instruments.drivers.gyrostar import Gyrostar
-from instruments.drivers.watlow_f4 import WatlowF4
-from instruments.drivers.watlow_f4t import WatlowF4T
 from instruments.errors import InstrumentError, LinkError, NoReply
 from instruments.protocols.modbus_registers import Register
 from instruments.simulators.server import SimulationServer

@@ -86,6 +86,28 @@ def test_a_stopped_bench_process_is_told_of_and_replaced(service: ServiceProcess
     )
 
 
+def test_a_bench_process_that_stands_still_is_replaced_by_the_next_service(service: ServiceProcess) -> None:
+    campaign = started(service)
+    os.kill(service.bench_pid, signal.SIGSTOP)
+    service.process.kill()
+    service.process.wait()
+    heir = begin(labctl(service.database, "serve", "--port", "0", "--json", *SPEED, "--bench", "single-axis-sim"))
+    try:
+        reported = json.loads(first_line(heir))
+        assert reported["bench_pid"] != service.bench_pid
+        with httpx.Client(base_url=reported["url"], timeout=WAIT_S) as http:
+            while http.get(f"/api/campaigns/{campaign}").json()["state"] != "running":
+                pass  # the test has a time-out
+        heir.send_signal(signal.SIGTERM)
+        _, said = heir.communicate(timeout=WAIT_S)
+        lines = [json.loads(line) for line in said.splitlines() if line.startswith("{")]
+        assert {line["child_pid"] for line in lines if line["event"] == "child.silent"} == {service.bench_pid}
+        assert "bench single-axis-sim is safe" in said
+    finally:
+        heir.kill()
+        heir.communicate()
+
+
 def test_a_bench_process_outlives_its_supervisor_and_the_next_service_takes_charge_of_it(
     service: ServiceProcess,
 ) -> None:

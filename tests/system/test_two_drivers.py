@@ -27,7 +27,8 @@ def test_the_second_is_refused_and_takes_over_when_the_first_is_killed(simulator
     # another database knows nothing of that lease, but the ports are taken
     said = simulator.refused("other.sqlite")
     assert "table: port /dev/" in said
-    assert "exclusively lock" in said
+    assert "cannot be opened" in said
+    assert f"process {first.pid} " in said
     heard_before_the_kill = len(simulator.heard)
     first.send_signal(signal.SIGKILL)
     first.wait(timeout=WAIT_S)

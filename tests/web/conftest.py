@@ -14,7 +14,7 @@ from tests.helpers.browser import PATIENCE_MS, WIDE, Faults, Service
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, BrowserContext, Page
 
-CHROMIUM = shutil.which("chromium")
+CHROMIUM = shutil.which("chromium-headless-shell") or shutil.which("chromium")
 ARGUMENTS = (
     "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking",
     "--disable-component-update", "--disable-sync", "--enable-unsafe-swiftshader",
@@ -57,10 +57,13 @@ def faults() -> Iterator[Faults]:
 
 @pytest.fixture
 def visit(chromium: Browser, service: Service, faults: Faults) -> Iterator[Callable[..., Page]]:
-    """Open a page of the service in a browser of its own: `visit("/bench", size=NARROW, dark=True)`."""
+    """Open a page of the service in a browser of its own: `visit("/bench", size=NARROW, dark=True)`.
+
+    Unless `idle`, the browser is never idle: a page without figures does not load Plotly for the next one (1 s).
+    """
     contexts: list[BrowserContext] = []
 
-    def opened(path: str, *, size: dict[str, int] = WIDE, dark: bool = False) -> Page:
+    def opened(path: str, *, size: dict[str, int] = WIDE, dark: bool = False, idle: bool = False) -> Page:
         context = chromium.new_context(
             viewport=size,
             color_scheme="dark" if dark else "light",
@@ -68,6 +71,8 @@ def visit(chromium: Browser, service: Service, faults: Faults) -> Iterator[Calla
         )
         contexts.append(context)
         context.set_default_timeout(PATIENCE_MS)
+        if not idle:
+            context.add_init_script("window.requestIdleCallback = () => 0")
         page = context.new_page()
         page.on("pageerror", lambda error: faults.append(f"{path}: {error}"))
         page.on("console", lambda reported: faults.hear(path, reported))

@@ -32,7 +32,9 @@ def test_wrong_data_are_refused_in_words_and_fitted_only_when_it_is_insisted_on(
     page.get_by_label("Model", exact=True).select_option("ojeda2000")
     page.get_by_role("button", name="Fit", exact=True).click()
     expect(dialog).to_contain_text("Objections")
-    expect(dialog).to_contain_text("Wrong: data set 65, axis z: its rate is 60 deg/s, its output says 79.8")
+    expect(dialog).to_contain_text(
+        "Wrong: data set 65, axis z: the rate is given as 60 deg/s, but the output shows 79.8"
+    )
     expect(dialog).not_to_contain_text("--accept-warnings")
     dialog.get_by_role("button", name="Cancel").click()
     expect(dialog).to_have_count(0)

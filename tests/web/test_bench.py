@@ -10,8 +10,8 @@ import pytest
 
 from instruments.clock import SystemClock
 from labctl.services.campaigns import preparation
-from procedures.contracts.operator import HumanOperator
 from tests.helpers.browser import Faults, Service
+from tests.helpers.paced_hand import PacedPerson
 from tests.helpers.paths import RECIPES
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ pytestmark = pytest.mark.timeout(300)
 @pytest.fixture
 def service(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Service]:
     """A bench on which a person turns and switches the units."""
-    monkeypatch.setattr(preparation, "operator_of", lambda _: HumanOperator())
+    monkeypatch.setattr(preparation, "operator_of", lambda _: PacedPerson())
     serving = Service(tmp_path)
     serving.start()
     yield serving
@@ -86,7 +86,7 @@ def test_what_cannot_be_done_ends_the_campaign(service: Service, visit: Callable
     expect(page.get_by_role("region", name="No campaign is running")).to_be_visible()
     assert "no wrench" in service.get("/api/campaigns/1")["reason"]
     last = page.get_by_role("region", name="Last: campaign 1")
-    expect(last).to_contain_text("A person said that it cannot be done.")
+    expect(last).to_contain_text("A person answered that the requested action cannot be done.")
     expect(last).to_contain_text("labctl stopped the table")
     expect(last).to_contain_text("Next:")
     expect(last).to_contain_text("simulated time")
@@ -154,10 +154,10 @@ def test_a_bench_that_was_not_confirmed_safe_is_told_and_cleared_by_a_person(
     reported = page.get_by_text(f"Bench {bench} was not confirmed safe")
     expect(reported).to_be_visible()
     expect(page.locator("main")).to_contain_text("the chamber did not answer")
-    expect(page.get_by_role("region", name="No campaign is running")).to_contain_text("No campaign starts before")
+    expect(page.get_by_role("region", name="No campaign is running")).to_contain_text("No campaign starts until")
     expect(page.get_by_role("button", name="Resume where it stopped")).to_be_disabled()
-    expect(page.get_by_text("Cannot be resumed now")).to_contain_text("inspect it first")
-    page.get_by_role("button", name="I have inspected it, it is safe").click()
+    expect(page.get_by_text("Cannot be resumed now")).to_contain_text("inspect the bench first")
+    page.get_by_role("button", name="I have inspected the bench, and it is safe").click()
     asked = page.get_by_role("dialog")
     asked.get_by_label("Your name").fill("Ann")
     asked.get_by_role("button", name="It is safe", exact=True).click()

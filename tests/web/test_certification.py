@@ -45,7 +45,7 @@ def test_the_dialog_shows_the_verdict_and_asks_for_an_override_where_it_is_neede
     dialog.get_by_label("Why").fill("needed on the robot today, to be replaced tomorrow")
     dialog.get_by_role("button", name="Certify").click()
     expect(dialog).to_be_visible()  # not without the override
-    dialog.get_by_role("checkbox", name="Certify it despite the objections").check()
+    dialog.get_by_role("checkbox", name="Certify this version despite the objections").check()
     dialog.get_by_role("button", name="Certify").click()
     expect(in_force).to_contain_text("version 2")
     expect(in_force).to_contain_text("Certified despite objections")

@@ -76,7 +76,7 @@ def test_free_motion_is_refused_on_the_page_too(service: Service, visit: Callabl
 
     page = visit("/recordings")
     drop(page, "flight.csv", csv_text(moved()).encode())
-    expect(page.get_by_role("alert")).to_contain_text("free motion without a reference is no calibration data")
+    expect(page.get_by_role("alert")).to_contain_text("free motion without a reference cannot calibrate a gyro")
     drop(page, "empty.csv", b"")
     expect(page.get_by_role("alert")).to_contain_text("the file is empty")
     assert service.get("/api/recordings") == []

@@ -78,7 +78,7 @@ def test_turns_profiles_and_poses_are_drawn_as_they_are(service: Service, visit:
 
     path, found = fitted(service, read_recording(EXAMPLES / "imucal-turns"), model="turns")
     page, turns = visit(path), found["turns"]
-    traces = named(figure(page, "Turns against what was asked"))
+    traces = named(figure(page, "Measured minus true angle of each turn"))
     for axis in "xyz":
         own = [k for k, each in enumerate(turns["axis"]) if each == axis]
         assert traces[f"output {axis}"]["y"] == pytest.approx([turns["residual_deg"][k] for k in own])
@@ -94,7 +94,7 @@ def test_turns_profiles_and_poses_are_drawn_as_they_are(service: Service, visit:
     assert rates["output"]["x"] == pytest.approx(rows["t_s"])
     left = named(figure(page, "Residual over time"))
     assert left["as a consumer has it"]["y"] == pytest.approx(rows["residual_dps"])
-    assert left["delay and bandwidth taken into account"]["y"] == pytest.approx(rows["followed_dps"])
+    assert left["true rate filtered by delay and bandwidth"]["y"] == pytest.approx(rows["followed_dps"])
     expect(page.get_by_role("region", name="Compare")).to_contain_text(" ms")
     session, _ = simulate_session(1, Session(rests=16, latitude_deg=48.0, temperature_c=23.5))
     path, found = fitted(service, session, model="poses")

@@ -94,8 +94,9 @@ def test_pages_that_do_not_exist_and_units_that_do_not(visit: Callable[..., Page
 def test_a_person_without_a_mouse_gets_there(visit: Callable[..., Page]) -> None:
     from playwright.sync_api import expect
 
-    page = visit("/")
+    page = visit("/", idle=True)
     settled(page)
+    page.wait_for_function("() => window.Plotly")  # loaded while the page is idle, for the next one
     page.keyboard.press("Tab")
     expect(page.get_by_role("link", name="To the page")).to_be_focused()
     for _ in range(6):

@@ -66,7 +66,7 @@ def test_a_start_that_needs_a_person_at_night_is_warned_of_and_a_better_one_prop
     asked.get_by_label("Your name").fill("Ann")
     for question in ("chamber clear", "table free", "limiter on"):
         asked.get_by_label(question).check()
-    asked.get_by_role("button", name="I confirm it for that time").click()
+    asked.get_by_role("button", name="I confirm these points for that time").click()
     page.wait_for_url("**/campaigns")
     entry = page.get_by_role("region", name="Schedule").first
     expect(entry).to_contain_text("Ann confirmed that the bench will be clear")

@@ -111,8 +111,8 @@ def test_every_effect_has_a_page_of_its_own(service: Service, visit: Callable[..
     page.get_by_label("Search").fill("upside gravity")
     page.get_by_label("Search").fill("magnetic")
     page.get_by_role("link", name="Magnetic sensitivity").click()
-    expect(page.locator("main")).to_contain_text("once per turn")
+    expect(page.locator("main")).to_contain_text("one cycle per turn")
     expect(page.get_by_role("region", name="How large it is")).to_contain_text("deg/s")
-    expect(page.get_by_role("region", name="What it is mistaken for")).to_contain_text("Earth rate")
+    expect(page.get_by_role("region", name="Effects that look the same")).to_contain_text("Earth rate")
     known = [each["id"] for each in service.get("/api/effects")["effects"]]
     assert page.evaluate(UNDRAWN, known) == []

@@ -55,7 +55,14 @@ def test_from_a_simulated_campaign_to_a_certified_file(service: Service, visit: 
     with page.expect_download() as download:
         page.get_by_role("button", name="Download JSON").click()
     assert download.value.suggested_filename == "FOG-0001.json"
-    expect(page.get_by_role("button", name="Download C header")).to_be_visible()
+    files = page.get_by_role("region", name="In force")
+    files.get_by_label("File format").select_option("table-csv")
+    files.get_by_label("temperatures").fill("3")
+    with page.expect_download() as table:
+        files.get_by_role("button", name="Download Table (CSV)").click()
+    assert b"axis,by_axis,output_dps,temperature_c,error_dps" in table.value.path().read_bytes()
+    files.get_by_label("File format").select_option("c")
+    expect(files.get_by_role("button", name="Download C header")).to_be_visible()
     file = json.loads(download.value.path().read_bytes())
     assert file["serial"] == "FOG-0001"
     assert "scale_factor_asymmetry" in [term["effect"] for term in file["model"]["terms"]]

@@ -95,6 +95,6 @@ def test_the_trend_is_drawn_with_its_interval_and_the_limit(unit: Service, visit
     assert [trace["y"] for trace in drawn["data"] if trace["name"] == "limit"] == [[0.05, 0.05], [-0.05, -0.05]]
     found = trace_of(figure(page, "Error over the years"), "as found")
     assert found["y"] == pytest.approx([point["as_found"]["rms_dps"] for point in said["points"] if point["as_found"]])
-    years.get_by_label("Limit of the bias, deg/s").fill("0.2")
-    years.get_by_label("Limit of the bias, deg/s").press("Enter")
+    years.get_by_label("Largest acceptable bias, deg/s").fill("0.2")
+    years.get_by_label("Largest acceptable bias, deg/s").press("Enter")
     expect(page).to_have_url(re.compile("limit=0.2"))

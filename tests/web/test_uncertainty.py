@@ -109,8 +109,8 @@ def test_published_coefficients_are_unknown_and_never_zero(
     assert {text for row in drawn for text in row[1:]} == {"unknown"}
     assert all(len(row) == 6 for row in drawn)
     assert [row[1] for row in cells(parts)] == ["unknown"] * 5
-    assert cells(parts)[0][2] == "published coefficients state none"
-    expect(card).to_contain_text("Coefficients: published coefficients state none.")
+    assert cells(parts)[0][2] == "published coefficients come without uncertainties"
+    expect(card).to_contain_text("Coefficients: published coefficients come without uncertainties.")
 
 
 def test_a_model_that_asks_for_more_is_unknown_with_its_reason(

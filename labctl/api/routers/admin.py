@@ -41,9 +41,10 @@ def revoke_key(name: str, request: ReasonRequest, service: ServiceDep) -> KeyRes
 def audit(
     service: ServiceDep,
     since: Annotated[
-        datetime | None, Query(description="Only rows from this instant on; without a time zone: UTC.")
+        datetime | None,
+        Query(description="Only rows from this instant on, ISO 8601; an instant without a time zone is UTC."),
     ] = None,
-    after: Annotated[int, Query(ge=0, le=2**63 - 1, description="Rows with a number above this one.")] = 0,
+    after: Annotated[int, Query(ge=0, le=2**63 - 1, description="Only rows whose number is larger than this.")] = 0,
     limit: Annotated[int, Query(ge=1, le=10_000, description="At most this many rows.")] = 1000,
 ) -> list[AuditResponse]:
     """Who did what, when and why, in order; each row's hash covers it and the row before."""

@@ -6,9 +6,9 @@ from fastapi import APIRouter
 
 from labctl.api.dependencies import ServiceDep, command_route
 from labctl.services.campaigns.bench_status import bench_statuses
-from labctl.services.commands.registry import CLEAR_BENCH
+from labctl.services.commands.registry import CHECK_BENCH, CLEAR_BENCH
 from labctl.services.commands.requests import ToBench
-from labctl.services.schemas.benches import BenchResponse, BenchStatus, ClearRequest
+from labctl.services.schemas.benches import BenchCheckResponse, BenchResponse, BenchStatus, CheckRequest, ClearRequest
 
 router = APIRouter(prefix="/api", tags=["catalogue"])
 
@@ -29,3 +29,9 @@ def bench_states(service: ServiceDep) -> list[BenchStatus]:
 def clear(bench: str, request: ClearRequest, service: ServiceDep) -> BenchStatus:
     """Record that a person has inspected a bench whose safe state was not confirmed; campaigns may start again."""
     return service.execute(CLEAR_BENCH, ToBench(bench, request))
+
+
+@command_route(router, CHECK_BENCH, "Check every instrument of the bench")
+def check(bench: str, request: CheckRequest, service: ServiceDep) -> BenchCheckResponse:
+    """Ask every instrument and port of the bench what it is and how it does, while no campaign runs; nothing moves."""
+    return service.execute(CHECK_BENCH, ToBench(bench, request))

@@ -5,20 +5,19 @@ from __future__ import annotations
 from typing import Annotated
 
 from fastapi import APIRouter, Header, Query, Request, Response
+from starlette.concurrency import run_in_threadpool
 
-from labctl.api.access_policy import NEEDS_APPROVER
 from labctl.api.computation import execute, follow, while_connected
 from labctl.api.dependencies import ServiceDep, command_route
 from labctl.api.event_stream import EventStream
 from labctl.fitting.effects import read_formulas
 from labctl.services.calibrations import fitting as services
-from labctl.services.calibrations.assessment import assess
-from labctl.services.calibrations.certification import list_certifications
 from labctl.services.calibrations.revision import preview_unit
+from labctl.services.calibrations.served import calibration_file
 from labctl.services.calibrations.surface import surface_of
 from labctl.services.calibrations.uncertainty import uncertainty_at
-from labctl.services.commands.registry import CERTIFY, FIT, IMPROVE, REVOKE
-from labctl.services.commands.requests import ToNewestOrVersion, ToUnit, ToVersion
+from labctl.services.commands.registry import FIT, IMPROVE
+from labctl.services.commands.requests import ToNewestOrVersion, ToUnit
 from labctl.services.criticism.comparison import compare_version
 from labctl.services.criticism.criticise import criticise_unit, residuals_unit
 from labctl.services.criticism.ladder import ladder as ladder_of
@@ -33,14 +32,7 @@ from labctl.services.schemas.calibrations import (
     ImproveResponse,
     LadderResponse,
     PreviewResponse,
-    SurfaceResponse,
     VersionResponse,
-)
-from labctl.services.schemas.certification import (
-    AssessmentResponse,
-    CertificationResponse,
-    CertifyRequest,
-    RevokeRequest,
 )
 from labctl.services.schemas.comparison import ComparisonResponse
 from labctl.services.schemas.criticism import (
@@ -50,14 +42,16 @@ from labctl.services.schemas.criticism import (
     StageResponse,
     VerificationResponse,
 )
-from labctl.services.schemas.uncertainty import UncertaintyResponse
+from labctl.services.schemas.uncertainty import SurfaceResponse, UncertaintyResponse
 
 router = APIRouter(prefix="/api/units/{serial}", tags=["calibrations"])
-OtherUnit = Annotated[bool, Query(description="Accept a recording of another unit.")]
+OtherUnit = Annotated[bool, Query(description="Accept a recording of another unit than the one in the address.")]
 RecordingNumber = Annotated[int | None, Query(description="Recording; default: the unit's newest.")]
 RecordingNumbers = Annotated[
-    list[int] | None, Query(description="Several recordings of the unit as one; instead of `recording`.")
+    list[int] | None, Query(description="Several recordings of the unit, used together; instead of `recording`.")
 ]
+#: Header of what an exported file does not carry.
+LOST = "X-Labctl-Lost"
 Formulas = Annotated[
     list[str] | None, Query(description="Your own effects to include in the comparison: 'name: expr'.")
 ]
@@ -68,19 +62,35 @@ Formulas = Annotated[
 async def calibration(
     serial: str,
     service: ServiceDep,
-    version: Annotated[int | None, Query(description="A version; default: the certified one (404 without).")] = None,
-    format: Annotated[str, Query(description="json, c ...")] = "json",  # noqa: A002  the contract's name
+    version: Annotated[
+        int | None, Query(description="Version; default: the certified version (404 if there is none).")
+    ] = None,
+    format: Annotated[  # noqa: A002  the contract's name
+        str, Query(description="Format of the file, such as json or c; `GET /api/units/{serial}` lists the formats.")
+    ] = "json",
+    option: Annotated[
+        list[str] | None, Query(description="Option of the format, as KEY=VALUE; may be repeated.")
+    ] = None,
     if_none_match: Annotated[str | None, Header()] = None,
 ) -> Response:
-    """The calibration as a file: the bytes never change, the ETag is their hash. 304 when the caller has them already.
+    """The calibration as a file; the ETag is its hash. 304 when the caller has it already.
 
-    A point read of tens of microseconds: it runs in the event loop, without a switch to a thread.
+    The file changes only with its certification, which it contains. `X-Labctl-State` is in-force, superseded, revoked
+    or not-certified, `X-Labctl-Due` the date until which it is valid; `Warning` says that it is overdue or revoked.
+    What a format does not carry of it, with its largest size, is in the header `X-Labctl-Lost`, one for each. JSON is a
+    point read of tens of microseconds: it runs in the event loop, without a switch to a thread; others compute.
     """
-    file = services.calibration_file(service.store, serial, version, format)
-    headers = {"ETag": f'"{file.etag}"', "Cache-Control": "no-cache"}
-    if if_none_match and f'"{file.etag}"' in if_none_match:
-        return Response(status_code=304, headers=headers)
-    return Response(file.content, media_type=file.media_type, headers=headers)
+    if format == "json" and not option:
+        file = calibration_file(service.store, serial, version, format)
+    else:
+        file = await run_in_threadpool(calibration_file, service.store, serial, version, format, option or [])
+    headers = file.headers(service.clock.utc())
+    is_known = if_none_match and f'"{file.etag}"' in if_none_match
+    response = Response(status_code=304) if is_known else Response(file.content, media_type=file.media_type)
+    response.headers.update(headers)
+    for loss in file.losses:
+        response.headers.append(LOST, loss.text)
+    return response
 
 
 @router.head("/calibrations", include_in_schema=False)
@@ -106,19 +116,6 @@ async def improve(serial: str, version: int, request: ImproveRequest, service: S
 def one_version(serial: str, version: int, service: ServiceDep) -> VersionResponse | ImprovedVersionResponse:
     """The result of the fit of a version, when and from which data it was made, and whether it is in force."""
     return services.one_version(service.store, serial, version)
-
-
-@router.get("/certifications", summary="Certifications and revocations")
-def certifications(serial: str, service: ServiceDep) -> list[CertificationResponse]:
-    """Every certification and revocation of a version of the unit, newest first: who, why, when, and until when."""
-    return list_certifications(service.store, serial)
-
-
-@router.get("/calibrations/{version}/assessment", summary="Objections to certifying a version")
-async def assessment(request: Request, serial: str, version: int, service: ServiceDep) -> AssessmentResponse:
-    """The verdict on the version from its own recording, its errors, and the objections that certifying it would
-    override."""
-    return await while_connected(request, service, assess, serial, version)
 
 
 @router.get("/calibrations/{version}/verification", summary="Apply a version to a recording")
@@ -205,7 +202,7 @@ async def pictures(
     return await while_connected(request, service, pictures_unit, serial, version, recording)
 
 
-@router.get("/calibrations/{version}/comparison", summary="A version without refitting, compared with a recording")
+@router.get("/calibrations/{version}/comparison", summary="Compare a version with a recording, without refitting")
 async def comparison(
     request: Request,
     serial: str,
@@ -251,9 +248,14 @@ async def uncertainty(
     serial: str,
     version: int,
     service: ServiceDep,
-    rate_dps: Annotated[float, Query(description="True rate about each axis in turn, deg/s.")],
-    temperature_c: Annotated[float, Query(description="The gyro's thermometer, deg C.")],
-    grid: Annotated[bool, Query(description="Also on a small grid over the calibrated range.")] = False,
+    rate_dps: Annotated[
+        float,
+        Query(description="True rate for which the uncertainty is computed, about one axis after the other, deg/s."),
+    ],
+    temperature_c: Annotated[float, Query(description="Temperature by the gyro's thermometer, deg C.")],
+    grid: Annotated[
+        bool, Query(description="Also compute the uncertainty on a small grid over the calibrated range.")
+    ] = False,
 ) -> UncertaintyResponse:
     """GUM components of a corrected rate at one rate and temperature, and whether that point lies in the
     calibrated range."""
@@ -266,24 +268,14 @@ async def ladder(
     request: Request,
     serial: str,
     service: ServiceDep,
-    recording: Annotated[int | None, Query(description="Recording; default: that of the newest version.")] = None,
+    recording: Annotated[
+        int | None,
+        Query(
+            description="Recording whose versions are listed; default: the recording "
+            "that the newest version was fitted to."
+        ),
+    ] = None,
 ) -> LadderResponse:
     """The errors of the versions fitted to one recording, each after the version it was changed from, and the
     noise floor."""
     return await while_connected(request, service, ladder_of, serial, recording)
-
-
-@command_route(router, CERTIFY, "Certify a version", dependencies=[NEEDS_APPROVER])
-async def certify(serial: str, version: int, request: CertifyRequest, service: ServiceDep) -> CertificationResponse:
-    """Put a version in force: who, why, and when the next calibration is due. An older version again is a rollback.
-
-    The verdict is stored with the certification. 409 where there are objections, unless `override` is set and the
-    reason is a sentence. Needs an approver's key.
-    """
-    return await execute(service, CERTIFY, ToVersion(serial, version, request))
-
-
-@command_route(router, REVOKE, "Revoke a version", dependencies=[NEEDS_APPROVER])
-def revoke(serial: str, version: int, request: RevokeRequest, service: ServiceDep) -> CertificationResponse:
-    """Revoke the version; the unit then has no certified calibration. Needs an approver's key."""
-    return service.execute(REVOKE, ToVersion(serial, version, request))

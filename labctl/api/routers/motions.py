@@ -31,7 +31,9 @@ async def version_motion(
     version: int,
     service: ServiceDep,
     recording: Annotated[int | None, Query(description="Recording; default: the unit's newest.")] = None,
-    other_unit: Annotated[bool, Query(description="Accept a recording of another unit.")] = False,
+    other_unit: Annotated[
+        bool, Query(description="Accept a recording of another unit than the one in the address.")
+    ] = False,
 ) -> MotionResponse:
     """The same, with what the version leaves; nothing is refitted."""
     return await while_connected(request, service, version_by_motion, serial, version, recording, other_unit=other_unit)

@@ -12,6 +12,7 @@ from labctl.api.computation import execute, while_connected, with_files
 from labctl.api.dependencies import ServiceDep, command_route
 from labctl.recording.column_map.templates import template
 from labctl.recording.info import Motion
+from labctl.services.calibrations.orientation import OrientationOptions, orientation_of_recording
 from labctl.services.commands.registry import IMPORT_EXAMPLE, IMPORT_LOG, IMPORT_RECORDING, SIMULATE_RECORDING
 from labctl.services.commands.requests import LogFile, RecordingFolder
 from labctl.services.recordings import catalogue
@@ -27,6 +28,7 @@ from labctl.services.schemas.recordings import (
     ExampleRequest,
     ImportResponse,
     LogPreview,
+    OrientationResponse,
     RecordingAlone,
     RecordingResponse,
     RecordingWithPoints,
@@ -36,13 +38,23 @@ from labctl.services.schemas.recordings import (
     TraceResponse,
 )
 
-MapField = Annotated[str, Form(max_length=1 << 20, description="Map of the columns, as JSON or TOML; empty: proposed.")]
+MapField = Annotated[
+    str,
+    Form(
+        max_length=1 << 20,
+        description="Column map, as JSON or TOML: which column of the "
+        "file is which quantity; empty: labctl proposes a map.",
+    ),
+]
 ImporterField = Annotated[
-    str, Form(max_length=100, description="Importer; empty: the one that recognises the file best.")
+    str,
+    Form(
+        max_length=100, description="Importer that reads the file; empty: the importer that recognises the file best."
+    ),
 ]
 OptionField = Annotated[list[str] | None, Form(max_length=20, description="Options of the importer, as KEY=VALUE.")]
 ModifiedField = Annotated[
-    float | None, Form(ge=0, le=4e12, description="When the file was last written, ms since 1970.")
+    float | None, Form(ge=0, le=4e12, description="When the file was last written, ms since 1970-01-01 UTC.")
 ]
 
 router = APIRouter(prefix="/api/recordings", tags=["recordings"])
@@ -136,7 +148,7 @@ def all_recordings(service: ServiceDep) -> list[RecordingResponse]:
 def recording(
     recording: int,
     service: ServiceDep,
-    points: Annotated[bool, Query(description="With the means of its data sets.")] = True,
+    points: Annotated[bool, Query(description="Include the means of the data sets in the response.")] = True,
 ) -> RecordingAlone | RecordingWithPoints:
     """What the recording is: unit, axes, channels, data sets."""
     return catalogue.describe_recording(service.store, recording, points=points)
@@ -153,10 +165,15 @@ async def trace(
     request: Request,
     recording: int,
     service: ServiceDep,
-    channel: Annotated[str, Query(description="Such as gyro_x or temperature_c.", max_length=60)],
-    from_s: Annotated[float | None, Query(description="Window, in seconds of the recording; default: all.")] = None,
-    until_s: Annotated[float | None, Query(description="Its end.")] = None,
-    points: Annotated[int, Query(ge=1, le=20_000, description="At most this many bins.")] = 2000,
+    channel: Annotated[str, Query(description="Name of the channel, such as gyro_x or temperature_c.", max_length=60)],
+    from_s: Annotated[
+        float | None,
+        Query(description="Beginning of the window, s since the recording began; default: the first reading."),
+    ] = None,
+    until_s: Annotated[
+        float | None, Query(description="End of the window, s since the recording began; default: the last reading.")
+    ] = None,
+    points: Annotated[int, Query(ge=1, le=20_000, description="Largest number of bins.")] = 2000,
 ) -> TraceResponse:
     """Smallest, largest and mean reading of a channel in time bins of equal length; empty bins are left out."""
     return await while_connected(request, service, trace_of, recording, channel, from_s, until_s, points)
@@ -167,11 +184,35 @@ async def allan(
     request: Request,
     recording: int,
     service: ServiceDep,
-    dataset: Annotated[int | None, Query(description="A data set; default: the longest section at rest.")] = None,
+    dataset: Annotated[
+        int | None, Query(description="Number of the data set to use; default: the longest section at rest.")
+    ] = None,
 ) -> AllanResponse:
     """The overlapping Allan deviation of each axis with 95 % intervals, and the coefficients N, B and K where they
     can be determined."""
     return await while_connected(request, service, allan_unit, recording, dataset)
+
+
+@router.get("/{recording}/orientation", summary="Static bias and angle of a recording", tags=["calibrations"])
+async def orientation(
+    request: Request,
+    recording: int,
+    service: ServiceDep,
+    axis: Annotated[str | None, Query(description="x, y or z; default: the only one.", max_length=1)] = None,
+    version: Annotated[
+        int | None,
+        Query(ge=0, description="Calibration that corrects it; 0: none; default: the certified one, if any."),
+    ] = None,
+    rest_s: Annotated[
+        float, Query(ge=0, le=1e6, description="At rest so long at first: its static bias is taken off, s.")
+    ] = 0.0,
+    instability_dps: Annotated[float, Query(ge=0, le=1e6, description="Bias instability, for the uncertainty.")] = 0.0,
+    standstill: Annotated[bool, Query(description="Hold the angle and learn the offset at standstill.")] = True,
+) -> OrientationResponse:
+    """The angle of one axis from its rate: static bias taken off (Ojeda et al. 2000, eqs. 15 and 16), offset renewed
+    at standstill (Weiss)."""
+    options = OrientationOptions(axis, rest_s, instability_dps, standstill)
+    return await while_connected(request, service, orientation_of_recording, recording, version, options)
 
 
 @router.get("/{recording}/file", summary="Download the recording", response_class=StreamingResponse)
@@ -179,7 +220,9 @@ async def file(
     request: Request,
     recording: int,
     service: ServiceDep,
-    format: Annotated[Literal["parquet", "csv"], Query(description="Format of the tables in the zip.")] = "parquet",  # noqa: A002
+    format: Annotated[  # noqa: A002
+        Literal["parquet", "csv"], Query(description="Format of the tables in the zip file.")
+    ] = "parquet",
 ) -> StreamingResponse:
     """The recording in the interchange format, every reading, as one zip; it imports again."""
     made = await with_files(request, zip_recording, service.store, recording, format)
@@ -192,7 +235,7 @@ def samples(
     recording: int,
     service: ServiceDep,
     dataset: Annotated[int, Query(description="Number of the data set.")],
-    limit: Annotated[int, Query(ge=1, le=100_000, description="At most this many readings.")] = 10_000,
+    limit: Annotated[int, Query(ge=1, le=100_000, description="Largest number of readings in the response.")] = 10_000,
 ) -> SamplesResponse:
     """The readings of one data set, column by column, in the units named beside them."""
     return catalogue.dataset_samples(service.store, recording, dataset, limit)

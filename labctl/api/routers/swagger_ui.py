@@ -20,7 +20,8 @@ PAGE = """<!DOCTYPE html>
 <link rel="icon" href="api-docs/favicon.png"><link rel="stylesheet" href="api-docs/swagger-ui.css"></head>
 <body><div id="swagger-ui"></div>
 <script src="api-docs/swagger-ui-bundle.js"></script><script src="api-docs/start.js"></script>
-<noscript>This page needs scripts; <a href="openapi.json">openapi.json</a> describes the same for programs.</noscript>
+<noscript>This page needs scripts;
+<a href="openapi.json">openapi.json</a> describes the interface for programs.</noscript>
 </body>
 </html>
 """

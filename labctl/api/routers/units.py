@@ -8,6 +8,7 @@ from fastapi import APIRouter, Query, Request
 
 from labctl.api.computation import while_connected
 from labctl.api.dependencies import ServiceDep
+from labctl.services.calibrations.due import span
 from labctl.services.criticism.trend import trend_unit
 from labctl.services.schemas.units import TrendResponse, UnitResponse
 from labctl.services.units import list_units, unit
@@ -16,15 +17,23 @@ router = APIRouter(prefix="/api", tags=["catalogue"])
 
 
 @router.get("/units", summary="All units")
-def units(service: ServiceDep) -> list[UnitResponse]:
-    """Every unit that was measured or imported, by serial number."""
-    return list_units(service.store)
+def units(
+    service: ServiceDep,
+    due_within: Annotated[
+        str | None, Query(max_length=20, description="Only units that are due within this span: 30d, 12h, 2w.")
+    ] = None,
+) -> list[UnitResponse]:
+    """Every unit that was measured or imported, by serial number.
+
+    With `due_within` those whose certification ends within that span or has ended, the earliest date first.
+    """
+    return list_units(service.store, service.clock.utc(), None if due_within is None else span(due_within))
 
 
 @router.get("/units/{serial}", summary="One unit")
 def one_unit(serial: str, service: ServiceDep) -> UnitResponse:
     """The unit, its recordings and calibrations, and which version is in force."""
-    return unit(service.store, serial)
+    return unit(service.store, serial, service.clock.utc())
 
 
 @router.get("/units/{serial}/trend", summary="A unit's calibrations over the years", tags=["criticism"])
@@ -33,10 +42,14 @@ async def trend(
     serial: str,
     service: ServiceDep,
     version: Annotated[
-        int | None, Query(description="Version compared with all recordings; default: the first.")
+        int | None, Query(description="Version that is compared with all recordings of the unit; default: the first.")
     ] = None,
     limit_dps: Annotated[
-        float | None, Query(gt=0, description="Limit of the bias, deg/s; default: twice the error that it states.")
+        float | None,
+        Query(
+            gt=0,
+            description="Largest bias that is acceptable, deg/s; default: twice the error that the calibration states.",
+        ),
     ] = None,
 ) -> TrendResponse:
     """As found and as left by recording, drift per year with its uncertainty, and when the bias leaves the limit."""

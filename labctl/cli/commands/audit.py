@@ -17,7 +17,8 @@ app = typer.Typer(no_args_is_help=True, help="The audit trail: who did what, whe
 @app.command("list")
 def list_(
     since: Annotated[
-        datetime | None, typer.Option("--since", help="From this instant on, UTC: 2026-03-01 or 2026-03-01T08:00:00.")
+        datetime | None,
+        typer.Option("--since", help="List rows from this instant on, UTC: 2026-03-01 or 2026-03-01T08:00:00."),
     ] = None,
     as_json: Json = False,
     database: Database = None,
@@ -46,7 +47,12 @@ def list_(
 def verify(
     anchor: Annotated[
         str | None,
-        typer.Option("--anchor", metavar="LENGTH:HASH", help="Anchor that an earlier verify printed, LENGTH:HASH."),
+        typer.Option(
+            "--anchor",
+            metavar="LENGTH:HASH",
+            help="Anchor that an earlier `labctl audit verify` printed, "
+            "LENGTH:HASH; the check fails if rows up to the anchor were changed.",
+        ),
     ] = None,
     as_json: Json = False,
     database: Database = None,

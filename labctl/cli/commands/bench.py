@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import Database, Json
-from labctl.cli.output import console, print_json
+from labctl.cli.output import console, print_json, stderr
 
 app = typer.Typer(no_args_is_help=True, help="The benches: tables, chambers and gyros.")
+
+
+def is_terminal() -> bool:
+    """Return whether a person can be asked."""
+    return sys.stdin.isatty()
 
 
 @app.command("check")
@@ -19,7 +26,8 @@ def check(
     as_json: Json = False,
     database: Database = None,  # noqa: ARG001  every command takes it
 ) -> None:
-    """Connect to every instrument of a bench and list the answers. Nothing moves."""
+    """Connect to every instrument of a bench and list what was found, each fault with what to do. Nothing moves."""
+    from labctl.cli.printing.benches import print_check
     from labctl.services.benches.check import check_bench
 
     with one_clear_line():
@@ -27,10 +35,86 @@ def check(
     if as_json:
         print_json(answer)
     else:
-        for device in answer.devices:
-            mark = "[green]answers[/]" if device.ok else "[red]failed[/] "
-            console.print(f"{mark}  {device.device:14} ", end="")
-            console.print(f"{device.text}  [{device.driver} of {device.distribution} {device.version}]", markup=False)
+        print_check(answer)
+    if not answer.ok:
+        raise typer.Exit(1)
+
+
+@app.command("ports")
+def ports(as_json: Json = False, database: Database = None) -> None:  # noqa: ARG001  every command takes it
+    """List the serial ports of this computer: name for a bench file, USB adapter, and what keeps from its use."""
+    from labctl.services.benches.ports import list_ports
+
+    found = list_ports()
+    if as_json:
+        print_json(found)
+        return
+    for port in found:
+        adapter = f"USB adapter {port.adapter or 'without a serial number'} ({port.product})" if port.product else ""
+        said = [f"now {port.device}" if port.device != port.path else "", adapter, port.trouble]
+        console.print(f"{port.path}  {'; '.join(filter(None, said))}", markup=False, soft_wrap=True)
+    if not found:
+        console.print("this computer has no serial port: plug the adapters in", markup=False)
+
+
+@app.command("new")
+def new(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Bench file to write.")],
+    name: Annotated[str, typer.Option("--name", help="Name of the bench; default: that of the file.")] = "",
+    latitude_deg: Annotated[
+        float | None, typer.Option("--latitude", metavar="DEG", help="Where the bench stands, for the Earth's rate.")
+    ] = None,
+    port: Annotated[
+        list[str] | None, typer.Option("--port", metavar="PATH", help="Serial port; repeatable. Default: all.")
+    ] = None,
+    host: Annotated[
+        list[str] | None, typer.Option("--host", metavar="HOST[:PORT]", help="Modbus TCP instrument; repeatable.")
+    ] = None,
+    setting: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="SECTION.KEY=VALUE", help="As table.max_rate_dps=100 or stim300.serial=A1."),
+    ] = None,
+    yes: Annotated[bool, typer.Option("--yes", help="Ask nothing; what is missing is an error.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace a file that is there.")] = False,
+    as_json: Json = False,
+    database: Database = None,  # noqa: ARG001  every command takes it
+) -> None:
+    """Write a bench file: find which instrument answers on each port, ask for the rest. Nothing moves or is set."""
+    from labctl.cli.bench_dialogue import asking, not_asking, print_search
+    from labctl.services.benches.new_bench import new_bench, parse_setting
+    from labctl.services.schemas.benches import NewBenchRequest
+
+    asks = asking if not yes and not as_json and is_terminal() else not_asking
+    with one_clear_line():
+        settings = dict(map(parse_setting, setting or []))
+        given = {"name": name or file.stem, "latitude_deg": latitude_deg, "ports": port or [], "hosts": host or []}
+        request = NewBenchRequest.model_validate({**given, "settings": settings})
+        answer = new_bench(file, request, asks, lambda line: None if as_json else print_search(line), force=force)
+    if as_json:
+        print_json(answer)
+    else:
+        console.print(f"{answer.file} is written; check it: labctl bench check {answer.file}", markup=False)
+
+
+@app.command("wiggle")
+def wiggle(
+    bench: Annotated[str, typer.Argument(metavar="FILE", help="Bench file, or the name of a shipped bench.")],
+    as_json: Json = False,
+    database: Database = None,  # noqa: ARG001  every command takes it
+) -> None:
+    """Turn one unit after the other by hand when asked, and learn which port moved; exit 1 where one is another's."""
+    from labctl.services.benches.wiggle import wiggle as wiggle_test
+
+    say = stderr if as_json else console
+    with one_clear_line():
+        answer = wiggle_test(bench, lambda line: say.print(line, markup=False, soft_wrap=True))
+    if as_json:
+        print_json(answer)
+    else:
+        for unit in answer.units:
+            mark = "[green]right[/]" if unit.ok else "[red]wrong[/]"
+            console.print(f"{mark}  {unit.unit:8} ", end="")
+            console.print(f"{unit.serial}: {unit.text}", markup=False, soft_wrap=True)
     if not answer.ok:
         raise typer.Exit(1)
 
@@ -49,12 +133,14 @@ def status(as_json: Json = False, database: Database = None) -> None:
         for bench in benches:
             said = [bench.unconfirmed, *(f"not made safe; campaigns left there: {left}" for left in bench.left)]
             if bench.attempts:
-                said.insert(1, f"the safe state was tried again {bench.attempts} times, last at {bench.attempted_at}")
+                said.insert(
+                    1, f"labctl tried {bench.attempts} more times to set the safe state, last at {bench.attempted_at}"
+                )
             if bench.confirmed_at:
                 said.insert(
                     2,
-                    f"labctl confirmed it at {bench.confirmed_at}; a person has still to inspect the bench, then "
-                    "`labctl bench clear`",
+                    f"labctl confirmed the safe state at {bench.confirmed_at}; a person must still inspect the "
+                    "bench, then run `labctl bench clear`",
                 )
             for line in filter(None, said if any(said) else ["the safe state is confirmed"]):
                 console.print(f"{bench.name:18} {line}", markup=False, soft_wrap=True)

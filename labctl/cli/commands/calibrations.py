@@ -10,14 +10,14 @@ import typer
 
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import AcceptWarnings, Database, Json, RecordingIds, Serial, recording_numbers
-from labctl.cli.output import console, print_json
+from labctl.cli.output import console, print_json, stderr
 
 Version = Annotated[int, typer.Argument(metavar="VERSION", help="Calibration version of the unit: 1, 2, 3 ...")]
 By = Annotated[str, typer.Option("--by", metavar="NAME", help="Name of the person.")]
 Reason = Annotated[str, typer.Option("--reason", metavar="TEXT", help="Reason; it is recorded.")]
 Override = Annotated[
     bool,
-    typer.Option("--override", help="Certify despite objections; the reason must be a sentence."),
+    typer.Option("--override", help="Certify although there are objections; the reason must then be a sentence."),
 ]
 
 
@@ -25,10 +25,16 @@ def fit(
     serial: Serial,
     recording: RecordingIds = None,
     model: Annotated[
-        str | None, typer.Option("--model", metavar="NAME", help="A preset: `labctl effects` lists them.")
+        str | None, typer.Option("--model", metavar="NAME", help="Name of a model; `labctl effects` lists the models.")
     ] = None,
     effects: Annotated[
-        str | None, typer.Option("--effects", metavar="A,B,C", help="Effects; `name:2` sets a polynomial order.")
+        str | None,
+        typer.Option(
+            "--effects",
+            metavar="A,B,C",
+            help="Ids of effects, which are the model, or are "
+            "added to --model; `name:2` sets the polynomial order to 2.",
+        ),
     ] = None,
     accept_warnings: AcceptWarnings = False,
     as_json: Json = False,
@@ -60,7 +66,12 @@ def certify(
     by: By,
     reason: Reason,
     due_days: Annotated[
-        int | None, typer.Option("--due-days", metavar="N", help="Days until the next calibration is due.")
+        int | None,
+        typer.Option(
+            "--due-days",
+            metavar="N",
+            help="Days until the next calibration is due; 0: no date; default: the recipe's, else $LABCTL_DUE_DAYS.",
+        ),
     ] = None,
     override: Override = False,
     as_json: Json = False,
@@ -124,33 +135,57 @@ def certifications(serial: Serial, as_json: Json = False, database: Database = N
 def calibration(
     serial: Serial,
     version: Annotated[
-        int | None, typer.Option("--version", metavar="N", help="Calibration version; default: the certified one.")
+        int | None, typer.Option("--version", metavar="N", help="Calibration version; default: the certified version.")
     ] = None,
     format_: Annotated[str, typer.Option("--format", metavar="NAME", help="json, c ...")] = "json",
-    out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Write a file instead of printing.")] = None,
+    option: Annotated[
+        list[str] | None,
+        typer.Option("--option", metavar="KEY=VALUE", help="Option of the format; may be repeated."),
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", metavar="FILE", help="Path of a file to write; default: print the calibration."),
+    ] = None,
     as_json: Json = False,  # noqa: ARG001  the calibration file is JSON already
     database: Database = None,
 ) -> None:
-    """Print a calibration as a file to load elsewhere."""
-    from labctl.services.calibrations.fitting import calibration_file
+    """Print a calibration as a file to load elsewhere; what its format does not carry is said on standard error."""
+    from labctl.services.calibrations.served import calibration_file
     from labctl.services.commands.open import open_readonly
 
     with one_clear_line(), open_readonly(database) as store:
-        content = calibration_file(store, serial, version, format_).content
+        file = calibration_file(store, serial, version, format_, option or [])
         if out is None:
-            sys.stdout.buffer.write(content)
+            sys.stdout.buffer.write(file.content)
         else:
-            out.write_bytes(content)
+            out.write_bytes(file.content)
+    for loss in file.losses:
+        typer.echo(f"format {format_} does not carry: {loss.text}", err=True)
 
 
 def compensate(
     calibration_file: Annotated[Path, typer.Argument(metavar="CALIBRATION_FILE")],
     source: Annotated[
-        Path, typer.Argument(metavar="IN", help="Samples: CSV or Parquet with gyro_x ..., temperature_c.")
+        Path,
+        typer.Argument(
+            metavar="IN", help="File of samples to correct: CSV or Parquet with columns gyro_x ... and temperature_c."
+        ),
     ],
-    target: Annotated[Path, typer.Argument(metavar="OUT", help="The same rows with rate_x_dps ... and `outside`.")],
+    target: Annotated[
+        Path,
+        typer.Argument(
+            metavar="OUT",
+            help="File to write, CSV or Parquet: the same rows with "
+            "the corrected rates rate_x_dps ... and a column `outside`.",
+        ),
+    ],
     outside: Annotated[
-        str, typer.Option("--outside", help="Beyond the calibrated range: clamp (and flag) or refuse.")
+        str,
+        typer.Option(
+            "--outside",
+            help="What to do with samples outside the calibrated range: clamp (correct as "
+            "at its edge and flag in column `outside`) or refuse.",
+        ),
     ] = "clamp",
     as_json: Json = False,
     database: Database = None,  # noqa: ARG001  needs none: a calibration file is enough
@@ -163,9 +198,11 @@ def compensate(
     if as_json:
         print_json(answer)
         return
+    if answer.warning:
+        stderr.print(f"labctl: {answer.warning}", style="bold red", markup=False)
     console.print(f"{answer.rows} readings -> {target}", markup=False)
     if answer.outside:
         console.print(
-            f"{answer.outside} of them lie outside the calibrated range and are flagged in column `outside`",
+            f"{answer.outside} rows lie outside the calibrated range and are flagged in column `outside`",
             style="yellow",
         )

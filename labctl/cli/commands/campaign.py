@@ -30,11 +30,19 @@ Seed = Annotated[int | None, typer.Option("--seed", help="Seed of the simulated 
 At = Annotated[
     str | None,
     typer.Option(
-        "--at", metavar="TIME", help="Time of the start: 2026-03-28T22:00, or `now`: as soon as the bench is free."
+        "--at",
+        metavar="TIME",
+        help="Start later, in a running service: 2026-03-28T22:00, or `now` for as soon as the bench is free.",
     ),
 ]
 Cron = Annotated[
-    str | None, typer.Option("--cron", metavar="LINE", help="Cron line of repeated starts: '30 22 * * FRI'.")
+    str | None,
+    typer.Option(
+        "--cron",
+        metavar="LINE",
+        help="Start repeatedly, in a running service: cron line such "
+        "as '30 22 * * FRI' (minute, hour, day, month, weekday).",
+    ),
 ]
 TimeZone = Annotated[
     str | None,
@@ -43,7 +51,9 @@ TimeZone = Annotated[
 Priority = Annotated[
     int | None,
     typer.Option(
-        "--priority", metavar="N", help="Of starts that are due the highest priority begins first; default: 0."
+        "--priority",
+        metavar="N",
+        help="When several starts are due, the one with the highest priority begins first; default: 0.",
     ),
 ]
 LateLimit = Annotated[
@@ -51,7 +61,7 @@ LateLimit = Annotated[
     typer.Option(
         "--late-limit-s",
         metavar="S",
-        help="A start that is later than this by S seconds is skipped; 0 skips every missed start.",
+        help="Skip a start that is more than S seconds late; 0 skips every missed start; default: no limit.",
     ),
 ]
 ClearConfirmedBy = Annotated[

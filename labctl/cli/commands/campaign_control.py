@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 #: How long an abort is followed until the bench is safe, and how often it is read, s.
 SAFE_WITHIN_S, LOOK_S = 120.0, 0.2
 
-Id = Annotated[int, typer.Argument(metavar="ID", help="Campaign.")]
+Id = Annotated[int, typer.Argument(metavar="ID", help="Number of the campaign.")]
 By = Annotated[
     str | None, typer.Option("--by", metavar="NAME", help="Name of the person; default: the user who is logged in.")
 ]
@@ -82,7 +82,8 @@ def pause(
 
 def resume(
     campaign: Annotated[
-        int | None, typer.Argument(metavar="ID", help="Campaign; default: the newest that was interrupted.")
+        int | None,
+        typer.Argument(metavar="ID", help="Number of the campaign; default: the newest that was interrupted."),
     ] = None,
     bench: BenchName = None,
     power: Annotated[
@@ -90,7 +91,8 @@ def resume(
         typer.Option(
             "--power",
             metavar="lost|kept",
-            help="Whether the units were off meanwhile; default: yes if this computer was.",
+            help="Whether the units lost power during the interruption; default: lost if this computer was restarted "
+            "meanwhile, else kept.",
         ),
     ] = None,
     speed: Annotated[
@@ -153,13 +155,18 @@ def confirm(
         str, typer.Argument(metavar="QUESTION", help="Id of the question, as `campaign status` or `watch` shows it.")
     ],
     campaign: Annotated[
-        int | None, typer.Option("--campaign", metavar="ID", help="Campaign; default: the newest.")
+        int | None, typer.Option("--campaign", metavar="ID", help="Number of the campaign; default: the newest.")
     ] = None,
     decline: Annotated[
-        str | None, typer.Option("--decline", metavar="WHY", help="It cannot be done; the campaign ends.")
+        str | None,
+        typer.Option(
+            "--decline",
+            metavar="WHY",
+            help="Answer that the action cannot be done, with the reason; the campaign ends.",
+        ),
     ] = None,
     again: Annotated[
-        bool, typer.Option("--again", help="Of a turn by hand: it did not go well and is to be asked again.")
+        bool, typer.Option("--again", help="For a turn by hand: the turn went wrong; request it again.")
     ] = False,
     by: By = None,
     as_json: Json = False,

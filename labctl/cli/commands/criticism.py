@@ -25,12 +25,14 @@ VersionOption = Annotated[int | None, typer.Option("--version", metavar="N", hel
 FormulaOption = Annotated[
     list[str] | None,
     typer.Option(
-        "--formula", metavar="'NAME: EXPR'", help="Your own effect as 'name: formula', or a TOML file of effects."
+        "--formula",
+        metavar="'NAME: EXPR'",
+        help="Your own effect to include, as 'name: formula', or a TOML file of effects.",
     ),
 ]
 
 
-OtherUnit = Annotated[bool, typer.Option("--other-unit", help="Accept a recording of another unit.")]
+OtherUnit = Annotated[bool, typer.Option("--other-unit", help="Accept a recording of another unit than SERIAL.")]
 
 
 def verify(
@@ -62,10 +64,18 @@ def criticise(
     other_unit: OtherUnit = False,
     formula: FormulaOption = None,
     next_recipe: Annotated[
-        Path | None, typer.Option("--next", metavar="FILE", help="Write the best next experiment as a recipe.")
+        Path | None,
+        typer.Option(
+            "--next",
+            metavar="FILE",
+            help="Path of a recipe to write: the experiment that best distinguishes the suspected effects.",
+        ),
     ] = None,
     report: Annotated[
-        Path | None, typer.Option("--report", metavar="FILE", help="Write a page with the pictures: one HTML file.")
+        Path | None,
+        typer.Option(
+            "--report", metavar="FILE", help="Path of a report to write: the verdict and the pictures in one HTML file."
+        ),
     ] = None,
     as_json: Json = False,
     database: Database = None,
@@ -140,7 +150,12 @@ def ladder(
     serial: Serial,
     recording: Annotated[
         int | None,
-        typer.Option("--recording", metavar="ID", help="Versions of this recording; default: of the newest version's."),
+        typer.Option(
+            "--recording",
+            metavar="ID",
+            help="Number of the recording whose versions are listed; default: "
+            "the recording that the newest version was fitted to.",
+        ),
     ] = None,
     as_json: Json = False,
     database: Database = None,

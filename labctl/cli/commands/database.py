@@ -13,7 +13,9 @@ from labctl.cli.output import console, print_json, stderr
 
 
 def backup(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="New file; never written over an existing one.")],
+    file: Annotated[
+        Path, typer.Argument(metavar="FILE", help="Path of the backup to write; an existing file is never overwritten.")
+    ],
     as_json: Json = False,
     database: Database = None,
 ) -> None:
@@ -32,7 +34,8 @@ def backup(
         stderr.print(f"labctl: {answer.remark}", markup=False)
     for finding in answer.findings:
         stderr.print(
-            f"labctl: the copy equals the database, in which damage was found: {finding.part}: {finding.text}",
+            f"labctl: the copy is identical to the database, but the database is damaged: {finding.part}: "
+            f"{finding.text}",
             markup=False,
         )
     if answer.findings:

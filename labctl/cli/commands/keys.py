@@ -10,7 +10,9 @@ from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import Database, Json
 from labctl.cli.output import console, print_json, stderr, table
 
-app = typer.Typer(no_args_is_help=True, help="API keys: who may read, make changes and approve over HTTP.")
+app = typer.Typer(
+    no_args_is_help=True, help="API keys, which allow people and programs to read, change or approve over HTTP."
+)
 
 KeyName = Annotated[str, typer.Argument(metavar="NAME", help="Name of the key's owner; the audit trail shows it.")]
 Reason = Annotated[str, typer.Option("--reason", metavar="TEXT", help="Reason; it is recorded.")]
@@ -39,7 +41,7 @@ def create(
         Role.OPERATOR: "read, and make changes",
         Role.APPROVER: "read, make changes and approve",
     }[answer.role]
-    stderr.print(f"{answer.name} may {may}. The key is not shown again: store it now.", markup=False)
+    stderr.print(f"{answer.name} may {may}. The key above is not shown again: store it now.", markup=False)
 
 
 @app.command("list")

@@ -1,22 +1,33 @@
-"""`labctl allan`: the noise of a unit at rest."""
+"""`labctl allan` and `orientation`: the noise of a unit at rest, and the angle that its rate adds up to."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import Database, Json, RecordingId
-from labctl.cli.output import print_json
+from labctl.cli.output import console, format_number, print_json, stderr
 from labctl.cli.printing.noise import print_allan
+
+if TYPE_CHECKING:
+    from labctl.services.schemas.recordings import OrientationResponse
 
 
 def allan(
-    source: Annotated[str, typer.Argument(metavar="SERIAL|FILE", help="A unit, or a file or folder of readings.")],
+    source: Annotated[
+        str,
+        typer.Argument(metavar="SERIAL|FILE", help="Serial number of a unit, or path of a file or folder of readings."),
+    ],
     column: Annotated[
-        str | None, typer.Option("--column", metavar="NAME", help="One column; default: every gyro_ column.")
+        str | None,
+        typer.Option(
+            "--column",
+            metavar="NAME",
+            help="Column of a file to use; default: every column whose name begins with gyro_.",
+        ),
     ] = None,
     recording: RecordingId = None,
     as_json: Json = False,
@@ -37,3 +48,66 @@ def allan(
         print_json(answer)
     else:
         print_allan(answer)
+
+
+def orientation(
+    source: Annotated[
+        str, typer.Argument(metavar="SERIAL|FILE", help="A unit, or a table of t_s, gyro_z ... and temperature_c.")
+    ],
+    axis: Annotated[str | None, typer.Option("--axis", help="x, y or z; default: the only one.")] = None,
+    rest_s: Annotated[
+        float, typer.Option("--rest-s", metavar="S", min=0, help="At rest so long at first: take its static bias off.")
+    ] = 0.0,
+    instability_dps: Annotated[
+        float, typer.Option("--instability-dps", metavar="X", min=0, help="Bias instability, for the uncertainty.")
+    ] = 0.0,
+    standstill: Annotated[
+        bool, typer.Option("--standstill/--no-standstill", help="Hold the angle and learn the offset at standstill.")
+    ] = True,
+    calibration: Annotated[
+        Path | None, typer.Option("--calibration", metavar="FILE", help="Of a table: correct it by this calibration.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Of a table: write the angle too.")] = None,
+    recording: RecordingId = None,
+    version: Annotated[
+        int | None,
+        typer.Option(
+            "--version", metavar="N", min=0, help="Of a unit: its version; 0: none; default: the certified one."
+        ),
+    ] = None,
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Follow the angle of one axis: static bias off (Ojeda 2000, eqs. 15-16), offset renewed at standstill (Weiss)."""
+    from labctl.errors import BadInput
+    from labctl.services.calibrations.orientation import OrientationOptions, orientation_of_file, orientation_of_unit
+    from labctl.services.commands.open import open_readonly
+
+    options = OrientationOptions(axis, rest_s, instability_dps, standstill)
+    with one_clear_line():
+        if Path(source).is_file():
+            answer = orientation_of_file(Path(source), calibration, out, options)
+        elif calibration is not None or out is not None:
+            raise BadInput(f"{source}: no such file; --calibration and --out are for a table, --version for a unit")
+        else:
+            with open_readonly(database) as store:
+                answer = orientation_of_unit(store, source, recording, version, options)
+    if as_json:
+        print_json(answer)
+    else:
+        _print(answer)
+
+
+def _print(answer: OrientationResponse) -> None:
+    if answer.warning:
+        stderr.print(f"labctl: {answer.warning}", style="bold red", markup=False)
+    by = "uncorrected" if answer.version is None else f"corrected by version {answer.version}"
+    console.print(f"axis {answer.axis}, {by}: {answer.readings} readings, {answer.left_out} left out", markup=False)
+    if (bias := answer.static_bias) is not None:
+        console.print(f"  static bias  {format_number(bias.bias_dps)} deg/s, u = {format_number(bias.u_dps, 2)} deg/s")
+    console.print(f"  angle        {answer.angle_deg:.3f} deg after {answer.seconds:.1f} s")
+    if answer.drift_deg_per_min is not None:
+        console.print(f"  per minute   {format_number(answer.drift_deg_per_min)} deg/min")
+    console.print(f"  standing     {answer.standing_s:.1f} s; offset {format_number(answer.offset_dps)} deg/s")
+    if answer.gap_s:
+        console.print(f"  without readings {answer.gap_s:.1f} s", style="yellow")

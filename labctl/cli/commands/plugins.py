@@ -1,12 +1,16 @@
-"""`labctl plugins`: what is installed beside labctl, and whether it can be used."""
+"""`labctl plugins` and `labctl driver`: what is installed beside labctl, and whether it can be used."""
 
 from __future__ import annotations
+
+from typing import Annotated
 
 import typer
 
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import Database, Json
 from labctl.cli.output import console, print_json, stderr, table
+
+driver_app = typer.Typer(no_args_is_help=True, help="The drivers of tables, chambers and gyros.")
 
 
 def plugins(as_json: Json = False, database: Database = None) -> None:  # noqa: ARG001  every command takes it
@@ -26,4 +30,37 @@ def plugins(as_json: Json = False, database: Database = None) -> None:  # noqa: 
         for line in dict.fromkeys(each.problem for each in found if each.problem):
             stderr.print(line, markup=False, soft_wrap=True)
     if any(each.problem for each in found):
+        raise typer.Exit(1)
+
+
+@driver_app.command("test")
+def driver_checks(
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Driver, as a bench file names it.")],
+    bench: Annotated[
+        str | None,
+        typer.Option("--bench", metavar="FILE", help="Simulated bench that has the driver; else the driver's own."),
+    ] = None,
+    as_json: Json = False,
+    database: Database = None,  # noqa: ARG001  every command takes it
+) -> None:
+    """Try a driver on its simulated instrument, in virtual time; exit 1 where it does not what every driver must."""
+    from labctl.services.plugins import check_driver
+    from labctl.services.schemas.admin import DriverCheckResponse
+
+    def show(each: DriverCheckResponse) -> None:
+        if not as_json:
+            console.print("[red]fails[/]  " if each.problem else "[green]does[/]   ", end="")
+            console.print(f"{each.check}{': ' if each.problem else ''}{each.problem}", markup=False, soft_wrap=True)
+
+    with one_clear_line():
+        answer = check_driver(name, bench, show)
+    if as_json:
+        print_json(answer)
+    else:
+        failed = sum(1 for each in answer.checks if each.problem)
+        said = (
+            f"{failed} of {len(answer.checks)} checks failed" if failed else f"all {len(answer.checks)} checks passed"
+        )
+        console.print(f"{name} of {answer.distribution} {answer.version}: {said}", markup=False)
+    if not answer.ok:
         raise typer.Exit(1)

@@ -12,20 +12,24 @@ from labctl.cli.import_dialogue import Acceptance, named, print_template, read_g
 from labctl.cli.options import Database, Json
 from labctl.cli.output import console, print_json, print_warnings
 
-export_app = typer.Typer(no_args_is_help=True, help="Write what the database holds to files.")
+export_app = typer.Typer(no_args_is_help=True, help="Write recordings of the database to files.")
 
 
 PathToImport = Annotated[
     Path | None,
     typer.Argument(
         metavar="PATH",
-        help="Folder with recording.toml and its data file; a CSV, Parquet or ULog file or a ROS bag; or what another "
-        "importer knows.",
+        help="Folder with recording.toml and its data file; a CSV, Parquet or ULog file; a ROS bag; or a file that "
+        "another installed importer reads.",
     ),
 ]
 ImporterName = Annotated[
     str | None,
-    typer.Option("--format", metavar="NAME", help="Importer; default: the one that recognises the file best."),
+    typer.Option(
+        "--format",
+        metavar="NAME",
+        help="Name of the importer that reads the file; default: the importer that recognises the file best.",
+    ),
 ]
 ImporterOptions = Annotated[
     list[str] | None,
@@ -33,7 +37,11 @@ ImporterOptions = Annotated[
 ]
 MapFile = Annotated[
     Path | None,
-    typer.Option("--map", metavar="FILE", help="What the columns of a log are, as TOML; default: proposed and asked."),
+    typer.Option(
+        "--map",
+        metavar="FILE",
+        help="Column map (TOML): which column of the log is which quantity; default: labctl proposes a map and asks.",
+    ),
 ]
 Beside = Annotated[
     list[Path] | None,
@@ -41,10 +49,14 @@ Beside = Annotated[
         "--beside", metavar="FILE", help="File with further columns of the same run, joined by time; may be repeated."
     ),
 ]
-AcceptMap = Annotated[bool, typer.Option("--accept-map", help="Import by the proposed map without a question.")]
+AcceptMap = Annotated[bool, typer.Option("--accept-map", help="Import with the proposed column map without asking.")]
 WriteMap = Annotated[
     Path | None,
-    typer.Option("--write-map", metavar="FILE", help="Write the map; without --accept-map nothing is imported."),
+    typer.Option(
+        "--write-map",
+        metavar="FILE",
+        help="Path of a file to write: the proposed column map; nothing is imported unless --accept-map is given too.",
+    ),
 ]
 TemplateKind = Annotated[
     str | None,
@@ -93,7 +105,7 @@ def import_(
 
 @export_app.command("recording")
 def export_recording(
-    recording: Annotated[int, typer.Argument(metavar="ID", help="Recording.")],
+    recording: Annotated[int, typer.Argument(metavar="ID", help="Number of the recording.")],
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="New folder to write; it must not exist.")],
     csv: Annotated[bool, typer.Option("--csv", help="CSV instead of Parquet.")] = False,
     points: Annotated[bool, typer.Option("--points", help="One row per data set instead of every reading.")] = False,
@@ -114,23 +126,30 @@ def export_recording(
 
 
 def simulate(
-    recipe: Annotated[str, typer.Argument(metavar="RECIPE", help="Recipe file, or the name of a shipped one.")],
+    recipe: Annotated[str, typer.Argument(metavar="RECIPE", help="Recipe file, or the name of a shipped recipe.")],
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="New folder to write; it must not exist.")],
     bench: Annotated[
-        str | None, typer.Option("--bench", metavar="FILE", help="Bench; default: the recipe's own.")
+        str | None,
+        typer.Option("--bench", metavar="FILE", help="Bench file, or name of a shipped bench; default: one that fits."),
     ] = None,
     gyro: Annotated[
-        str | None, typer.Option("--gyro", metavar="NAME", help="Which gyro of the bench; default: first.")
+        str | None,
+        typer.Option("--gyro", metavar="NAME", help="Name of the bench's gyro to record; default: the first."),
     ] = None,
     hide: Annotated[
         list[str] | None,
         typer.Option(
-            "--hide", metavar="EFFECT[=SIZE]", help="Hide an effect; SIZE in its unit, or z10: ten noise units."
+            "--hide",
+            metavar="EFFECT[=SIZE]",
+            help="Hide an effect in the gyro; SIZE in the unit of the effect "
+            "(`labctl effects`), or z10 for a signal of ten standard deviations of the noise.",
         ),
     ] = None,
-    seed: Annotated[int, typer.Option("--seed", help="Same seed, same recording.")] = 1,
+    seed: Annotated[
+        int, typer.Option("--seed", help="Seed of the random numbers; the same seed gives the same recording.")
+    ] = 1,
     sample_rate_hz: Annotated[
-        float | None, typer.Option("--sample-rate", metavar="HZ", help="Readings per second; default 10.")
+        float | None, typer.Option("--sample-rate", metavar="HZ", help="Readings per second; default: 10.")
     ] = None,
     csv: Annotated[bool, typer.Option("--csv", help="CSV instead of Parquet.")] = False,
     as_json: Json = False,

@@ -21,7 +21,7 @@ StartId = Annotated[int, typer.Argument(metavar="ID", help="Entry of the schedul
 
 @app.command("list")
 def list_(
-    ended: Annotated[bool, typer.Option("--all", help="Also entries that have ended.")] = False,
+    ended: Annotated[bool, typer.Option("--all", help="List entries that have ended too.")] = False,
     as_json: Json = False,
     database: Database = None,
 ) -> None:

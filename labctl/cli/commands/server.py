@@ -19,18 +19,15 @@ def serve(
     simulate: Annotated[bool, typer.Option("--simulate", help="Run a simulated bench; default: triaxial-sim.")] = False,
     speed: Annotated[
         float,
-        typer.Option(
-            "--speed",
-            metavar="X",
-            help="Speed of a simulated bench: X times real time; 0: as fast as this computer keeps up.",
-        ),
+        typer.Option("--speed", metavar="X", help="Simulated bench: X times real time; 0: as fast as possible."),
     ] = 1.0,
     host: Annotated[str, typer.Option("--host", metavar="ADDRESS", help="Address to listen on.")] = "127.0.0.1",
-    port: Annotated[int, typer.Option("--port", metavar="N", help="Port; 0 takes a free one.")] = 8420,
+    port: Annotated[int, typer.Option("--port", metavar="N", help="TCP port; 0 chooses a free port.")] = 8420,
     require_keys: Annotated[
         bool,
         typer.Option(
-            "--require-keys", help="Require a key on loopback too; on other addresses a key is always required."
+            "--require-keys",
+            help="Require an API key on loopback (127.0.0.1) too; on other addresses a key is always required.",
         ),
     ] = False,
     max_upload_mib: Annotated[
@@ -82,7 +79,7 @@ def _found(source: str, database: str | None) -> tuple[str, str]:
 
 
 def simulator(
-    bench: Annotated[str, typer.Argument(metavar="BENCH", help="Bench file, or the name of a shipped one.")],
+    bench: Annotated[str, typer.Argument(metavar="BENCH", help="Bench file, or the name of a shipped bench.")],
     out: Annotated[
         Path | None,
         typer.Option(
@@ -121,10 +118,12 @@ def simulator(
 
 
 def demo(
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder of the demo's files.")] = Path(
-        "demo-output"
-    ),
-    quick: Annotated[bool, typer.Option("--quick", help="Use a smaller tri-axial campaign, to be faster.")] = False,
+    out: Annotated[
+        Path, typer.Option("--out", metavar="DIR", help="Folder into which the demo writes its files.")
+    ] = Path("demo-output"),
+    quick: Annotated[
+        bool, typer.Option("--quick", help="Run a smaller tri-axial campaign, so that the demo ends sooner.")
+    ] = False,
     as_json: Json = False,
     database: Database = None,
 ) -> None:

@@ -1,4 +1,4 @@
-"""`labctl trend`: a unit's calibrations over the years."""
+"""`labctl units` and `trend`: which version of each unit is in force, until when, and a unit over the years."""
 
 from __future__ import annotations
 
@@ -14,15 +14,55 @@ if TYPE_CHECKING:
     from labctl.services.schemas.units import AppliedVersion, TrendResponse
 
 
+def units(
+    due_within: Annotated[
+        str | None,
+        typer.Option("--due-within", metavar="SPAN", help="Only units that are due within 30d, 12h, 2w, or overdue."),
+    ] = None,
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """List the units, the version in force of each, and when it is due; with --due-within the earliest date first."""
+    from instruments.clock import SystemClock
+    from labctl.services.calibrations.due import span
+    from labctl.services.commands.open import open_readonly
+    from labctl.services.units import list_units
+
+    with one_clear_line():
+        within = None if due_within is None else span(due_within)
+        with open_readonly(database) as store:
+            found = list_units(store, SystemClock().utc(), within)
+    if as_json:
+        print_json(found)
+        return
+    if not found:
+        console.print("no unit is due" if due_within else "no unit has been measured or imported yet")
+        return
+    rows = table("", "unit", "model", "in force", "due", "")
+    for each in found:
+        version = "none" if each.certified_version is None else f"version {each.certified_version}"
+        due = "–" if each.due is None else f"{each.due:%Y-%m-%d}"
+        rows.add_row(each.serial, each.model or "–", version, due, "[bold red]overdue[/]" if each.overdue else "")
+    console.print(rows)
+
+
 def trend(
     serial: Serial,
     version: Annotated[
         int | None,
-        typer.Option("--version", metavar="N", help="Version compared with all recordings; default: the first."),
+        typer.Option(
+            "--version",
+            metavar="N",
+            help="Version that is compared with all recordings of the unit; default: the first.",
+        ),
     ] = None,
     limit_dps: Annotated[
         float | None,
-        typer.Option("--limit-dps", metavar="X", help="Limit of the bias; default: twice the error that it states."),
+        typer.Option(
+            "--limit-dps",
+            metavar="X",
+            help="Largest bias that is acceptable, deg/s; default: twice the error that the calibration states.",
+        ),
     ] = None,
     as_json: Json = False,
     database: Database = None,

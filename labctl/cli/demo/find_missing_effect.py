@@ -23,7 +23,7 @@ def play(demo: DemoRunner, real_serial: str) -> None:
     answer = _criticise_and_improve(demo, SERIAL)
     demo.say(f"(hidden effect: {', '.join(HIDDEN)})")
     demo.figures["hidden"] = {"hidden": list(HIDDEN), "named": [*answer.named], "verdict": answer.verdict}
-    demo.title("The same steps on the real gyro's recording, from a simple model")
+    demo.title("The real gyro's recording, criticised in the same way from a simple model on")
     demo.fit(real_serial, "bias_scale", demo.store.recordings.of_unit(real_serial)[0].id)
     answer = _criticise_and_improve(demo, real_serial)
     demo.figures["real_walk"] = {"named": [*answer.named], "verdict": answer.verdict}
@@ -38,7 +38,10 @@ def _criticise_and_improve(demo: DemoRunner, serial: str) -> CriticismResponse:
         better = improve_unit(demo.store, serial, ImproveRequest(add=[added]), VirtualClock().utc())
         before, after = better.before, better.error
         if answer.verdict == "ambiguous":
-            demo.say(f"adding the first of them, to see how far it leads (not that it is the cause): {added}")
+            demo.say(
+                "adding the first suspected effect, to see how much of the error it explains (this does not "
+                f"prove that it is the cause): {added}"
+            )
         demo.say(
             f"added {added}: RMS {before.rms_dps:.4f} -> {after.rms_dps:.4f} deg/s, held-out temperatures "
             f"{before.heldout_rms_dps:.4f} -> {after.heldout_rms_dps:.4f}, noise floor {after.noise_floor_dps:.4f}"

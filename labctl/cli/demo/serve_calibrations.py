@@ -47,5 +47,5 @@ def _address(service: subprocess.Popen[str]) -> str:
         if '"url"' in line:
             return line.split('"')[3]
     raise RuntimeError(
-        "the service of the demo ended before it was ready; run `labctl serve --simulate` to see its error"
+        "the service of the demo ended before it was ready; run `labctl serve --simulate` to see the error message"
     )

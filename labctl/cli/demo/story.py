@@ -30,7 +30,7 @@ def run_demo(folder: Path, database: str | None, *, quick: bool, quiet: bool) ->
         example_data.play(demo)
         find_missing_effect.play(demo, "OSU-FOG-2024")
         serials = [triaxial.SERIAL, single_axis.SERIAL, "WEISS-ENV05S", "OSU-FOG-2024"]
-        demo.title("Certified: of each unit the version with the least held-out error")
+        demo.title("Certified: for each unit, the version with the smallest held-out error")
         for serial in serials:
             _certify_best(demo, serial)
         serve_calibrations.play(demo, serials)

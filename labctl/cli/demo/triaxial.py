@@ -38,7 +38,9 @@ def play(demo: DemoRunner, *, quick: bool) -> None:
         "raw_over_compensated": {**_gains(context, errors)},
     }
     ratios = ", ".join(f"{axis} {r:.2f}" for axis, r in over_floor.items())
-    demo.say(f"yang2018 on the second campaign, RMS over noise floor: {ratios}  (1 is perfect)")
+    demo.say(
+        f"yang2018 on the second campaign, RMS error divided by the noise floor: {ratios} (1 is the best possible)"
+    )
 
 
 def _gains(context: FitData, errors: dict[str, dict[str, np.ndarray]]) -> dict[str, float]:

@@ -67,7 +67,7 @@ def print_poses(poses: PosesJson) -> None:
     )
     for left in moves["left_out"]:
         where = f"{left['from_s']:.1f} to {left['until_s']:.1f} s"
-        console.print(f"  left out: turn from {where}: {left['why']}", style="yellow", markup=False, soft_wrap=True)
+        console.print(f"  turn left out, from {where}: {left['why']}", style="yellow", markup=False, soft_wrap=True)
     console.print(f"frame: {poses['accelerometer']['frame']}", style="dim", markup=False, soft_wrap=True)
     console.print(f"not determined: {poses['not_determined']}", style="dim", markup=False, soft_wrap=True)
 

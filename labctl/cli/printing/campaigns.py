@@ -27,7 +27,7 @@ def print_plan(answer: PlanResponse) -> None:
         _print_warning(answer.attendance)
     if answer.visibility is None:
         return
-    rows = table("\nwhat this plan could find", "effect", "visible share", "from size", "unit", numbers=3)
+    rows = table("\neffects that this plan could detect", "effect", "visible share", "from size", "unit", numbers=3)
     for line in answer.visibility:
         if line.visible:
             rows.add_row(line.effect, format_number(line.share, 2), format_number(line.smallest_size, 2), line.unit)
@@ -86,11 +86,10 @@ def print_campaign(answer: CampaignResponse) -> None:
             f"  chamber {format_number(answer.chamber_c)} deg C, gyro {format_number(answer.gyro_c)} deg C, "
             f"table {format_number(answer.rate_dps)} deg/s"
         )
+    _print_instruments(answer)
     _print_question(answer)
     if answer.wish is not None:
         console.print(f"  {answer.wish} was requested and will be carried out", style="yellow", markup=False)
-    for device, state in answer.links.items():
-        console.print(f"  {device}: link {state}", style="red", markup=False)
     for unit, why in answer.dropped.items():
         console.print(f"  {unit} is excluded from the rest of the campaign: {why}", style="red", markup=False)
     if answer.last_error:
@@ -100,6 +99,17 @@ def print_campaign(answer: CampaignResponse) -> None:
     _print_advice(answer)
     for serial, recording in answer.recordings.items():
         console.print(f"  recording {recording}: {serial}", markup=False)
+    for device, said in answer.reported.items():
+        known = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in said.items())
+        console.print(f"  {device} says: {known}", markup=False, soft_wrap=True)
+
+
+def _print_instruments(answer: CampaignResponse) -> None:
+    """Print what reference instruments read, and links that are not well."""
+    for column, value in answer.references.items():
+        console.print(f"  {column} {format_number(value)} by a reference instrument", markup=False)
+    for device, state in answer.links.items():
+        console.print(f"  {device}: link {state}", style="red", markup=False)
 
 
 def _print_question(answer: CampaignResponse) -> None:
@@ -117,7 +127,7 @@ def _print_advice(answer: CampaignResponse) -> None:
         console.print(f"  what labctl did: {answer.advice.done}", markup=False, soft_wrap=True)
         console.print(f"  what to do next: {answer.advice.next}", markup=False, soft_wrap=True)
     if answer.state in STOPPED_EARLY and answer.resume_reason:
-        word = "resume only after you have checked this" if answer.resumable else "not resumable"
+        word = "resume only after you have checked the points above" if answer.resumable else "not resumable"
         console.print(f"  {word}: {answer.resume_reason}", style="yellow", markup=False, soft_wrap=True)
 
 

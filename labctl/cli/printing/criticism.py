@@ -28,7 +28,7 @@ def print_verification(answer: VerificationResponse) -> None:
     for axis, found in answer.axes.items():
         rows.add_row(axis, format_number(found.rms_dps), format_number(found.max_dps), format_number(found.bias_dps))
     console.print(rows)
-    console.print("as expected" if answer.ok else "NOT as expected: fit a new version, or criticise this one")
+    console.print("as expected" if answer.ok else "NOT as expected: fit a new version, or criticise this version")
 
 
 def print_criticism(answer: CriticismResponse) -> None:
@@ -92,7 +92,7 @@ def _not_testable(answer: CriticismResponse) -> list[str]:
     for line in answer.not_testable:
         if line["why"] == "channel":
             lacking.setdefault(", ".join(map(_channel_in_words, line["needs"])), []).append(line["effect"])
-    said = [f"this schedule cannot test: {', '.join(hidden)}"] if hidden else []
+    said = [f"effects that this schedule cannot test: {', '.join(hidden)}"] if hidden else []
     return said + [f"not recorded: {channel}, which would show {', '.join(each)}" for channel, each in lacking.items()]
 
 
@@ -156,15 +156,16 @@ def print_improvement(answer: ImproveResponse) -> None:
     for effect_id, span in answer.plausible.items():
         if not span["inside"]:
             console.print(
-                f"  {effect_id}: larger than is usual ({span['from']:g} to {span['to']:g}); compare it again with "
-                "the effects that explain the same",
+                f"  {effect_id}: larger than is usual ({span['from']:g} to {span['to']:g}); another effect may "
+                "explain the same error: criticise the new version",
                 style="yellow",
             )
     for left in answer.left_out:
         size = left.get("rms_dps")
-        cost = "" if size is None else f", which leaves {size:.2g} deg/s RMS on these data"
+        cost = "" if size is None else f", so that {size:.2g} deg/s RMS remain uncorrected on these data"
         console.print(
-            f"  {left['effect']} not part of a calibration ({left['origin']}); a calibration file leaves it out{cost}",
+            f"  {left['effect']} ({left['origin']}) is not part of a calibration; a calibration file leaves it "
+            f"out{cost}",
             soft_wrap=True,
         )
     console.print(f"next: labctl criticise {answer.serial}", style="dim")
@@ -205,6 +206,7 @@ def ladder_lines(answer: LadderResponse, width: int = 40) -> list[str]:
             "cannot be applied" if other.applied_rms_dps is None else f"{format_number(other.applied_rms_dps)} deg/s"
         )
         lines.append(
-            f"    version {other.version} of recording {other.recording}, applied here without refitting: {error}"
+            f"    version {other.version} of recording {other.recording}, applied to this recording without "
+            f"refitting: {error}"
         )
     return lines

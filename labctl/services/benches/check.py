@@ -2,27 +2,81 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from pathlib import Path
 
-from instruments.bench import check
-from instruments.bench_config import shipped_benches
-from instruments.clock import ScaledClock, SystemClock, VirtualClock
-from instruments.simulation import serve_simulation
+from instruments.bench_config import BenchFile, shipped_benches
+from instruments.checks.check import check
+from instruments.checks.findings import DeviceReport
+from instruments.clock import Clock, ScaledClock, SystemClock, VirtualClock, WallClock
+from instruments.simulation import Simulation, serve_simulation
 from labctl.errors import BadInput
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.benches import BenchCheckResponse, DeviceCheck, ShippedBench
+from labctl.services.schemas.benches import (
+    BenchCheckResponse,
+    BenchDescription,
+    BenchUnit,
+    DeviceCheck,
+    FindingResponse,
+    ShippedBench,
+)
 
 
 def check_bench(source: str) -> BenchCheckResponse:
     """Talk to every instrument of a bench and say what answered; nothing moves."""
     bench = load_bench(source)
-    clock = VirtualClock() if bench.is_simulated else SystemClock()
-    devices = [
-        DeviceCheck(device=device, ok=ok, text=text, **bench.drivers[device].model_dump())
-        for device, ok, text in check(bench, clock)
-    ]
-    return BenchCheckResponse(bench=source, ok=all(each.ok for each in devices), devices=devices)
+    return checked(bench, source, clock_of(bench))
+
+
+def checked(bench: BenchFile, source: str, clock: Clock, simulation: Simulation | None = None) -> BenchCheckResponse:
+    """Return what was found out about a bench whose drivers are resolved; `source` is what it is called."""
+    return response_of(bench, source, check(bench, clock, simulation))
+
+
+def response_of(bench: BenchFile, source: str, reports: Sequence[DeviceReport]) -> BenchCheckResponse:
+    """Return the reports on the instruments of a bench as a response, dated now."""
+    devices = [_device(report, bench) for report in reports]
+    return BenchCheckResponse(
+        bench=source, ok=all(each.ok for each in devices), checked_at=WallClock().utc(), devices=devices
+    )
+
+
+def description(
+    bench: BenchFile, campaign: int | None, unconfirmed: str, check_: BenchCheckResponse | None
+) -> BenchDescription:
+    """Return a bench, what runs on it, what its safe state did not confirm, and its last check."""
+    return BenchDescription(
+        name=bench.name,
+        simulated=bench.is_simulated,
+        latitude_deg=bench.latitude_deg,
+        units=[BenchUnit(name=g.name, serial=g.serial, driver=g.driver) for g in bench.gyros],
+        campaign=campaign,
+        unconfirmed=unconfirmed,
+        check=check_,
+    )
+
+
+def _device(report: DeviceReport, bench: BenchFile) -> DeviceCheck:
+    return DeviceCheck(
+        device=report.device,
+        ok=report.is_ok,
+        text=report.text,
+        kind=report.kind,
+        state=report.state,
+        address=report.address,
+        findings=[FindingResponse(**asdict(each)) for each in report.findings],
+        reported=report.reported,
+        **bench.drivers[report.device].model_dump(),
+    )
+
+
+def clock_of(bench: BenchFile) -> Clock:
+    """Return the clock of a check: that of simulators in another process runs at their speed."""
+    if bench.is_simulated:
+        return VirtualClock()
+    remote = bench.simulation is not None and bench.simulation.control is not None
+    return ScaledClock(bench.simulation.speed) if remote and bench.simulation is not None else SystemClock()
 
 
 def shipped() -> list[ShippedBench]:

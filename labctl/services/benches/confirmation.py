@@ -124,6 +124,6 @@ def describe_bench(row: BenchRow) -> str:
         return describe_safe_state(row.name, row.unconfirmed)
     return (
         f"bench {row.name} was confirmed safe by labctl at {row.confirmed_at:%Y-%m-%d %H:%M:%S} UTC, attempt "
-        f"{row.attempts}, after: {row.unconfirmed}; inspect it before anything moves, then `labctl bench clear "
+        f"{row.attempts}, after: {row.unconfirmed}; inspect the bench before anything moves, then `labctl bench clear "
         f"{row.name} --by NAME`"
     )

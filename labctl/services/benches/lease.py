@@ -69,7 +69,7 @@ class BenchHold:
         """Take the bench. Raises Conflict naming the holder; waits a term for one that may be dead."""
         found = self._store.leases.holder(self._bench)
         if found is not None and not self._gone(found):
-            raise Conflict(f"{described(found)}; wait for its end, or stop it")
+            raise Conflict(f"{described(found)}; wait until that process ends, or stop it")
         begun_s, now = self._clock.now_s(), self._clock.utc()
         mine = LeaseRow(
             self._bench, self._owner, socket.gethostname(), this_machine(), os.getpid(), since=now,

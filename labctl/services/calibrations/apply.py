@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import pyarrow as pa
 import pyarrow.csv as pacsv
 import pyarrow.parquet as pq
 
+from labctl.certification import CalibrationWarning
 from labctl.compensator import Compensator
 from labctl.errors import BadInput
 from labctl.fitting.numeric.arrays import Array
@@ -24,7 +26,9 @@ def compensate_file(calibration: Path, source: Path, target: Path, outside: str)
     """
     if outside not in {"clamp", "refuse"}:
         raise BadInput(f"--outside {outside!r} is not known (expected clamp or refuse)")
-    compensator = Compensator.from_file(calibration, outside=outside)  # type: ignore[arg-type]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", CalibrationWarning)  # the answer says it
+        compensator = Compensator.from_file(calibration, outside=outside)  # type: ignore[arg-type]
     if not source.is_file():
         raise BadInput(f"{source}: no such file; check the path")
     columns = read_table(source)
@@ -50,7 +54,9 @@ def compensate_file(calibration: Path, source: Path, target: Path, outside: str)
         pq.write_table(table, target)
     else:
         pacsv.write_csv(table, target)
-    return CompensationResponse(rows=len(raw), outside=int(corrected.outside.sum()), file=str(target))
+    return CompensationResponse(
+        rows=len(raw), outside=int(corrected.outside.sum()), file=str(target), warning=compensator.warning
+    )
 
 
 def _floats(column: Column) -> Array:

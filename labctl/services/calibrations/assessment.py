@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from labctl.errors import BadInput, NotEnoughData, NotFound
 from labctl.fitting.models.inversion import NotConverged
 from labctl.services.calibrations.comparison import worse_than_raw, worse_than_version
+from labctl.services.calibrations.due import interval_days
 from labctl.services.criticism.criticise import criticise_unit
 from labctl.services.recordings.inspection import inspect_stored
 from labctl.services.schemas.certification import AssessmentResponse, CertifiedErrors, Objection
@@ -25,6 +26,7 @@ def assess(store: Store, serial: str, version: int) -> AssessmentResponse:
     row = store.calibrations.get(store.units.get(serial).serial, version)
     criticism, reason, unusable = _criticised(store, row)
     objections = [*unusable, *_of_verdict(criticism), *_of_errors(store, row), *_of_data(store, row)]
+    due_days, due_from = interval_days(store, serial, version, None)
     return AssessmentResponse(
         serial=serial,
         version=version,
@@ -37,6 +39,8 @@ def assess(store: Store, serial: str, version: int) -> AssessmentResponse:
         override_needed=bool(objections),
         least_reason_characters=LEAST_REASON_CHARACTERS,
         least_reason_words=LEAST_REASON_WORDS,
+        due_days=due_days,
+        due_from=due_from,
     )
 
 
@@ -79,9 +83,12 @@ def _of_verdict(criticism: CriticismResponse | None) -> Iterator[Objection]:
     version = f"{criticism.serial} --version {criticism.version}"
     do = f"find out which effect is missing: labctl criticise {version}"
     if criticism.verdict == "missing":
-        do = f"add it and certify the new version: labctl improve {version} --add {criticism.named[0]}"
+        do = f"add the missing effect and certify the new version: labctl improve {version} --add {criticism.named[0]}"
     elif criticism.verdict == "ambiguous":
-        do = f"measure what distinguishes them (labctl criticise {version}), add that and certify the new version"
+        do = (
+            f"make the measurement that distinguishes these effects (labctl criticise {version}), add the right one "
+            "and certify the new version"
+        )
     said = (
         f"the verdict on recording {criticism.recording} is {criticism.verdict!r} ({figures}): {_sentence(criticism)}"
     )
@@ -106,7 +113,7 @@ def _of_errors(store: Store, row: CalibrationRecord) -> Iterator[Objection]:
         yield Objection(what="worse", text=finding.said, do=finding.do)
     history = store.calibrations.history(row.serial)
     in_force = history[0].version if history and history[0].act == "certify" else None
-    others = {row.parent: "which it was made from"} | {in_force: "which is in force"}
+    others = {row.parent: "from which it was made"} | {in_force: "which is in force"}
     for version, role in others.items():
         if version is None or version == row.version:
             continue

@@ -9,6 +9,7 @@ from labctl.acting_user import actor
 from labctl.errors import BadInput, CertificationRefused
 from labctl.json_types.calibrations import JudgementDetail
 from labctl.services.calibrations.assessment import LEAST_REASON_CHARACTERS, LEAST_REASON_WORDS, assess
+from labctl.services.calibrations.due import interval_days
 from labctl.services.schemas.certification import (
     AssessmentResponse,
     CertificationResponse,
@@ -54,14 +55,15 @@ def certify(store: Store, serial: str, version: int, request: CertifyRequest, at
     """
     if request.override:
         _refuse_short(request.reason)
+    days, due_from = interval_days(store, store.units.get(serial).serial, version, request.due_days)
     known = assess(store, serial, version)
     if known.objections and not request.override:
         raise CertificationRefused(refusal(known))
     judgement = Judgement(
         known.verdict, known.verdict_recording, at if known.verdict else None, bool(known.objections),
-        cast(JudgementDetail, known.model_dump(mode="json", include=set(KEPT))),
+        cast(JudgementDetail, {**known.model_dump(mode="json", include=set(KEPT)), "due_from": due_from}),
     )  # fmt: skip
-    due = at + timedelta(days=request.due_days) if request.due_days else None
+    due = None if days is None else at + timedelta(days=days)
     return _set_in_force(store, serial, version, "certify", request, at, due, judgement)
 
 

@@ -41,8 +41,8 @@ def worse_than_raw(error: Errors, *, late: bool = False) -> list[Finding]:
     return [
         Finding(
             "worse", "likely" if late else "certain", "fit",
-            f"its residual on the data of the fit is {left:.4g} deg/s RMS, and the error without correction is "
-            f"{raw:.4g} deg/s", left, "deg/s", f"less than {raw:.4g} deg/s",
+            f"the residual of the model on the data of the fit is {left:.4g} deg/s RMS, but the error without "
+            f"correction is only {raw:.4g} deg/s", left, "deg/s", f"less than {raw:.4g} deg/s",
             "add time_delay and bandwidth to the effects" if late
             else "check sign, unit and axes of the output, or choose another model",
         )
@@ -79,6 +79,6 @@ def worse_than_version(other: Errors, own: Errors) -> str:
         ("RMS", other.rms_dps, own.rms_dps),
     ):
         if first is not None and second is not None:
-            said = f"its {name} error, {second:.4g} deg/s, is worse than the {first:.4g} deg/s"
+            said = f"the version's {name} error, {second:.4g} deg/s, is larger than the {first:.4g} deg/s"
             return said if second > WORSE_VERSION * first else ""
     return ""

@@ -1,16 +1,16 @@
-"""Calibrations: fit, versions, and files for consumers."""
+"""Calibrations: fit and versions."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
 from datetime import datetime
 
 from labctl.calibration import build_calibration, read_calibration
-from labctl.exports import export_calibration
 from labctl.fitting import fit
 from labctl.fitting.effects.response import IDS
 from labctl.fitting.uncertainty import evidence_of
 from labctl.json_types.models import KeptFit
+from labctl.recording.info import REFERENCES, RecordingInfo
 from labctl.services.calibrations.certification import certification_response, version_in_force
 from labctl.services.calibrations.comparison import worse_than_raw
 from labctl.services.calibrations.next_version import keep_next_version
@@ -25,16 +25,7 @@ from labctl.services.schemas.calibrations import (
     ImprovedVersionResponse,
     VersionResponse,
 )
-from labctl.store import NewCalibration, Store
-
-
-@dataclass(frozen=True)
-class CalibrationFile:
-    """A calibration as a consumer gets it: immutable bytes and their tag."""
-
-    content: bytes
-    media_type: str
-    etag: str
+from labctl.store import NewCalibration, RecordingRow, Store
 
 
 def fit_unit(store: Store, serial: str, request: FitRequest, at: datetime) -> FitResponse:
@@ -57,6 +48,7 @@ def fit_unit(store: Store, serial: str, request: FitRequest, at: datetime) -> Fi
     recipe, bench = (run.recipe_name, run.bench_name) if run is not None else (None, None)
     made = {
         "recording": recording, "campaign": campaign, "recipe": recipe, "bench": bench, **several(recordings),
+        **reference_of(measured.rows),
     }  # fmt: skip
 
     def build(version: int) -> NewCalibration:
@@ -79,6 +71,13 @@ def fit_unit(store: Store, serial: str, request: FitRequest, at: datetime) -> Fi
 def several(recordings: tuple[int, ...]) -> dict[str, list[int]]:
     """Return what a calibration's provenance says of its recordings beside the newest, where there are several."""
     return {"recordings": list(recordings)} if len(recordings) > 1 else {}
+
+
+def reference_of(rows: Sequence[RecordingRow]) -> dict[str, str]:
+    """Return what a calibration's provenance says of the rates of its recordings, where that is known."""
+    infos = [RecordingInfo.model_validate(row.info) for row in rows]
+    known = dict.fromkeys(REFERENCES[info.rate_reference] for info in infos if info.rate_reference is not None)
+    return {"rate_reference": "; ".join(known)} if known else {}
 
 
 def list_calibrations(store: Store, serial: str) -> list[CalibrationRow]:
@@ -110,20 +109,9 @@ def one_version(store: Store, serial: str, version: int) -> VersionResponse | Im
     beside = {
         "parent": row.parent, "recording": row.recording, "recordings": list(row.recordings),
         "created_at": row.created_at, "hash": row.hash,
+        "rate_reference": calibration.document["provenance"].get("rate_reference", ""),
         "left_out": list(calibration.document["left_out"]), "remembers": remembered_by(calibration),
         "in_force": in_force, "due": last.due if last is not None and in_force else None, "certification": last,
     }  # fmt: skip
     kind = ImprovedVersionResponse if "improved_from" in row.answer else VersionResponse
     return kind.model_validate({**row.answer, **beside})
-
-
-def calibration_file(store: Store, serial: str, version: int | None, format_name: str) -> CalibrationFile:
-    """Return a calibration in a consumer's format; without a version the certified one.
-
-    Raises NotFound, NotCertified, BadInput for an unknown format.
-    """
-    document, hash_ = store.calibrations.document(serial, version)
-    if format_name == "json":
-        return CalibrationFile(document, "application/json", hash_)
-    content, media_type = export_calibration(document, format_name)
-    return CalibrationFile(content, media_type, f"{hash_}-{format_name}")

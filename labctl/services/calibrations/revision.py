@@ -23,7 +23,7 @@ from labctl.json_types.models import ChangeFigures, KeptChange, UsualRange
 from labctl.recording import Recording
 from labctl.services.cache import RecentResults, cached
 from labctl.services.calibrations.comparison import worse_than_before
-from labctl.services.calibrations.fitting import several
+from labctl.services.calibrations.fitting import reference_of, several
 from labctl.services.calibrations.next_version import keep_next_version
 from labctl.services.criticism.evaluation import model_of
 from labctl.services.criticism.measurements import Measurements
@@ -198,7 +198,9 @@ def _shaped(measured: Measurements, base: ErrorModel, term: Term) -> Term:
 def _keep(store: Store, serial: str, change: _Change, at: datetime) -> ImproveResponse:
     parent, after = change.row.version, change.after
     recording, recordings = change.measured.row.id, change.measured.recordings
-    made = {"recording": recording, "improved_from": parent, **several(recordings)}
+    made = {
+        "recording": recording, "improved_from": parent, **several(recordings), **reference_of(change.measured.rows),
+    }  # fmt: skip
     evidence = use_evidence(fit_data_of(change.points), changed(after.fitted.model))
 
     def build(version: int) -> NewCalibration:

@@ -12,7 +12,8 @@ from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.models.true_rate_error import errors_at_true_rates
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording.recording import Column
-from labctl.services.schemas.calibrations import Surface, SurfaceResponse, Validity
+from labctl.services.schemas.calibrations import Validity
+from labctl.services.schemas.uncertainty import Surface, SurfaceResponse
 from labctl.store import CalibrationRecord, Store
 
 #: Rates that a surface of a model without a rate spans where the unit's are not known, deg/s.

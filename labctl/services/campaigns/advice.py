@@ -41,7 +41,7 @@ FAILURES: tuple[Failure, ...] = (
     Failure(
         r"(?:taken up|resumed) \d+ times without finishing a step",
         "The campaign was resumed several times and never finished a step.",
-        f"Find out at the bench what stops it each time, {RESUME}.",
+        f"Find out at the bench what stops the campaign each time, {RESUME}.",
     ),
     Failure(
         r"not (?:taken up|resumed): ",
@@ -55,18 +55,19 @@ FAILURES: tuple[Failure, ...] = (
     ),
     Failure(
         r" declined: ",
-        "A person said that it cannot be done.",
-        f"Remove what prevents it, {RESUME} and answer its question.",
+        "A person answered that the requested action cannot be done.",
+        f"Remove what prevents the action, {RESUME} and answer the campaign's question.",
     ),
     Failure(
         r"^the turn by .* was refused \d+ times",
-        "A turn by hand was refused again and again.",
-        f"Compare what came out with what was asked, check axis, sense and unit, {RESUME} and turn again.",
+        "A turn by hand was refused several times.",
+        f"Compare the measured angle with the requested angle, check axis, direction and unit, {RESUME} and turn "
+        "again.",
     ),
     Failure(
         r"(?:\w+ answered|no answer) within",
         "The bench's question was not answered in time.",
-        f"Choose a time when a person is at the bench, {RESUME} and answer its question.",
+        f"Choose a time when a person is at the bench, {RESUME} and answer the campaign's question.",
     ),
     Failure(
         r"the soak at .* did not settle within",
@@ -80,7 +81,7 @@ FAILURES: tuple[Failure, ...] = (
     ),
     Failure(
         r"set point .* read back",
-        "The chamber did not take the set point that it was given.",
+        "The chamber did not accept the set point that labctl sent.",
         f"Check the controller's panel for a profile, a lock or a limit, {RESUME}.",
     ),
     Failure(
@@ -91,7 +92,7 @@ FAILURES: tuple[Failure, ...] = (
     Failure(
         r"the air is beyond|its own thermometer: ",
         "A temperature passed a limit of the chamber or of a unit.",
-        f"Let chamber and unit return to room temperature, find out why they left it, {RESUME}.",
+        f"Let chamber and unit return to room temperature, find out why the limit was passed, {RESUME}.",
     ),
     Failure(
         r"the air left its set point|is off the air's",
@@ -100,7 +101,7 @@ FAILURES: tuple[Failure, ...] = (
     ),
     Failure(
         r" runs .* deg/s instead of|steps took .* instead of|is steady at .* not for the",
-        "The table did not turn at the rate that it was asked for.",
+        "The table did not turn at the commanded rate.",
         f"Check that the table turns freely and that its cables have enough slack, {RESUME}.",
     ),
     Failure(
@@ -109,21 +110,21 @@ FAILURES: tuple[Failure, ...] = (
         LOOK,
     ),
     Failure(
-        r"readings lost or damaged|readings marked bad|not one of about",
+        r"readings lost or damaged|readings marked bad|not one of about|the counter on .* stands at",
         "The readings of a unit were missing, damaged or marked bad.",
         f"Check the unit's power, cable and baud rate, {RESUME}.",
     ),
     Failure(
-        r"nothing heard|no answer|gave no answer|no intact datagram|no whole line|does not answer|link .* broke|"
+        r"nothing heard|no answer|gave no answer|no intact |no whole line|does not answer|link .* broke|"
         r"cannot be opened|no Modbus TCP|reply belongs to another request|not reached again|"
         r"link is gone|came that are no reply|answered instead of unit|reply to request|line was never silent|"
-        r"no Modbus instrument",
+        r"no Modbus instrument|, no Modbus;",
         "An instrument did not answer.",
-        f"Check its power and cable with `labctl bench check`, {RESUME}.",
+        f"Check the instrument's power and cable, run `labctl bench check`, {RESUME}.",
     ),
     Failure(
         r"check address and driver|not a C4|, serial |is set otherwise|readings/s on |has serial number|on USB adapter",
-        "Another instrument answered than the one in the bench file.",
+        "The instrument that answered is not the instrument in the bench file.",
         f"Compare the bench file with the bench, {RESUME}.",
     ),
     Failure(
@@ -133,7 +134,7 @@ FAILURES: tuple[Failure, ...] = (
     ),
     Failure(
         r"^ended by an error of the program|^[A-Za-z_.]*(Error|Exception)\b",
-        "labctl met an error of its own.",
+        "labctl failed because of a fault in labctl itself.",
         f"Report the reason with the version of labctl, inspect the bench, {RESUME}.",
     ),
 )

@@ -9,6 +9,7 @@ from instruments.bench_config import BenchFile
 from instruments.clock import Clock
 from labctl.errors import BenchBusy, Conflict, StoreError
 from labctl.log import get_logger
+from labctl.services.benches.check import checked, description
 from labctl.services.benches.confirmation import SafeStateRetry
 from labctl.services.benches.lease import BenchHold
 from labctl.services.benches.start_confirmation import confirmation_text
@@ -20,7 +21,8 @@ from labctl.services.campaigns.preparation import Prepared, prepare, refuse_unco
 from labctl.services.campaigns.recovery import CampaignRecovery, secure_bench
 from labctl.services.campaigns.resume import prepare_resume, with_original_simulation
 from labctl.services.campaigns.status import answer_of, campaign_status
-from labctl.services.schemas.benches import BenchDescription, BenchUnit
+from labctl.services.planning.loading import with_drivers
+from labctl.services.schemas.benches import BenchCheckResponse, BenchDescription
 from labctl.services.schemas.campaigns import (
     CampaignRequest,
     CampaignResponse,
@@ -66,6 +68,7 @@ class BenchRunner:
         self._recovery = CampaignRecovery(store, bench, make_clock)
         self._stops = False
         self._stop_requested: int | None = None  #: the campaign that was stopped last
+        self._last_check: BenchCheckResponse | None = None
         self.used = False  #: whether anything was asked of the bench here
         self._listeners = ChangeListeners()
         #: Tries the safe state again while it is unconfirmed; started by the process that serves the bench.
@@ -122,6 +125,13 @@ class BenchRunner:
             prepared = prepare(self._store, request.recipe, bench, clock, clip=request.clip, bench_clear=clear)
             self._begin(prepared)
         return campaign_status(self._store, prepared.id)
+
+    def check(self) -> BenchCheckResponse:
+        """Ask every instrument what it is and how it does; nothing moves. Raises BenchBusy while a campaign runs."""
+        with self._guard:
+            self._refuse_unless_free()
+            self._last_check = checked(with_drivers(self._bench), self._bench.name, self._make_clock())
+            return self._last_check
 
     def _refuse_unless_free(self) -> None:
         if self._stops:
@@ -188,15 +198,14 @@ class BenchRunner:
     def pause(self, campaign: int, request: ReasonRequest) -> CampaignResponse:
         """Ask the running campaign to hold after the present data set. Raises Conflict when it does not run here."""
         self._running(campaign).control.pause(request.text)
-        answer = self.status(campaign)
-        return answer or campaign_status(self._store, campaign)
+        return self.status(campaign) or campaign_status(self._store, campaign)
 
     def confirm(self, campaign: int, request: ConfirmRequest) -> CampaignResponse:
         """Answer the open question. Raises StalePrompt for any other one, Conflict when nothing is asked here."""
         operator = self._running(campaign).prepared.operator
         if not isinstance(operator, HumanOperator):
             raise StalePrompt(
-                f"question {request.prompt!r} is not asked: this bench turns its units itself; send no answer"
+                f"question {request.prompt!r} was not asked: this bench turns its units itself; send no answer"
             )
         operator.reply(Answer(request.prompt, request.confirmed, request.by, request.reason, request.again))
         return self.status(campaign) or campaign_status(self._store, campaign)
@@ -259,14 +268,8 @@ class BenchRunner:
 
     def describe(self) -> BenchDescription:
         """Return the bench and what it is doing."""
-        return BenchDescription(
-            name=self._bench.name,
-            simulated=self._bench.is_simulated,
-            latitude_deg=self._bench.latitude_deg,
-            units=[BenchUnit(name=g.name, serial=g.serial, driver=g.driver) for g in self._bench.gyros],
-            campaign=self.running,
-            unconfirmed=self._store.benches.unconfirmed(self._bench.name),
-        )
+        unconfirmed = self._store.benches.unconfirmed(self._bench.name)
+        return description(self._bench, self.running, unconfirmed, self._last_check)
 
     @property
     def polls(self) -> tuple[int, int] | None:

@@ -15,6 +15,8 @@ from procedures.contracts.campaign_state import ENDED, CampaignState
 HEARTBEAT_S = 10.0
 #: What changes all the time, as a unit's output does, is read this often.
 LIVE_S = 1.0
+#: Changes within this time are one to a client: a bench in virtual time reports hundreds a second.
+LEAST_S = 0.05
 #: What one client received counts for the others this long, unless the bench rings.
 FRESH_S = 0.5
 
@@ -47,6 +49,34 @@ class StatusCache:
         return cast(T, await asyncio.shield(found))  # one who leaves does not end it for the others
 
 
+class Bell:
+    """Rung by the bench's thread, waited for by one client: it rings LEAST_S after the first change."""
+
+    def __init__(self) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._event = asyncio.Event()
+        self._rung = False
+
+    def ring(self) -> None:
+        """Note that something has changed. Raises RuntimeError where the client's event loop has ended."""
+        if not self._rung:
+            self._rung = True
+            self._loop.call_soon_threadsafe(self._loop.call_later, LEAST_S, self._event.set)
+
+    def clear(self) -> None:
+        """Ring again at the next change: what has changed until now is about to be read."""
+        self._event.clear()
+        self._rung = False
+
+    async def rings(self) -> bool:
+        """Wait LIVE_S for a change; returns whether there was one."""
+        try:
+            await asyncio.wait_for(self._event.wait(), LIVE_S)
+        except TimeoutError:
+            return False
+        return True
+
+
 class CampaignEventStream:
     """Tells clients the status of campaigns."""
 
@@ -64,17 +94,12 @@ class CampaignEventStream:
         """Yield a campaign's events after number `after`, where it stands whenever that has changed, and None to show
         that the stream lives, until the campaign ends or it is `over` for another reason.
 
-        A client that reads slowly gets the newest status next, never a queue of old ones; the bench only rings a bell.
+        A client that reads slowly gets the newest status next, never a queue of old ones; the bench only rings a bell,
+        at most every LEAST_S.
         """
-        bell = asyncio.Event()
-        loop = asyncio.get_running_loop()
+        bell = Bell()
         shown: CampaignResponse | None = None
-
-        def ring() -> None:
-            if not bell.is_set():
-                loop.call_soon_threadsafe(bell.set)
-
-        stop = self._listen(ring) if self._listen is not None else None
+        stop = self._listen(bell.ring) if self._listen is not None else None
         try:
             while True:
                 bell.clear()
@@ -111,19 +136,10 @@ class CampaignEventStream:
     async def _now(self, campaign: int) -> CampaignResponse:
         return await self._status_cache.at(("now", campaign), lambda: self._status(campaign))
 
-    async def _meanwhile(self, campaign: int, bell: asyncio.Event) -> AsyncIterator[CampaignResponse | None]:
+    async def _meanwhile(self, campaign: int, bell: Bell) -> AsyncIterator[CampaignResponse | None]:
         """Yield where a campaign stands until the bell rings, or until it is time to show that the stream lives."""
         for _ in range(round(HEARTBEAT_S / LIVE_S)):
-            if await _rings(bell):
+            if await bell.rings():
                 return
             yield await self._now(campaign)
         yield None
-
-
-async def _rings(bell: asyncio.Event) -> bool:
-    """Wait a moment for the bell; returns whether it rang."""
-    try:
-        await asyncio.wait_for(bell.wait(), LIVE_S)
-    except TimeoutError:
-        return False
-    return True

@@ -35,7 +35,7 @@ def campaign_plan(store: Store, campaign: int) -> CampaignPlanResponse:
         forecast_s=_forecast(steps),
     )
     return CampaignPlanResponse(
-        campaign=campaign, recipe=row.recipe_name, text=_text(row.recipe), bench=row.bench_name, state=row.state,
+        campaign=campaign, recipe=row.recipe_name, text=recipe_text(row.recipe), bench=row.bench_name, state=row.state,
         schedule_hash=row.schedule_hash, steps=len(steps),
         datasets=sum(DATA_SETS_OF_TURN if step.kind == "turn" else 1 for step in steps if "dataset" in step.body),
         expected_s=row.expected_s,
@@ -43,7 +43,7 @@ def campaign_plan(store: Store, campaign: int) -> CampaignPlanResponse:
     )  # fmt: skip
 
 
-def _text(recipe: JsonObject) -> str:
+def recipe_text(recipe: JsonObject) -> str:
     """Return a recipe as text; nothing where it was written by a labctl whose recipes had other keys."""
     try:
         return tomli_w.dumps(recipe_document(Recipe.model_validate(dict(recipe))))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from instruments.bench import Bench, open_bench
@@ -10,13 +11,21 @@ from instruments.clock import Clock, ScaledClock, SystemClock, VirtualClock
 from instruments.drivers.unit_handlers import ManualUnitHandler
 from instruments.errors import InstrumentError
 from instruments.interfaces.gyro import Gyro, GyroIdentity
+from instruments.interfaces.table import RateTable
 from labctl.acting_user import actor
 from labctl.errors import BadInput, Conflict
 from labctl.json_types.recordings import RawChannelJson
 from labctl.log import get_logger
 from labctl.recording import RecordingInfo
 from labctl.services.benches.confirmation import describe_bench
+from labctl.services.benches.identity import refuse_changed, reported_of
 from labctl.services.benches.power_failure import boot_id
+from labctl.services.benches.reference_columns import (
+    raw_channel,
+    reference_channels,
+    reference_notes,
+    refuse_doubled_columns,
+)
 from labctl.services.planning.loading import load_recipe, with_drivers
 from labctl.services.planning.timeline import step_json
 from labctl.store import NewCampaign, NewUnit, Store
@@ -123,7 +132,8 @@ def prepare(
 
     `opened` is the bench where it is open already; `bench_clear` is what a person has confirmed about it.
 
-    Raises InstrumentError when an instrument does not answer, PlanRefused when the bench cannot do the recipe.
+    Raises InstrumentError when an instrument does not answer, PlanRefused when the bench cannot do the recipe, Conflict
+    where a unit or its USB adapter is not the one that it was.
     """
     load_libraries()
     bench_file = with_drivers(bench_file)  # what is written down names the release of each driver
@@ -134,9 +144,8 @@ def prepare(
         _identify_at_rest(bench, clock)
         plan = make_plan(recipe, BenchLimits.of(bench), clip=clip)
         identities = {name: gyro.identify() for name, gyro in bench.gyros.items()}
-        said = {name: dict(found.reported) for name, found in identities.items() if found.reported}
-        bench_file = bench_file.model_copy(update={"reported": said})
-        units = tuple(_unit(gyro, identities[name], bench_file, clock, recipe) for name, gyro in bench.gyros.items())
+        bench_file = _with_reported(store, bench_file, identities)
+        units = _units(bench, identities, bench_file, clock, recipe)
         new = NewCampaign(
             recipe_name=recipe.name,
             recipe=plan.recipe.model_dump(mode="json"),
@@ -161,6 +170,13 @@ def prepare(
         raise
 
 
+def _with_reported(store: Store, bench: BenchFile, identities: Mapping[str, GyroIdentity]) -> BenchFile:
+    """Return a bench with what its instruments say of themselves; raises Conflict where one is not the known one."""
+    reported = reported_of(bench, {name: found.reported for name, found in identities.items()})
+    refuse_changed(store, bench, reported)
+    return bench.model_copy(update={"reported": reported})
+
+
 def _identify_at_rest(bench: Bench, clock: Clock) -> None:
     """Make sure that the right table and chamber answer, as far as the bench has them, and that the table is at rest.
 
@@ -171,11 +187,32 @@ def _identify_at_rest(bench: Bench, clock: Clock) -> None:
         table.identify()
     if chamber is not None:
         chamber.identify()
+    for reference in bench.references.values():
+        reference.identify()
     if table is not None and table.is_moving() and (complaint := stop_table(table, clock)):
         raise InstrumentError(table.name, complaint)
 
 
-def _unit(gyro: Gyro, identity: GyroIdentity, bench: BenchFile, clock: Clock, recipe: Recipe) -> NewUnit:
+def _units(
+    bench: Bench, identities: dict[str, GyroIdentity], bench_file: BenchFile, clock: Clock, recipe: Recipe
+) -> tuple[NewUnit, ...]:
+    """Return the recording of each unit; raises BadInput for a column that would have two sources."""
+    beside = reference_channels(bench, bench_file)
+    return tuple(
+        _unit(gyro, identities[name], bench.table, bench_file, clock, recipe, beside)
+        for name, gyro in bench.gyros.items()
+    )
+
+
+def _unit(
+    gyro: Gyro,
+    identity: GyroIdentity,
+    table: RateTable | None,
+    bench: BenchFile,
+    clock: Clock,
+    recipe: Recipe,
+    beside: tuple[RawChannelJson, ...],
+) -> NewUnit:
     latitude = bench.latitude_deg
     info = RecordingInfo.model_validate(
         {
@@ -184,9 +221,11 @@ def _unit(gyro: Gyro, identity: GyroIdentity, bench: BenchFile, clock: Clock, re
             "axes": gyro.axes,
             "kind": "samples",
             "motion": "rates" if recipe.turns is None else "turns",
+            "rate_reference": None if table is None or recipe.turns is not None else table.limits.reference,
             "turn_common_u": None if recipe.turns is None else recipe.turns.common_u,
             "started_at": clock.utc(),
             "latitude_deg": latitude,
+            "notes": reference_notes(bench),
             "sample_rate_hz": gyro.sample_rate_hz,
             "max_rate_dps": gyro.limits.max_rate_dps,
             "technology": identity.technology or None,
@@ -194,7 +233,6 @@ def _unit(gyro: Gyro, identity: GyroIdentity, bench: BenchFile, clock: Clock, re
             "output": {axis: dict(unit) for axis, unit in identity.output.items()},
         }
     )
-    channels: tuple[RawChannelJson, ...] = tuple(
-        {"name": c.name, "unit": c.unit, "scale": c.scale, "offset": c.offset} for c in gyro.channels
-    )
-    return NewUnit(gyro.name, info.model_dump(mode="json"), channels)
+    channels = tuple(raw_channel(channel) for channel in gyro.channels)
+    refuse_doubled_columns(gyro.name, channels, beside)
+    return NewUnit(gyro.name, info.model_dump(mode="json"), (*channels, *beside))

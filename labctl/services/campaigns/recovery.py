@@ -110,8 +110,8 @@ class CampaignRecovery:
                 continue
             if resumed is not None:
                 text = (
-                    f"not resumed: campaign {resumed} is resumed here first; after it run `labctl campaign resume "
-                    f"{row.id}`"
+                    f"not resumed: campaign {resumed} on the same bench is resumed first; when that has ended, run "
+                    f"`labctl campaign resume {row.id}`"
                 )
                 self._close(row.id, text)
                 continue

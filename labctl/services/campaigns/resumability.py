@@ -61,5 +61,5 @@ def _refusal(store: Store, answer: CampaignResponse, bench: BenchFile | None, ru
     if running not in {None, answer.id}:  # its own end is being written: by the time of a resume it is over
         return f"campaign {running} runs on bench {name} now; wait for its end or abort it"
     if text := store.benches.unconfirmed(name):
-        return f"the safe state of bench {name} is not confirmed ({text}); inspect it first"
+        return f"the safe state of bench {name} is not confirmed ({text}); inspect the bench first"
     return ""

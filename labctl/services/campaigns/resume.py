@@ -13,6 +13,7 @@ from labctl.config import default_database
 from labctl.errors import Conflict
 from labctl.log import get_logger
 from labctl.services.benches.confirmation import SafeStateRetry
+from labctl.services.benches.identity import pinned, reported_in
 from labctl.services.benches.lease import holding, open_for
 from labctl.services.benches.power_failure import boot_id, power_failed
 from labctl.services.campaigns.execution import Attend, Observe, run_attended
@@ -136,14 +137,17 @@ def _other_drivers(row: CampaignRow, bench_file: BenchFile) -> str:
 
 
 def _same_units(row: CampaignRow, bench_file: BenchFile) -> BenchFile:
-    """Return the bench with its drivers; raises Conflict where it carries other units, BadBench for a driver."""
+    """Return the bench with its drivers, which accepts only the instruments that the campaign began with.
+
+    Raises Conflict where it carries other units, BadBench for a driver.
+    """
     here = {gyro.serial for gyro in bench_file.gyros}
     if set(row.recordings) != here:
         raise Conflict(
             f"campaign {row.id} measures {', '.join(sorted(row.recordings))}, bench {bench_file.name} carries "
             f"{', '.join(sorted(here))}; name the campaign's own bench with --bench"
         )
-    return with_drivers(bench_file)
+    return pinned(with_drivers(bench_file), reported_in(row))
 
 
 def resume_here(

@@ -11,6 +11,7 @@ from pydantic import TypeAdapter
 
 from instruments.bench_config import BenchFile
 from labctl.services.benches.bench_clock import has_simulated_time
+from labctl.services.benches.identity import reported_in
 from labctl.services.campaigns.advice import advice_of
 from labctl.services.schemas.campaigns import (
     CampaignResponse,
@@ -46,6 +47,7 @@ def answer_of(row: CampaignRow, progress: Progress, request: ControlRequest | No
         chamber_c=progress.chamber_c,
         setpoint_c=progress.setpoint_c,
         gyro_c=next(iter(progress.gyro_c.values()), None),
+        references=dict(progress.references),
         rate_dps=progress.rate_dps,
         outputs=[] if state in ENDED else [OutputResponse(**asdict(output)) for output in progress.live.outputs()],
         last_error=progress.last_error or None,
@@ -58,6 +60,7 @@ def answer_of(row: CampaignRow, progress: Progress, request: ControlRequest | No
         ended_at=row.ended_at,
         recordings=dict(row.recordings),
         drivers=_drivers(row),
+        reported=reported_in(row),
         simulated_time=has_simulated_time(row.bench),
         advice=advice_of(state, progress.reason),
     )
@@ -110,6 +113,7 @@ def _from_summary(row: CampaignRow, seen: CampaignSummary) -> CampaignResponse:
         ended_at=row.ended_at,
         recordings=dict(row.recordings),
         drivers=_drivers(row),
+        reported=reported_in(row),
         simulated_time=has_simulated_time(row.bench),
         advice=advice_of(row.state, row.reason),
     )

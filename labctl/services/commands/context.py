@@ -8,7 +8,8 @@ from functools import cached_property
 from typing import Protocol
 
 from instruments.clock import Clock
-from labctl.services.commands.requests import CampaignResume, CampaignStart, ToCampaign
+from labctl.services.commands.requests import CampaignResume, CampaignStart, ToBench, ToCampaign
+from labctl.services.schemas.benches import BenchCheckResponse, CheckRequest
 from labctl.services.schemas.campaigns import CampaignResponse, ConfirmRequest, ReasonRequest
 from labctl.services.schemas.schedule import ScheduledResponse
 from labctl.store import Store
@@ -57,4 +58,8 @@ class CampaignControl(Protocol):
 
     def confirm(self, context: CommandContext, asked: ToCampaign[ConfirmRequest], /) -> CampaignResponse:
         """Answer the question that a campaign waits for. Raises StalePrompt for another one."""
+        ...
+
+    def check(self, context: CommandContext, asked: ToBench[CheckRequest], /) -> BenchCheckResponse:
+        """Ask every instrument of a bench what it is and how it does; nothing moves."""
         ...

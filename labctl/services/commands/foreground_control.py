@@ -7,13 +7,15 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 
 from labctl.errors import BadInput
+from labctl.services.benches.check import check_bench
 from labctl.services.campaigns.execution import AskClear, Attend, Observe, run_here
 from labctl.services.campaigns.resume import resume_here
 from labctl.services.campaigns.unattended import abort_abandoned, not_running
 from labctl.services.commands.context import CommandContext
-from labctl.services.commands.requests import CampaignResume, CampaignStart, ToCampaign
+from labctl.services.commands.requests import CampaignResume, CampaignStart, ToBench, ToCampaign
 from labctl.services.planning.loading import bench_for, load_bench, load_recipe
 from labctl.services.schedule import queue
+from labctl.services.schemas.benches import BenchCheckResponse, CheckRequest
 from labctl.services.schemas.campaigns import CampaignResponse, ConfirmRequest, ReasonRequest, StartRequest
 from labctl.services.schemas.schedule import ScheduledResponse
 
@@ -86,3 +88,7 @@ class ForegroundControl:
     def confirm(self, context: CommandContext, asked: ToCampaign[ConfirmRequest]) -> CampaignResponse:
         """Raise Conflict: no campaign asks anything here."""
         raise not_running(context.store, asked.campaign, f"answer question {asked.body.prompt}")
+
+    def check(self, _: CommandContext, asked: ToBench[CheckRequest]) -> BenchCheckResponse:
+        """Check a bench by its file or its shipped name, in this process."""
+        return check_bench(asked.bench)

@@ -26,7 +26,7 @@ from labctl.services.commands.requests import (
 from labctl.services.recordings import examples, importers, transfer
 from labctl.services.schedule import queue
 from labctl.services.schemas.admin import BackupNote, KeyRequest, KeyResponse, NewKeyResponse
-from labctl.services.schemas.benches import BenchStatus, ClearRequest
+from labctl.services.schemas.benches import BenchCheckResponse, BenchStatus, CheckRequest, ClearRequest
 from labctl.services.schemas.calibrations import FitRequest, FitResponse, ImproveRequest, ImproveResponse
 from labctl.services.schemas.campaigns import CampaignResponse, ConfirmRequest, ReasonRequest
 from labctl.services.schemas.certification import CertificationResponse, CertifyRequest, RevokeRequest
@@ -103,6 +103,10 @@ def _cancel_start(context: CommandContext, asked: ToStart) -> ScheduledResponse:
 def _clear_bench(context: CommandContext, asked: ToBench[ClearRequest]) -> BenchStatus:
     by, reason = asked.body.by, asked.body.reason
     return bench_status(context.store.benches.clear(asked.bench, by, reason, context.now()))
+
+
+def _check_bench(context: CommandContext, asked: ToBench[CheckRequest]) -> BenchCheckResponse:
+    return context.control.check(context, asked)
 
 
 def _create_key(context: CommandContext, asked: KeyRequest) -> NewKeyResponse:
@@ -194,6 +198,9 @@ CANCEL_START = Command(
 )
 CLEAR_BENCH = Command(
     method="POST", path="/api/benches/{bench}/clear", handler=_clear_bench, responses={200: BenchStatus}
+)
+CHECK_BENCH = Command(
+    method="POST", path="/api/benches/{bench}/check", handler=_check_bench, responses={200: BenchCheckResponse}
 )
 CREATE_KEY = Command(method="POST", path="/api/keys", handler=_create_key, responses={201: NewKeyResponse})
 REVOKE_KEY = Command(method="POST", path="/api/keys/{name}/revoke", handler=_revoke_key, responses={200: KeyResponse})

@@ -6,13 +6,14 @@ import threading
 from contextvars import copy_context
 
 from labctl.acting_user import actor
-from labctl.errors import Conflict, StoreError
+from labctl.errors import Conflict, NotFound, StoreError
 from labctl.log import get_logger
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.unattended import abort_abandoned, not_running, record_action
 from labctl.services.commands.context import CommandContext
-from labctl.services.commands.requests import CampaignResume, CampaignStart, ToCampaign
+from labctl.services.commands.requests import CampaignResume, CampaignStart, ToBench, ToCampaign
 from labctl.services.schedule import queue
+from labctl.services.schemas.benches import BenchCheckResponse, CheckRequest
 from labctl.services.schemas.campaigns import CampaignResponse, ConfirmRequest, ReasonRequest
 from labctl.services.schemas.schedule import ScheduledResponse
 
@@ -45,7 +46,7 @@ class ServiceControl:
         """Continue a paused campaign, or resume an interrupted one on this service's bench."""
         runner, body = self._bench_runner(), asked.body
         if asked.campaign is None:
-            raise Conflict("a service resumes a campaign by its number; name it")
+            raise Conflict("a service needs the number of the campaign to resume; give its number")
         paused = runner.runs(asked.campaign)  # a resume after an interruption is recorded together with its rows
         answer = runner.resume(asked.campaign, body)
         if paused:
@@ -99,6 +100,15 @@ class ServiceControl:
         said = f"{body.prompt}: {'done' if body.confirmed else 'cannot be done'}; {body.by}; {body.reason}"
         self._record(context, "confirm", asked.campaign, said)
         return answer
+
+    def check(self, context: CommandContext, asked: ToBench[CheckRequest]) -> BenchCheckResponse:
+        """Check this service's bench. Raises NotFound for another one, BenchBusy while a campaign runs."""
+        runner = self._bench_runner()
+        if asked.bench != runner.bench.name:
+            raise NotFound(f"this service drives bench {runner.bench.name}, not {asked.bench!r}; check that one")
+        found = runner.check()
+        context.store.audit.record(context.now(), "bench check", f"bench {found.bench}", {"ok": found.ok})
+        return found
 
     @staticmethod
     def _record(context: CommandContext, action: str, campaign: int, reason: str) -> None:

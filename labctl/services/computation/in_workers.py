@@ -139,9 +139,8 @@ class InWorkers(Pool):
             worker.join(END_S)
             code = worker.exitcode
         return ComputationEnded(
-            f"the computation was ended: its process {_end_in_words(code)} before it had a result. Try again; if it "
-            "happens again,"
-            f" take a recording of fewer data sets (memory limit {self.limits.memory_mib} MiB)"
+            f"the computation was ended: its process {_end_in_words(code)} before it had a result. Try again; if "
+            f"this happens again, use a recording of fewer data sets (memory limit {self.limits.memory_mib} MiB)"
         )
 
     @staticmethod

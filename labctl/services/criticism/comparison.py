@@ -72,9 +72,13 @@ def comparison_json(store: Store, serial: str, version: int, recording: int) -> 
 
 
 def _source(calibration: Calibration, fitted_to: Sequence[int], measured: Measurements) -> str:
-    own = "which it was fitted to" if set(fitted_to) >= set(measured.recordings) else "which it was not fitted to"
+    fitted = "was fitted" if set(fitted_to) >= set(measured.recordings) else "was not fitted"
+    own = f"which the version {fitted} to"
     if 0 < len(set(fitted_to) & set(measured.recordings)) < len(measured.recordings):
-        own = f"of which it was fitted to {', '.join(map(str, sorted(set(fitted_to) & set(measured.recordings))))}"
+        own = (
+            "of which the version was fitted to "
+            f"{', '.join(map(str, sorted(set(fitted_to) & set(measured.recordings))))}"
+        )
     return f"version {calibration.version} without refitting, on {measured.named}, {own}"
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from labctl.errors import BadInput
 from labctl.services.cache import cached_group
-from labctl.services.criticism.versions import version_of
+from labctl.services.criticism.versions import content_digest, version_of
 from labctl.services.recordings.loading import chosen_rows, readings_question
 from labctl.services.schemas.base import ResponseModel
 from labctl.services.schemas.criticism import CriticismResponse, ResidualsResponse
@@ -62,7 +62,7 @@ def _cached_criticism(
         return evaluate(store, row, measured, competing)
 
     question = {
-        "serial": row.serial, "version": row.version, "calibration": row.hash, "model": row.answer["model"],
+        "serial": row.serial, "version": row.version, "calibration": content_digest(row), "model": row.answer["model"],
         **readings_question(store, measured),
         "formulas": [[each.id, each.text] for each in competing],
     }  # fmt: skip

@@ -35,6 +35,13 @@ def with_warnings(answer: CriticismResponse, warnings: list[DataWarning]) -> Cri
 
 #: Up to this many noise floors an error counts as noise: a model follows no drift, and repeats share some of it.
 AT_FLOOR = 1.25
+#: Of a recording whose rates were commanded, and not measured.
+UNMEASURED = (
+    "The reference is the commanded rate of the table, not a measured one: table_rate_ratio and "
+    "scale_factor are the same column in these data, so a constant error of the table is part of the scale factor, and "
+    "no reading of the gyro can distinguish them; the angle of an encoder, an index pulse or a counted number of turns "
+    "can."
+)
 #: Channels that run on while temperatures rise.
 HISTORY = frozenset({"t_s", "power_s"})
 
@@ -148,7 +155,10 @@ def sentences(found: Criticism, experiments: Sequence[Experiment] = ()) -> list[
             f"This schedule cannot distinguish {verdict.depends_on[0]} from {_list(verdict.confounded)}: confounded."
         )
     if _leg(found) and (verdict.groups or verdict.form == "unexplained"):
-        said.append("More cannot be concluded from temperatures that only rise.")
+        said.append(
+            "Since the temperature only rises in this recording, an error that grows with time cannot be "
+            "distinguished from one that grows with temperature."
+        )
     if verdict.form == "ambiguous" and verdict.indistinguishable:
         wanted = [str(experiment["do"]) for experiment in experiments[:1]]
         if not wanted:
@@ -160,6 +170,8 @@ def sentences(found: Criticism, experiments: Sequence[Experiment] = ()) -> list[
         technology = found.data.info.technology or "this technology"
         said.append(f"Equivalent in these data, but not physical for {technology}: {_list(verdict.not_physical)}.")
     said += _further(found)
+    if found.data.info.rate_reference == "demanded":
+        said.append(UNMEASURED)
     factor = found.drift_over_datasheet
     if verdict.form == "adequate" and factor is not None and factor >= LARGE_DRIFT:
         said.append(f"The drift is larger than specified: {factor:.1f} times the value expected from the data sheet.")
@@ -176,7 +188,8 @@ def _remainder(verdict: Verdict) -> str:
     follows = f", and follows {channels[0]}" if channels else ""
     return (
         f"{' and '.join(group[0] for group in verdict.groups)} {'explains' if len(verdict.groups) == 1 else 'explain'} "
-        f"{explained} % of the excess; the residual is {float(left['over_floor']):.1f} times the floor{follows}."
+        f"{explained} % of the excess over the noise floor; the remaining residual is "
+        f"{float(left['over_floor']):.1f} times the noise floor{follows}."
     )
 
 
@@ -188,7 +201,7 @@ def _further(found: Criticism) -> list[str]:
     if not names or found.base is None:
         return []
     worth = f": at best the error falls from {found.base.error.rms_dps:.4g} to {min(after):.4g} deg/s" if after else ""
-    return [f"Further suspected effects, within the noise{worth}: {_list(sorted(names))}."]
+    return [f"Further suspected effects, too small to be distinguished from noise{worth}: {_list(sorted(names))}."]
 
 
 def _leg(found: Criticism) -> bool:
@@ -240,7 +253,7 @@ def _on_axes(group: tuple[str, ...], found: Criticism) -> str:
 
 def _ambiguous(verdict: Verdict, words: list[str]) -> str:
     if len(words) > 1:
-        return f"Missing: {'; and '.join(words)}; this recording cannot distinguish those joined by 'or'."
+        return f"Missing: {'; and '.join(words)}; this recording cannot distinguish the effects joined by 'or'."
     if not verdict.indistinguishable:
         return f"Something like {words[0]} is missing, but it explains only a part of the residual."
     names = "; ".join(map(_word, verdict.indistinguishable))

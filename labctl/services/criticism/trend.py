@@ -194,11 +194,13 @@ def _leaving(
 
 def _text(drifts: Sequence[Drift], points: int) -> Iterator[str]:
     if not drifts:
-        yield f"{points} recording{'s' if points != 1 else ''} in time: a drift takes two, and its uncertainty three."
+        word = "recording" if points == 1 else "recordings"
+        yield f"{points} {word} in time: a drift needs two recordings, and its uncertainty three."
     for each in drifts:
         said = f"Axis {each.axis}, {each.what}" if each.axis != "all" else "RMS error over all axes"
         if each.u is None or each.low is None or each.high is None:
-            yield f"{said}: {each.per_year:.2g} {each.unit} by two recordings; an uncertainty takes {LEAST_POINTS}."
+            figure = f"{said}: {each.per_year:.2g} {each.unit}"
+            yield f"{figure} from two recordings; its uncertainty needs {LEAST_POINTS} recordings."
         else:
             is_drift = "drifts by" if each.significant else "no drift beyond repeatability:"
             yield f"{said}: {is_drift} {each.per_year:.2g} {each.unit} (95 %: {each.low:.2g} to {each.high:.2g})."
@@ -207,13 +209,13 @@ def _text(drifts: Sequence[Drift], points: int) -> Iterator[str]:
 def _leaving_text(leaves: Sequence[Leaving], limit: float | None) -> Iterator[str]:
     for each in leaves:
         if each.outside:
-            yield f"Axis {each.axis}: the bias is outside {limit:.3g} deg/s at the newest recording already."
+            yield f"Axis {each.axis}: the bias is already outside {limit:.3g} deg/s at the newest recording."
             continue
         when: Mapping[str, str] = {
             name: f"{value:%Y-%m-%d}" if value else "not within 50 years"
             for name, value in (("expected", each.expected), ("earliest", each.earliest), ("latest", each.latest))
         }
         yield (
-            f"Axis {each.axis}: the bias leaves {limit:.3g} deg/s: expected {when['expected']}, earliest "
+            f"Axis {each.axis}: the bias passes the limit of {limit:.3g} deg/s: expected {when['expected']}, earliest "
             f"{when['earliest']}, latest {when['latest']}."
         )

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
+import json
+
 from labctl.errors import BadInput
 from labctl.store import CalibrationRecord, Store
 
@@ -14,3 +17,12 @@ def version_of(store: Store, serial: str, version: int | None) -> CalibrationRec
     if version is None:
         return max(rows, key=lambda row: row.version)
     return store.calibrations.get(serial, version)
+
+
+def content_digest(row: CalibrationRecord) -> str:
+    """Return a digest of a version's file without the instant of its issue, on which no criticism depends.
+
+    The hash of the file itself is another one for each fit, of the same recording too.
+    """
+    content = {key: value for key, value in json.loads(row.document).items() if key not in {"issued_at", "hash"}}
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

@@ -114,17 +114,19 @@ def limits_of(bench: BenchFile) -> BenchLimits:
 def bench_for(recipe: Recipe) -> str:
     """Return the shipped simulated bench that fits a recipe best.
 
-    One that is named after it; else the one with the fewest axes that can do it whole, the fastest of these first.
+    One that is named after it; else the one with the fewest axes that can do it whole, the fastest of these first, and
+    a table with an encoder last.
     """
     if f"{recipe.name}-sim" in shipped_benches():
         return f"{recipe.name}-sim"
     axes = {position.lstrip("-") for position in recipe.positions}
-    fitting: list[tuple[bool, int, float, str]] = []
+    fitting: list[tuple[bool, int, float, bool, str]] = []
     for name, path in shipped_benches().items():
         bench = load_bench(str(path))
         recorded = {axis for gyro in bench.gyros for axis in gyro.axes}
         if bench.is_simulated and axes <= recorded and not missing_instruments(recipe, limits_of(bench)):
-            fitting.append((not _can_do(recipe, bench), len(recorded), -bench.gyros[0].max_rate_dps, name))
+            has_encoder = getattr(bench.table, "reference", "computed") != "computed"  # a key of a driver's own model
+            fitting.append((not _can_do(recipe, bench), len(recorded), -bench.gyros[0].max_rate_dps, has_encoder, name))
     if not fitting:
         raise BadBench(
             f"recipe {recipe.name}: no shipped bench records axes {sorted(axes)}; name one with --bench FILE"

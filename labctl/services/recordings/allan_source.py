@@ -52,14 +52,15 @@ def allan_of_file(path: Path, column: str | None) -> AllanResponse:
 def _of_recording(recording: Recording, column: str | None, number: int | None) -> AllanResponse:
     if recording.info.kind != "samples":
         raise BadInput(
-            f"{recording.info.serial}: holds {recording.info.kind}; an Allan deviation needs the readings; import those"
+            f"{recording.info.serial}: the folder contains {recording.info.kind}, but an Allan deviation needs "
+            "single readings; import the readings"
         )
     if column is None:
         found = static_record(recording)
         if found is None:
             raise NotEnoughData(
-                f"{recording.info.serial}: no stretch of {LEAST_READINGS} readings at rest, at one temperature and "
-                "without a gap; record the unit at rest"
+                f"{recording.info.serial}: no {LEAST_READINGS} successive readings are at rest, at one temperature "
+                "and without a gap; record the unit at rest"
             )
         return _answer(found, number, dict(recording.info.datasheet))
     _refuse_unknown(recording.info.serial, column, recording.columns)
@@ -110,7 +111,7 @@ def _of_course(what: str, courses: dict[str, NDArray[np.float64]], t_s: NDArray[
         if (noise := allan(values[rows], period_s)) is not None:
             axes[name] = noise
     if not axes:
-        raise NotEnoughData(f"{what}: its readings do not scatter, so they say nothing about noise; check the column")
+        raise NotEnoughData(f"{what}: its readings are all equal, so the noise cannot be estimated; check the column")
     return StaticRecord(1, 1, float("nan"), n * period_s, axes)
 
 

@@ -80,7 +80,12 @@ def _of_rows(numbers: list[int], means: list[MeanRow]) -> dict[str, ChannelColum
 
 
 #: Columns of a table of points that say which data set it is, or how its mean was made.
-NO_CHANNEL = frozenset({"dataset", "t_s", "position", "run", "mounting", "table_rate_dps", "n", "duration_s", "valid"})
+NO_CHANNEL = frozenset(
+    {
+        "dataset", "t_s", "position", "run", "mounting", "table_rate_dps", "computed_rate_dps", "encoder_rate_u_dps",
+        "n", "duration_s", "valid",
+    }
+)  # fmt: skip
 
 
 def _of_table(numbers: list[int], points: Recording) -> dict[str, ChannelColumns]:

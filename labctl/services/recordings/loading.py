@@ -105,7 +105,10 @@ def chosen_rows(
     """
     wanted = sorted(set(recordings))
     if recording is not None and wanted and wanted != [recording]:
-        raise BadInput(f"recording {recording} and recordings {', '.join(map(str, wanted))}: say one of the two")
+        raise BadInput(
+            f"recording {recording} and recordings {', '.join(map(str, wanted))} were both requested: give "
+            "one of the two"
+        )
     if len(wanted) > MOST_TOGETHER:
         raise BadInput(f"{len(wanted)} recordings; at most {MOST_TOGETHER} are fitted together; name fewer")
     if len(wanted) < 2:

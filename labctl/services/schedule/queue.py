@@ -15,7 +15,7 @@ from labctl.services.schemas.schedule import ScheduledResponse, StartEventRespon
 from labctl.store import NewStart, StartRow, Store
 from procedures.planning.plan import make_plan
 
-NO_SERVICE = "no service runs: it is started only while `labctl serve` holds this database with bench {bench}"
+NO_SERVICE = "no service runs: the campaign is started only while `labctl serve` holds this database with bench {bench}"
 
 
 def is_scheduled(request: CampaignRequest) -> bool:
@@ -24,11 +24,16 @@ def is_scheduled(request: CampaignRequest) -> bool:
         raise BadInput("a start has a time or a cron line, not both; leave one out")
     if request.at is not None or request.cron is not None:
         if request.hide:
-            raise BadInput("hide: only for a campaign that begins now; leave it out, or the time")
+            raise BadInput(
+                "hide: possible only for a campaign that begins now; leave out hide, or the time of the start"
+            )
         return True
     given = [name for name in ("time_zone", "priority", "late_limit_s") if name in request.model_fields_set]
     if given:
-        raise BadInput(f"{', '.join(given)}: only for a start with a time or a cron line; name one, or leave it out")
+        raise BadInput(
+            f"{', '.join(given)}: possible only for a start with a time or a cron line; give a time or a "
+            "cron line, or leave it out"
+        )
     return False
 
 
@@ -54,7 +59,9 @@ def add_start(store: Store, request: CampaignRequest, bench: BenchFile, now: dat
     )  # fmt: skip
     row = store.starts.get(store.starts.add(new, now))
     assumed = request.time_zone is None and (request.cron is not None or not _has_zone(request.at))
-    return _answer(store, row, note=f"{zone.key} is the local time zone, no other was named" if assumed else "")
+    return _answer(
+        store, row, note=f"no time zone was given: {zone.key}, that of this computer, was used" if assumed else ""
+    )
 
 
 def _has_zone(at: str | None) -> bool:

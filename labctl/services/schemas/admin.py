@@ -38,7 +38,7 @@ class KeyRequest(Request):
     """A key to make."""
 
     name: Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9 ._@-]{0,99}$")] = Field(
-        description="Owner's name, shown in the audit trail; each name is used once."
+        description="Name of the key's owner, shown in the audit trail; a name cannot be used for a second key."
     )
     role: Role
 
@@ -125,4 +125,21 @@ class PluginResponse(ResponseModel):
     distribution: str
     version: str
     target: str = Field(description="module:object")
-    problem: str = Field(default="", description="Why it cannot be used; empty where it can.")
+    problem: str = Field(default="", description="Why the entry point cannot be used; empty if it can.")
+
+
+class DriverCheckResponse(ResponseModel):
+    """One thing that every driver must do."""
+
+    check: str
+    problem: str = Field(default="", description="What the driver does instead; empty where it does it.")
+
+
+class DriverTestResponse(ResponseModel):
+    """A driver, tried on its simulator."""
+
+    driver: str
+    distribution: str
+    version: str
+    ok: bool
+    checks: list[DriverCheckResponse]

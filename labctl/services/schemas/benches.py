@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from datetime import datetime
+from typing import Literal
 
-from pydantic import Field
+from pydantic import Field, JsonValue
 
 from labctl.services.schemas.base import Request, ResponseModel
 
@@ -16,24 +17,42 @@ class ClearRequest(Request):
     reason: str = "inspected the bench"
 
 
+class CheckRequest(Request):
+    """A check of the whole bench; it needs no answers."""
+
+
 class BenchStatus(ResponseModel):
     """A bench, and what its last safe state could not confirm."""
 
     name: str
     last_used_at: datetime
     unconfirmed: str = Field(
-        default="", description="Until a person has inspected the bench and clears it; empty when all is well."
+        default="",
+        description="What the last safe state could not confirm; kept until a person has inspected and "
+        "cleared the bench; empty when all is well.",
     )
     unconfirmed_at: datetime | None = None
-    attempts: int = Field(default=0, description="How often the safe state was tried again since.")
+    attempts: int = Field(
+        default=0, description="How often labctl has tried again to set the safe state since `unconfirmed_at`."
+    )
     attempted_at: datetime | None = None
     confirmed_at: datetime | None = Field(
         default=None,
-        description="When such an attempt confirmed the safe state; a person has still to inspect and clear it.",
+        description="When a later attempt confirmed the safe state; a person must still inspect and clear the bench.",
     )
     left: list[str] = Field(
-        default_factory=list, description="Campaigns that no process runs any more and that have not been ended."
+        default_factory=list, description="Campaigns whose process is gone and that have not been ended."
     )
+
+
+class FindingResponse(ResponseModel):
+    """One thing that was found out about an instrument."""
+
+    what: str
+    text: str = Field(description="Of one that is not good: what is wrong and what to do.")
+    state: Literal["good", "doubtful", "bad"]
+    value: float | None = None
+    unit: str = ""
 
 
 class DeviceCheck(ResponseModel):
@@ -41,10 +60,31 @@ class DeviceCheck(ResponseModel):
 
     device: str
     ok: bool
-    text: str
+    text: str = Field(description="What is bad or, where nothing is, everything in one line.")
+    kind: Literal["table", "chamber", "reference", "gyro", "other"] = "other"
+    state: Literal["good", "doubtful", "bad"] = Field(
+        default="good",
+        description="doubtful: a campaign can run, its figures may be worse. bad: it cannot, or they would be wrong.",
+    )
+    address: str = Field(default="", description="Its port, or host and TCP port.")
+    findings: list[FindingResponse] = Field(default_factory=list)
+    reported: dict[str, str] = Field(
+        default_factory=dict, description="What it and its USB adapter say of themselves: serial, firmware, adapter ..."
+    )
     driver: str = Field(default="", description="Name of its driver.")
-    distribution: str = Field(default="", description="Distribution that the driver came from.")
+    distribution: str = Field(
+        default="", description="Python distribution (installed package) that provides the driver."
+    )
     version: str = Field(default="", description="Version of that distribution.")
+
+
+class BenchCheckResponse(ResponseModel):
+    """Whether every instrument of a bench answered."""
+
+    bench: str
+    ok: bool
+    checked_at: datetime
+    devices: list[DeviceCheck]
 
 
 class BenchUnit(ResponseModel):
@@ -62,17 +102,27 @@ class BenchDescription(ResponseModel):
     simulated: bool
     latitude_deg: float | None
     units: list[BenchUnit]
-    campaign: int | None = Field(description="The campaign that runs now.")
-    unconfirmed: str = Field(description="What its last safe state could not confirm; empty when all is well.")
+    campaign: int | None = Field(description="The campaign that runs now; null: none.")
+    unconfirmed: str = Field(
+        description="What the last safe state of the bench could not confirm; empty when all is well."
+    )
+    check: BenchCheckResponse | None = Field(
+        default=None, description="What was found when it was last checked since the service was started."
+    )
     heard_s: float = Field(
-        default=0.0, description="Time since the last answer of the process that drives it, s; 0: it is this one."
+        default=0.0,
+        description="Time since the last answer of the process that drives the bench, s; 0: this "
+        "process drives the bench.",
     )
 
 
 class BenchResponse(BenchDescription):
     """The bench of a service, and what a person is asked before a campaign starts there."""
 
-    start_questions: dict[str, str] = Field(description="Check -> question; empty for a simulated bench.")
+    start_questions: dict[str, str] = Field(
+        description="For each check: the question that a person must confirm "
+        "before a start; empty for a simulated bench."
+    )
 
 
 class ShippedBench(ResponseModel):
@@ -82,9 +132,57 @@ class ShippedBench(ResponseModel):
     text: str
 
 
-class BenchCheckResponse(ResponseModel):
-    """Whether every instrument of a bench answered."""
+class PortResponse(ResponseModel):
+    """A serial port of this computer."""
+
+    device: str = Field(description="As the system numbers it now.")
+    path: str = Field(description="The name for a bench file: it does not depend on the order of plugging.")
+    adapter: str = Field(description="Serial number of its USB adapter; empty where it has none.")
+    product: str
+    trouble: str = Field(description="Why it cannot be used, and what to do; empty when all is well.")
+
+
+class NewBenchRequest(Request):
+    """Where to look for instruments, and what a person has said already."""
+
+    name: str = Field(min_length=1, max_length=200)
+    latitude_deg: float | None = None
+    ports: list[str] = Field(default_factory=list, description="Empty: all of this computer.")
+    hosts: list[str] = Field(default_factory=list, description="HOST or HOST:PORT of Modbus TCP instruments.")
+    settings: dict[str, JsonValue] = Field(default_factory=dict, description="SECTION.KEY -> value.")
+
+
+class FoundResponse(ResponseModel):
+    """What is at one address."""
+
+    address: str
+    kind: str = Field(description="table, chamber or gyro; empty where nothing was recognised.")
+    driver: str
+    text: str = Field(description="What was recognised, or why nothing was and what to do.")
+
+
+class NewBenchResponse(ResponseModel):
+    """A bench file that was written."""
+
+    file: str
+    found: list[FoundResponse]
+    bench: dict[str, JsonValue] = Field(description="The document, section by section.")
+
+
+class WiggleUnit(ResponseModel):
+    """What moved when one unit was to be turned by hand."""
+
+    unit: str
+    serial: str
+    port: str
+    moved: list[str] = Field(description="Units whose readings moved, the fastest first.")
+    ok: bool = Field(description="It moved, and it alone.")
+    text: str
+
+
+class WiggleResponse(ResponseModel):
+    """Whether every unit is on its port."""
 
     bench: str
     ok: bool
-    devices: list[DeviceCheck]
+    units: list[WiggleUnit]

@@ -25,11 +25,14 @@ from labctl.services.schemas.certification import CertificationResponse
 from labctl.services.schemas.criticism import ResidualColumns
 from labctl.services.schemas.warnings import WARNINGS, DataWarning
 
-ACCEPT = "Fit also what is certainly wrong, or worse than no correction; the answer still holds the warnings."
+ACCEPT = (
+    "Fit data that are certainly wrong, and keep a fit that is worse than no correction; the response still lists "
+    "the warnings."
+)
 
 
 SEVERAL = "Several recordings of the unit, fitted together; instead of `recording`."
-FITTED_TO = "All recordings that it was fitted to; `recording` is the newest of them."
+FITTED_TO = "All recordings that the model was fitted to; `recording` is the newest of these."
 
 
 class FitRequest(Request):
@@ -37,10 +40,11 @@ class FitRequest(Request):
 
     recording: int | None = Field(default=None, description="Recording; default: the unit's newest.")
     recordings: list[int] = Field(default_factory=list, description=SEVERAL)
-    model: str | None = Field(default=None, description="ojeda2000, yang2018, single_temperature, weiss1995 ...")
+    model: str | None = Field(default=None, description="Name of a model, such as yang2018; default: only `effects`.")
     effects: list[str] = Field(
         default_factory=list,
-        description="Effect ids, `name:2` sets an order. Without `model` a complete model, with it added to it.",
+        description="Effect ids; `name:2` sets the polynomial order to 2. Without `model`, these effects are the "
+        "whole model; with `model`, they are added to that model.",
     )
     accept_warnings: bool = Field(default=False, description=ACCEPT)
 
@@ -48,12 +52,15 @@ class FitRequest(Request):
 class ImproveRequest(Request):
     """How to change the effects of a version; the changed model is fitted again and becomes the next version."""
 
-    add: list[str] = Field(default_factory=list, description="Effect ids; `name:2` sets an order.")
-    remove: list[str] = Field(default_factory=list, description="Effect ids that are in the version.")
-    formula: list[str] = Field(default_factory=list, description="Effects of your own: 'name: expression'.")
+    add: list[str] = Field(default_factory=list, description="Ids of effects to add; `name:2` sets polynomial order 2.")
+    remove: list[str] = Field(default_factory=list, description="Ids of the version's effects to remove.")
+    formula: list[str] = Field(default_factory=list, description="Your own effects to add, each as 'name: expression'.")
     version: int | None = Field(default=None, description="Version to change; default: the newest.")
     recording: int | None = Field(default=None, description="Recording; default: the unit's newest.")
-    recordings: list[int] = Field(default_factory=list, description=f"{SEVERAL} Default: those of a joint version.")
+    recordings: list[int] = Field(
+        default_factory=list,
+        description=f"{SEVERAL} Default: the recordings of the version, if it was fitted to several.",
+    )
     accept_warnings: bool = Field(default=False, description=ACCEPT)
 
 
@@ -63,33 +70,34 @@ class ModelResponse(ResponseModel):
     name: str
     effects: list[str]
     argument: Literal["rate", "output"] = Field(
-        description="Whether the regressors see the true rate (forward law) or the gyro's output (direct law)."
+        description="What the regressors are computed from: `rate`, the true rate (forward law), or `output`, the "
+        "gyro's output (direct law)."
     )
-    terms: list[TermJson] | None = Field(default=None, description="The effects with orders and nonlinear parameters.")
-    temperature: TemperatureBasisJson | None = Field(default=None, description="How temperature enters.")
-    reference: ReferenceJson | None = Field(default=None, description="What the terms are centred on.")
+    terms: list[TermJson] | None = Field(default=None, description="Effects, with orders and parameters.")
+    temperature: TemperatureBasisJson | None = Field(default=None, description="How temperature enters the model.")
+    reference: ReferenceJson | None = Field(default=None, description="Zero point of the temperature terms.")
 
 
 class LegError(ResponseModel):
-    """How well data sets of one direction of the temperature are predicted by a fit to the others."""
+    """How well one leg, a stretch of heating or of cooling, is predicted by a fit to the others."""
 
-    fitted: str = Field(description="heating, cooling, or all legs but one.")
-    tested: str = Field(description="cooling, heating, or each leg in turn.")
-    rms_dps: float | None = Field(description="Root mean square over the data sets tested; null: see `why`.")
+    fitted: str = Field(description="Data sets that were fitted: heating, cooling, or all legs but one.")
+    tested: str = Field(description="Data sets that were predicted by the fit: cooling, heating, or each leg in turn.")
+    rms_dps: float | None = Field(description="RMS prediction error of the data sets tested, deg/s; null: see `why`.")
     datasets: int
-    why: str = Field(default="", description="Why there is no figure; empty where there is one.")
+    why: str = Field(default="", description="Why `rms_dps` is null; else empty.")
 
 
 class ErrorFigures(ResponseModel):
     """Input-referred errors in deg/s, one value per data set and axis, root mean square over all."""
 
-    raw_rms_dps: float | None = Field(description="Before any compensation.")
-    rms_dps: float | None = Field(description="After compensation, on the data of the fit.")
-    heldout_rms_dps: float | None = Field(description="Each temperature predicted by a fit without its data.")
-    noise_floor_dps: float | None = Field(description="Root of the mean variance of a data-set mean: white and drift.")
+    raw_rms_dps: float | None = Field(description="Error before any compensation, deg/s.")
+    rms_dps: float | None = Field(description="Error after compensation, on the data that were fitted, deg/s.")
+    heldout_rms_dps: float | None = Field(description="Error at temperatures that were left out of the fit, deg/s.")
+    noise_floor_dps: float | None = Field(description="Error of data-set means due to noise and drift alone, deg/s.")
     noise_floor_source: str = Field(default="none", description="How the noise floor was estimated.")
     heldout_by_leg: list[LegError] = Field(
-        default_factory=list, description="Heating by a fit to cooling and so on; empty: the temperature goes one way."
+        default_factory=list, description="Error of heating by a fit to cooling, and the reverse; empty: one leg."
     )
 
 
@@ -97,10 +105,10 @@ class Validity(ResponseModel):
     """Where the calibration was measured; outside it is extrapolation."""
 
     temperature_c: tuple[float | None, float | None] = Field(
-        description="Lowest and highest of the readings, deg C; null: no thermometer, and no law of temperature."
+        description="Lowest and highest measured temperature, deg C; null: not measured, and no term depends on it."
     )
     rate_dps: tuple[float | None, float | None] = Field(
-        description="Lowest and highest true rate, deg/s; null: no limit, nothing of the model depends on the rate."
+        description="Lowest and highest true rate, deg/s; null: no limit, no term of the model depends on the rate."
     )
 
 
@@ -110,25 +118,26 @@ class FittedResponse(ResponseModel):
     serial: str
     model: ModelResponse
     axes: dict[str, AxisCoefficients] = Field(
-        description="axis -> coefficients with value, standard uncertainty u, and unit."
+        description="For each axis: the coefficients with value, standard uncertainty u, and unit."
     )
     error: ErrorFigures
     validity: Validity
     warnings: list[DataWarning] = Field(default_factory=list, description=WARNINGS)
     noise: dict[str, AxisNoiseJson] = Field(
-        default_factory=dict, description="axis -> white noise and drift that the data were weighted by, deg/s."
+        default_factory=dict, description="For each axis: white noise and drift that set the weights of the fit, deg/s."
     )
     environment: FitEnvironment = Field(
-        default_factory=FitEnvironment, description="Which thermometer was used, how the Earth's rate was treated."
+        default_factory=FitEnvironment,
+        description="Which thermometer was used; whether the Earth's rate was subtracted.",
     )
-    reference_temperature_c: float | None = Field(default=None, description="Temperature terms are centred on it.")
-    recording: int | None = Field(default=None, description="The recording that it was fitted to.")
+    reference_temperature_c: float | None = Field(default=None, description="Zero point of temperature terms, deg C.")
+    recording: int | None = Field(default=None, description="The recording that the model was fitted to.")
     poses: PosesJson | None = Field(
-        default=None, description="Of a calibration by hand: rests, the accelerometer, moves, held-out moves."
+        default=None, description="Only by hand: results for rests, accelerometer, moves, held-out moves."
     )
     recordings: list[int] = Field(default_factory=list, description=FITTED_TO)
     joint: JointJson | None = Field(
-        default=None, description="Of several recordings: repeatability, agreement, each predicted by the others."
+        default=None, description="Only for several: repeatability, agreement, each predicted by the others."
     )
 
 
@@ -136,7 +145,7 @@ class FitResponse(FittedResponse):
     """A calibration version, as `labctl fit --json` and `POST .../calibrations` give it."""
 
     version: int
-    campaign: int | None = Field(default=None, description="The campaign of the recording; null: it was imported.")
+    campaign: int | None = Field(default=None, description="Campaign that made the recording; null: imported.")
     recipe: str | None = None
     bench: str | None = None
     hash: str = Field(description="SHA-256 of the calibration file.")
@@ -146,8 +155,10 @@ class ChangedModel(FittedResponse):
     """What a change of a version's effects brought."""
 
     improved_from: int = Field(description="The version that was changed.")
-    before: ErrorFigures = Field(description="Errors of the version that was changed, fitted to the same recording.")
-    plausible: dict[str, UsualRange] = Field(description="Effect -> the usual range, and whether it is inside.")
+    before: ErrorFigures = Field(description="Errors of the model before the change, on the same recording, deg/s.")
+    plausible: dict[str, UsualRange] = Field(
+        description="For each effect: its usual range, and whether the size is inside."
+    )
     left_out: list[LeftOut] = Field(description="Effects of the fit that are not exported with the calibration.")
 
 
@@ -175,7 +186,8 @@ class LadderRow(ResponseModel):
     model: str
     effects: list[str]
     applied_rms_dps: float | None = Field(
-        default=None, description="Of a version of another recording: its error on this one, applied without refitting."
+        default=None,
+        description="Only in `others`: RMS error on this recording without refitting, deg/s.",
     )
     raw_rms_dps: float | None
     rms_dps: float | None
@@ -187,11 +199,11 @@ class LadderResponse(ResponseModel):
     """The error of the versions fitted to one recording, each version after its parent."""
 
     serial: str
-    recording: int | None = Field(default=None, description="The recording of all steps.")
-    recordings: list[int] = Field(default_factory=list, description="All recordings of the steps.")
+    recording: int | None = Field(default=None, description="Recording that all `steps` were fitted to.")
+    recordings: list[int] = Field(default_factory=list, description="All recordings that `steps` were fitted to.")
     steps: list[LadderRow]
     others: list[LadderRow] = Field(
-        default_factory=list, description="Versions of other recordings, and their error on this one."
+        default_factory=list, description="Versions fitted to other recordings, with their error on this recording."
     )
     noise_floor_dps: float | None
 
@@ -217,7 +229,7 @@ class Follower(ResponseModel):
     parameter: float = Field(description="Time constant of a lag, s; width of a play, K.")
     unit: Literal["s", "K"]
     size: dict[str, float] = Field(
-        description="axis -> deg/s for each K that the lag is behind, or at an edge of the play."
+        description="For each axis, deg/s: error per K of lag, or error at an edge of the play."
     )
 
 
@@ -230,13 +242,17 @@ class VersionFacts(ResponseModel):
         default=None, description="Date until which the certification is valid; null: no date."
     )
     certification: CertificationResponse | None = Field(
-        description="The newest act on this version; null: there was none."
+        description="The newest certification or revocation of this version; null: there was none."
+    )
+    rate_reference: str = Field(
+        default="", description="What the rates of its recordings were known from; empty: not known."
     )
     left_out: list[LeftOut] = Field(
-        default_factory=list, description="Effects of the fit that are not exported, each with its RMS, deg/s."
+        default_factory=list,
+        description="Effects of the fit that are not exported, each with its RMS, deg/s.",
     )
     remembers: list[Follower] = Field(
-        default_factory=list, description="What follows the temperature from sample to sample in use: the state."
+        default_factory=list, description="Lags and plays to be updated with the temperature of every sample."
     )
 
 
@@ -250,27 +266,6 @@ class ImprovedVersionResponse(VersionFacts, ImproveResponse):
     """A calibration version that a change of effects made, and whether it is in force."""
 
 
-class Surface(ResponseModel):
-    """One axis, turned about itself, the others at rest."""
-
-    rate_dps: list[float]
-    temperature_c: list[float]
-    error_dps: list[list[float]] = Field(
-        description="Output minus true rate: a row per temperature, one per rate in it."
-    )
-
-
-class SurfaceResponse(ResponseModel):
-    """The error that a calibration subtracts, within the calibrated range."""
-
-    serial: str
-    version: int
-    validity: Validity
-    held: dict[str, float] = Field(description="Channels that the model needs besides: their means in its recording.")
-    left_out: list[LeftOut] = Field(description="Effects of the fit that are not exported with the calibration.")
-    axes: dict[str, Surface]
-
-
 class CatalogueResponse(ResponseModel):
     """Every effect that a model can be made of, and every model that a fit can be asked for by name."""
 
@@ -282,5 +277,6 @@ class CompensationResponse(ResponseModel):
     """How many rows were corrected, how many of them lay outside the calibration, and where they are."""
 
     rows: int
-    outside: int = Field(description="Rows outside the calibrated rates or temperatures.")
+    outside: int = Field(description="Number of rows outside the calibrated rates or temperatures.")
     file: str
+    warning: str = Field(default="", description="That the calibration is overdue or was revoked; empty: it is not.")

@@ -24,14 +24,21 @@ class CampaignRequest(Request):
     hide: list[str] = Field(
         default_factory=list,
         max_length=20,
-        description="Of a simulated bench, now: effects hidden in its units, EFFECT or EFFECT=SIZE in its unit.",
+        description="Effects to hide in the units of a simulated bench, each as EFFECT or EFFECT=SIZE, SIZE in the "
+        "unit of the effect; not for a later start.",
     )
     at: str | None = Field(
         default=None,
         max_length=64,
-        description="When to begin, ISO 8601; without offset in `time_zone`. `now`: as soon as the bench is free.",
+        description="Time of the start, ISO 8601; a time without an offset is in `time_zone`. `now`: start as soon "
+        "as the bench is free. Default: start at once.",
     )
-    cron: str | None = Field(default=None, max_length=200, description="Cron line of repeated starts: five fields.")
+    cron: str | None = Field(
+        default=None,
+        max_length=200,
+        description="Cron line of repeated starts: minute, hour, "
+        "day of month, month, day of week, such as '30 2 * * MON'.",
+    )
     time_zone: str | None = Field(
         default=None,
         max_length=100,
@@ -41,25 +48,26 @@ class CampaignRequest(Request):
         default=0,
         ge=-100,
         le=100,
-        description="Of the starts that are due, the one with the highest number begins first.",
+        description="When several starts are due, the one with the highest priority begins first.",
     )
     late_limit_s: float | None = Field(
         default=None,
         ge=0,
         le=1e9,
-        description="How much later than due it may begin; 0: a missed start is skipped; absent: any time, once.",
+        description="Largest delay of the start, s: a start that is later is skipped. 0: every missed start is "
+        "skipped; default: no limit, a missed start begins late, once.",
     )
     confirmed_by: str = Field(
         default="",
         max_length=200,
-        description="Of a bench that is not simulated: the person who confirms `checks`; of a later start, that they "
-        "will hold then.",
+        description="Needed for a bench that is not simulated: name of the person who confirms `checks`; for a later "
+        "start, the person confirms that the checks will be met at that time.",
     )
     checks: list[BenchCheck] = Field(
         default_factory=list,
         max_length=10,
-        description="Of a bench that is not simulated, all three: the chamber is clear, the table is free, the "
-        "independent temperature limiter is on.",
+        description="Needed for a bench that is not simulated, all three: chamber_clear (the chamber is clear), "
+        "table_free (the table is free to turn), limiter_on (the independent temperature limiter is on).",
     )
 
 
@@ -70,9 +78,12 @@ class StartRequest(Request):
     bench: str | None = None
     clip: bool = False
     speed: float | None = Field(
-        default=None, gt=0, allow_inf_nan=False, description="Of a simulated bench; absent: as fast as it can."
+        default=None,
+        gt=0,
+        allow_inf_nan=False,
+        description="Speed of a simulated bench, as a multiple of real time; default: as fast as possible.",
     )
-    seed: int | None = Field(default=None, ge=0, description="Speed of a simulated bench: X times real time.")
+    seed: int | None = Field(default=None, ge=0, description="Seed of the random numbers of a simulated bench.")
     confirmed_by: str = Field(default="", max_length=200, description="Same as in `POST /api/campaigns`.")
     checks: list[BenchCheck] = Field(default_factory=list, description="Same as in `POST /api/campaigns`.")
 
@@ -94,8 +105,13 @@ class ConfirmRequest(Request):
 
     prompt: str = Field(min_length=1)
     by: str = Field(min_length=1, max_length=200)
-    confirmed: bool = Field(default=True, description="False: it cannot be done, and the campaign ends.")
-    again: bool = Field(default=False, description="Of a turn by hand: it did not go well and is to be asked again.")
+    confirmed: bool = Field(
+        default=True,
+        description="true: the requested action is done; false: the action cannot be done, and the campaign ends.",
+    )
+    again: bool = Field(
+        default=False, description="Only for a turn by hand: true if the turn went wrong and is to be requested again."
+    )
     reason: str = ""
 
 
@@ -105,7 +121,9 @@ class ResumeRequest(Request):
     by: str = Field(default="a person", min_length=1, max_length=200)
     reason: str = ""
     power: Literal["lost", "kept"] | None = Field(
-        default=None, description="Whether the units were off meanwhile; absent: yes when the host was."
+        default=None,
+        description="Whether the units lost power during the interruption; default: `lost` if the "
+        "computer was restarted meanwhile, else `kept`.",
     )
 
 
@@ -117,10 +135,11 @@ class PromptResponse(ResponseModel):
     text: str
     position: str | None = None
     turn_deg: float | None = Field(
-        default=None, description="Of a turn by hand: its angle, positive counter-clockwise seen from above."
+        default=None,
+        description="Only for a turn by hand: angle to turn by, deg, positive counter-clockwise seen from above.",
     )
     within_s: float | None = Field(
-        default=None, description="How long the answer is waited for, by the campaign's clock; null: no limit."
+        default=None, description="Time within which the answer must arrive, s by the campaign's clock; null: no limit."
     )
 
 
@@ -128,13 +147,16 @@ class TurnResponse(ResponseModel):
     """The turn by hand that is under way."""
 
     position: str = Field(description="The body axis that points up, about which the units are turned.")
-    asked_deg: float = Field(description="Positive counter-clockwise seen from above.")
-    phase: Literal["rest", "turn"] = Field(description="What the units are to do now.")
-    attempt: int = Field(description="From 1; a turn that was refused is asked again.")
-    came_deg: dict[str, float] = Field(
-        default_factory=dict, description="Unit -> what has come out so far, by its nominal scale factor."
+    asked_deg: float = Field(description="Angle that is requested, deg, positive counter-clockwise seen from above.")
+    phase: Literal["rest", "turn"] = Field(
+        description="Whether the units must now be kept at rest (`rest`) or be turned (`turn`)."
     )
-    refused: str = Field(default="", description="Why the attempt before was refused; empty for the first.")
+    attempt: int = Field(description="Number of this attempt, from 1; a turn that was refused is requested again.")
+    came_deg: dict[str, float] = Field(
+        default_factory=dict,
+        description="For each unit: angle turned so far, deg, computed with the nominal scale factor.",
+    )
+    refused: str = Field(default="", description="Why the previous attempt was refused; empty for the first.")
 
 
 class OutputResponse(ResponseModel):
@@ -144,9 +166,9 @@ class OutputResponse(ResponseModel):
     channel: str
     unit: str
     mean: float
-    std: float = Field(description="Of single readings.")
+    std: float = Field(description="Standard deviation of single readings.")
     n: int
-    t_s: float = Field(description="Time of the last reading since the campaign began.")
+    t_s: float = Field(description="Time of the last reading, s since the campaign began.")
 
 
 class AdviceResponse(ResponseModel):
@@ -178,45 +200,74 @@ class CampaignResponse(ResponseModel):
     step_text: str = ""
     progress: float = Field(ge=0, le=1)
     expected_end: datetime | None = None
-    t_s: float | None = Field(default=None, description="Campaign time: seconds since it began, on its own clock.")
+    t_s: float | None = Field(
+        default=None, description="Campaign time: seconds since the campaign began, by the campaign's own clock."
+    )
     chamber_c: float | None = None
     setpoint_c: float | None = None
     gyro_c: float | None = None
+    references: dict[str, float] = Field(
+        default_factory=dict,
+        description="Of a campaign that runs here, now: column -> value of a reference instrument.",
+    )
     rate_dps: float | None = None
-    outputs: list[OutputResponse] = Field(default_factory=list, description="Of a campaign that runs here, now.")
+    outputs: list[OutputResponse] = Field(
+        default_factory=list,
+        description="Present outputs of the units; empty if this process does not run the campaign.",
+    )
     last_error: str | None = None
     wish: Literal["pause", "abort"] | None = Field(
         default=None, description="A pause or abort that was requested and is not carried out yet."
     )
     prompt: PromptResponse | None = Field(default=None, description="The question that waits for a person.")
-    turn: TurnResponse | None = Field(default=None, description="Of a campaign that runs here: the turn by hand, now.")
-    links: dict[str, str] = Field(default_factory=dict, description="Instruments that answer late or not at all.")
+    turn: TurnResponse | None = Field(
+        default=None,
+        description="The turn by hand that is under way; null: none, or this process does not run the campaign.",
+    )
+    links: dict[str, str] = Field(
+        default_factory=dict, description="Instruments that answer late or not at all: name -> what is wrong."
+    )
     dropped: dict[str, str] = Field(default_factory=dict, description="Units that take no further part: name -> why.")
-    abandoned: bool = Field(default=False, description="No process runs it any more, and it has no end.")
+    abandoned: bool = Field(
+        default=False,
+        description="The process that ran the campaign is gone, and the campaign was neither resumed nor ended.",
+    )
     started_at: datetime | None = None
     ended_at: datetime | None = None
     recordings: dict[str, int] = Field(default_factory=dict, description="serial -> recording")
     drivers: dict[str, DriverResponse] = Field(
-        default_factory=dict, description="table, chamber or gyro name -> its driver when the campaign began."
+        default_factory=dict,
+        description="For each table, chamber and gyro: the driver that was used when the campaign began.",
     )
-    unrecorded: str = Field(default="", description="Of a request that was carried out: what could not be written.")
+    unrecorded: str = Field(
+        default="",
+        description="What could not be written to the database although the request was carried out; else empty.",
+    )
+    reported: dict[str, dict[str, str]] = Field(
+        default_factory=dict,
+        description="table, chamber or gyro name -> what it and its USB adapter said of themselves when the campaign "
+        "began: serial, firmware, revision, output_unit, adapter; what says nothing is left out.",
+    )
     simulated_time: bool = Field(
-        default=False, description="Its times are those of a simulated bench, which may run faster than real time."
+        default=False, description="All times are those of a simulated bench, which may run faster than real time."
     )
-    advice: AdviceResponse | None = Field(default=None, description="Of a failed campaign.")
+    advice: AdviceResponse | None = Field(
+        default=None, description="What happened and what to do; only for a failed campaign."
+    )
     ended: bool = Field(
         default_factory=lambda given: given["state"] in ENDED,
-        description="Over: nothing happens any more unless a person resumes it.",
+        description="The campaign has ended; it goes on only if a person resumes it.",
     )
     active: bool = Field(
         default_factory=lambda given: given["state"] in ACTIVE and not given["abandoned"],
-        description="A process has it in hand: planned, running, paused or waiting, and not abandoned.",
+        description="A process runs the campaign: the state is planned, running, paused or waiting, and `abandoned` "
+        "is false.",
     )
     resumable: bool | None = Field(
         default=None, description="Whether `resume` would be accepted here now; null in lists."
     )
     resume_reason: str = Field(
-        default="", description="Why it would not be accepted, or the objections although it would be."
+        default="", description="Why `resume` would be refused; if it would be accepted, objections to it, or empty."
     )
 
 
@@ -229,7 +280,7 @@ class EventResponse(ResponseModel):
     kind: str
     level: Literal["info", "warning", "error"]
     message: str
-    device: str | None = Field(default=None, description="The instrument or unit that it is about.")
-    value: float | None = Field(default=None, description="What was measured, in `unit`.")
-    limit: float | None = Field(default=None, description="Which limit it was compared with, in `unit`.")
+    device: str | None = Field(default=None, description="The instrument or unit that the event concerns.")
+    value: float | None = Field(default=None, description="Measured value, in `unit`.")
+    limit: float | None = Field(default=None, description="Limit that `value` was compared with, in `unit`.")
     unit: str | None = None

@@ -9,9 +9,12 @@ from pydantic import Field
 
 from labctl.services.schemas.base import Request, ResponseModel
 
-WHEN = "When the verdict was taken: at the certification."
+DueSource = Literal["user", "recipe", "configuration"]
+DUE_FROM = "Where the interval is from; null: none is given, and there is no date."
+WHEN = "Time of the verdict, which is the time of the certification."
 NO_VERDICT = (
-    "Verdict of the newest criticism on the version's own recording; null: there is none, `verdict_reason` says why."
+    "Verdict of the newest criticism of the version on the recording that it was fitted to; null: none, see "
+    "`verdict_reason`."
 )
 
 
@@ -20,13 +23,21 @@ class RevokeRequest(Request):
 
     by: str = Field(min_length=1)
     reason: str = Field(min_length=1)
-    due_days: int | None = Field(default=None, gt=0, le=36_500, description="Days until the unit is due again.")
+    due_days: int | None = Field(
+        default=None,
+        ge=0,
+        le=36_500,
+        description="Of a certification: days until the unit is due for its next calibration; 0: no date; absent: "
+        "those of the recipe (`recalibrate_after_days`), else of the service ($LABCTL_DUE_DAYS), else no date.",
+    )
 
 
 class CertifyRequest(RevokeRequest):
     """Who certifies a version, and why."""
 
-    override: bool = Field(default=False, description="Certify against objections; the reason must then be a sentence.")
+    override: bool = Field(
+        default=False, description="Certify although there are objections; the reason must then be a sentence."
+    )
 
 
 class Objection(ResponseModel):
@@ -34,7 +45,7 @@ class Objection(ResponseModel):
 
     what: Literal["verdict", "worse", "data"]
     text: str = Field(description="The objection, with figures in deg/s.")
-    do: str = Field(description="What to do instead of certifying it.")
+    do: str = Field(description="What to do instead of certifying this version.")
 
 
 class CertifiedErrors(ResponseModel):
@@ -52,14 +63,18 @@ class AssessmentResponse(ResponseModel):
     serial: str
     version: int
     verdict: str | None = Field(description=NO_VERDICT)
-    verdict_reason: str = Field(description="Why there is no verdict; empty where there is one.")
+    verdict_reason: str = Field(description="Why there is no verdict; empty if there is one.")
     verdict_recording: int | None
-    verdict_text: str = Field(description="The verdict in words; empty without one.")
+    verdict_text: str = Field(description="The verdict in words; empty if there is none.")
     error: CertifiedErrors
     objections: list[Objection]
-    override_needed: bool = Field(description="Whether certifying it needs `override`.")
-    least_reason_characters: int = Field(description="Length of the reason that goes with an override.")
+    override_needed: bool = Field(description="Whether the version can be certified only with `override`.")
+    least_reason_characters: int = Field(description="Smallest number of characters of the reason for an override.")
     least_reason_words: int
+    due_days: int | None = Field(
+        description="Days that the certification is valid where none are given; null: no date."
+    )
+    due_from: DueSource | None = Field(description=DUE_FROM)
 
 
 class CertificationResponse(ResponseModel):
@@ -72,11 +87,14 @@ class CertificationResponse(ResponseModel):
     reason: str
     at: datetime
     due: datetime | None = None
+    due_from: DueSource | None = Field(default=None, description=DUE_FROM)
     verdict: str | None = Field(default=None, description=NO_VERDICT)
-    verdict_reason: str | None = Field(default=None, description="Why there is no verdict; empty where there is one.")
+    verdict_reason: str | None = Field(default=None, description="Why there is no verdict; empty if there is one.")
     verdict_recording: int | None = None
     verdict_at: datetime | None = Field(default=None, description=WHEN)
     verdict_text: str | None = Field(default=None, description="The verdict in words.")
     error: CertifiedErrors | None = None
-    override: bool | None = Field(default=None, description="Whether it was certified against objections.")
+    override: bool | None = Field(
+        default=None, description="Whether the version was certified although there were objections."
+    )
     objections: list[Objection] = Field(default_factory=list)

@@ -8,8 +8,8 @@ from labctl.json_types.models import LeftOut
 from labctl.recording.info import Motion
 from labctl.services.schemas.base import ResponseModel
 
-AXIS = "The output axis."
-CORRECTED = "null: without a version."
+AXIS = "The gyro axis whose output is compared."
+CORRECTED = "null: no version is applied."
 
 
 class ModelLines(ResponseModel):
@@ -20,9 +20,18 @@ class ModelLines(ResponseModel):
 
     axis: str
     position: str
-    level: list[float] = Field(description="Temperature, deg C, or table rate, deg/s, of each line.")
-    levels: int = Field(description="How many levels the recording has; more than lines: evenly picked.")
-    at: list[float] = Field(description="Table rate, deg/s, or temperature, deg C, along the lines.")
+    level: list[float] = Field(
+        description="Temperature, deg C, of each line over the rate; table rate, deg/s, of "
+        "each line over the temperature."
+    )
+    levels: int = Field(
+        description="Number of levels in the recording; if there are more levels than lines, the "
+        "lines are for evenly spaced levels."
+    )
+    at: list[float] = Field(
+        description="Points of the lines: table rate, deg/s, of lines over the rate; "
+        "temperature, deg C, of lines over the temperature."
+    )
     error_dps: list[list[float]]
 
 
@@ -36,8 +45,12 @@ class ComparisonColumns(ResponseModel):
     table_rate_dps: list[float] = Field(default_factory=list)
     own_rate_dps: list[float] = Field(default_factory=list, description="True rate along the output axis.")
     temperature_c: list[float] = Field(default_factory=list)
-    temperature_level_c: list[float] = Field(default_factory=list, description="Centre of its temperature level.")
-    rate_level_dps: list[float] = Field(default_factory=list, description="Centre of its level of the table rate.")
+    temperature_level_c: list[float] = Field(
+        default_factory=list, description="Centre of the temperature level that the data set belongs to, deg C."
+    )
+    rate_level_dps: list[float] = Field(
+        default_factory=list, description="Centre of the table-rate level that the data set belongs to, deg/s."
+    )
     measured_error_dps: list[float] = Field(default_factory=list, description="Output minus own rate.")
     modelled_error_dps: list[float] = Field(
         default_factory=list, description="What the version subtracts: output minus corrected rate."
@@ -45,10 +58,14 @@ class ComparisonColumns(ResponseModel):
     residual_dps: list[float] = Field(default_factory=list, description="Residual: corrected rate minus own rate.")
     turn_before_deg: list[float | None] = Field(
         default_factory=list,
-        description="Error after a full turn with the static bias alone taken off; null: too slow, another axis turns, "
-        "or the recording has nothing at rest.",
+        description="Error of the integrated angle after a full turn with only the static bias subtracted, deg; "
+        "null: the rate is too low, another axis turns, or the recording has no data set at rest.",
     )
-    turn_after_deg: list[float | None] = Field(default_factory=list, description="The same after the calibration.")
+    turn_after_deg: list[float | None] = Field(
+        default_factory=list,
+        description="Error of the integrated angle "
+        "after a full turn with the calibration applied, deg; null as for `turn_before_deg`.",
+    )
 
 
 class ComparisonResponse(ResponseModel):
@@ -57,13 +74,23 @@ class ComparisonResponse(ResponseModel):
     serial: str
     version: int
     recording: int
-    recordings: list[int] = Field(default_factory=list, description="All recordings; `recording` is the newest.")
+    recordings: list[int] = Field(
+        default_factory=list, description="All recordings that the version is compared with; `recording` is the newest."
+    )
     fitted_to: int | None = Field(description="The recording that the version was fitted to.")
-    source: str = Field(description="Which model all numbers here come from, in words.")
-    held: dict[str, float] = Field(description="Other channels that the lines need: their means in this recording.")
+    source: str = Field(
+        description="A sentence that names the model and the data from which the numbers were computed."
+    )
+    held: dict[str, float] = Field(
+        description="Other channels that the lines depend on, held constant at their mean in this recording."
+    )
     left_out: list[LeftOut] = Field(description="Effects of the fit that are not exported with the calibration.")
-    least_turn_rate_dps: float = Field(description="The error per turn is given from this rate on.")
-    at_rest_dps: float = Field(description="Below this table rate a data set is at rest.")
+    least_turn_rate_dps: float = Field(
+        description="The error per turn is computed where the magnitude of the rate is at least this, deg/s."
+    )
+    at_rest_dps: float = Field(
+        description="A data set counts as at rest if the magnitude of its table rate is below this, deg/s."
+    )
     columns: ComparisonColumns
     over_rate: list[ModelLines] = Field(description="A line over the table rate for each temperature level.")
     over_temperature: list[ModelLines] = Field(description="A line over temperature for each level of the table rate.")
@@ -74,21 +101,31 @@ class RestColumns(ResponseModel):
 
     axis: list[str] = Field(default_factory=list, description=AXIS)
     dataset: list[int] = Field(default_factory=list)
-    t_s: list[float | None] = Field(default_factory=list, description="Since the recording began; null: not known.")
-    temperature_c: list[float | None] = Field(default_factory=list, description="null: there was no thermometer.")
+    t_s: list[float | None] = Field(
+        default_factory=list, description="Time since the recording began, s; null: not known."
+    )
+    temperature_c: list[float | None] = Field(
+        default_factory=list, description="Temperature, deg C; null: there was no thermometer."
+    )
     leg: list[str] = Field(
-        default_factory=list, description="heating or cooling; empty where the temperature does not move."
+        default_factory=list,
+        description="Whether the temperature rises (heating) or falls (cooling); empty where it is constant.",
     )
     bias_dps: list[float] = Field(
-        default_factory=list, description="Output minus the Earth's rate, which is 0 where the latitude is not known."
+        default_factory=list,
+        description="Output minus the Earth's rate, deg/s; where the latitude is not known, nothing is subtracted.",
     )
     u_dps: list[float | None] = Field(
-        default_factory=list, description="Standard uncertainty of the mean by white noise; null: not known."
+        default_factory=list, description="Standard uncertainty of the mean due to white noise, deg/s; null: not known."
     )
     modelled_dps: list[float | None] = Field(
-        default_factory=list, description=f"What the version subtracts there, with what it remembers; {CORRECTED}"
+        default_factory=list,
+        description="Error that the version subtracts, lag and hysteresis of the temperature "
+        f"included, deg/s; {CORRECTED}",
     )
-    residual_dps: list[float | None] = Field(default_factory=list, description=f"What it leaves; {CORRECTED}")
+    residual_dps: list[float | None] = Field(
+        default_factory=list, description=f"Bias that remains after the correction, deg/s; {CORRECTED}"
+    )
 
 
 class TurnColumns(ResponseModel):
@@ -97,15 +134,18 @@ class TurnColumns(ResponseModel):
     axis: list[str] = Field(default_factory=list, description=AXIS)
     dataset: list[int] = Field(default_factory=list)
     about: list[str] = Field(default_factory=list, description="Body axis that pointed up, with its sign.")
-    asked_deg: list[float] = Field(default_factory=list, description="Angle that the output axis turned by.")
-    output_deg: list[float] = Field(default_factory=list, description="Integral of the output as it is.")
+    asked_deg: list[float] = Field(default_factory=list, description="True angle that the output axis turned by, deg.")
+    output_deg: list[float] = Field(default_factory=list, description="Integral of the uncorrected output, deg.")
     corrected_deg: list[float | None] = Field(
-        default_factory=list, description=f"Integral of the corrected rate; {CORRECTED}"
+        default_factory=list, description=f"Integral of the corrected rate, deg; {CORRECTED}"
     )
-    residual_deg: list[float | None] = Field(default_factory=list, description="Corrected minus asked.")
+    residual_deg: list[float | None] = Field(
+        default_factory=list, description="`corrected_deg` minus `asked_deg`, deg."
+    )
     u_deg: list[float | None] = Field(
         default_factory=list,
-        description="Standard uncertainty of an integral minus the angle: angle, time stamps and noise; null: unknown.",
+        description="Standard uncertainty of the integral minus the true angle, from angle, time stamps and noise, "
+        "deg; null: unknown.",
     )
 
 
@@ -115,14 +155,18 @@ class ProfileColumns(ResponseModel):
     axis: list[str] = Field(default_factory=list, description=AXIS)
     dataset: list[int] = Field(default_factory=list)
     t_s: list[float] = Field(default_factory=list)
-    true_dps: list[float] = Field(default_factory=list, description="Rate of the table along the axis.")
+    true_dps: list[float] = Field(
+        default_factory=list, description="Component of the table's rate along the axis, deg/s."
+    )
     output_dps: list[float] = Field(default_factory=list)
     residual_dps: list[float | None] = Field(
-        default_factory=list, description=f"Corrected minus true rate, as a consumer has it; {CORRECTED}"
+        default_factory=list,
+        description=f"Corrected rate minus true rate, as a user of the calibration obtains it, deg/s; {CORRECTED}",
     )
     followed_dps: list[float | None] = Field(
         default_factory=list,
-        description="Corrected rate minus the true rate through the version's delay and bandwidth; null: it has none.",
+        description="Corrected rate minus the true rate filtered by the version's delay and bandwidth, deg/s; null: "
+        "the version has neither.",
     )
 
 
@@ -131,7 +175,9 @@ class AxisResponse(ResponseModel):
 
     delay_s: float | None = None
     u_delay_s: float | None = None
-    bandwidth_hz: float | None = Field(default=None, description="At half of the power: 1/(2 pi time constant).")
+    bandwidth_hz: float | None = Field(
+        default=None, description="Frequency at which the power is halved, 1/(2 pi time constant), Hz."
+    )
     u_bandwidth_hz: float | None = None
 
 
@@ -141,11 +187,16 @@ class PoseColumns(ResponseModel):
     from_s: list[float] = Field(default_factory=list)
     until_s: list[float] = Field(default_factory=list)
     accelerometer_deg: list[float] = Field(
-        default_factory=list, description="Angle between gravity before and after, by the accelerometer."
+        default_factory=list,
+        description="Angle between gravity before and after the move, from the accelerometer, deg.",
     )
-    gyro_deg: list[float] = Field(default_factory=list, description="The same by the gyro's rates, integrated.")
+    gyro_deg: list[float] = Field(
+        default_factory=list,
+        description="Angle between gravity before and after the move, from the integrated rates of the gyro, deg.",
+    )
     residual_deg: list[float] = Field(
-        default_factory=list, description="Angle between gravity after the move by the gyro and by the accelerometer."
+        default_factory=list,
+        description="Angle between gravity after the move from the gyro and from the accelerometer, deg.",
     )
 
 
@@ -154,14 +205,25 @@ class MotionResponse(ResponseModel):
 
     serial: str
     recording: int
-    version: int | None = Field(description="Version that is applied without refitting; null: the outputs as they are.")
+    version: int | None = Field(
+        description="Version that is applied without refitting; null: none, the outputs are not corrected."
+    )
     motion: Motion
-    source: str = Field(description="What the numbers are of, in words.")
-    rows: int = Field(description="Rows of each axis that are here.")
-    of: int = Field(description="Rows that the recording has; more than `rows`: evenly picked.")
+    source: str = Field(
+        description="A sentence that names the version and the recording from which the numbers were computed."
+    )
+    rows: int = Field(description="Number of rows of each axis in this response.")
+    of: int = Field(
+        description="Number of rows of each axis in the recording; if larger than `rows`, evenly spaced "
+        "rows were chosen."
+    )
     rest: RestColumns | None = None
     turns: TurnColumns | None = None
     profile: ProfileColumns | None = None
     poses: PoseColumns | None = None
-    responses: dict[str, AxisResponse] = Field(default_factory=dict, description="Of a profile, by axis.")
-    left_out: list[str] = Field(default_factory=list, description="What could not be used, and why.")
+    responses: dict[str, AxisResponse] = Field(
+        default_factory=dict, description="Delay and bandwidth of each axis; only for a rate profile."
+    )
+    left_out: list[str] = Field(
+        default_factory=list, description="Parts of the recording that could not be used, each with the reason."
+    )

@@ -42,15 +42,18 @@ class VerificationResponse(ResponseModel):
     recorded_unit: str = Field(description="Serial number of the unit that was recorded.")
     seen: bool = Field(description="Whether the version was fitted to this recording.")
     datasets: int
-    rms_dps: float = Field(description="Over data sets and axes.")
+    rms_dps: float = Field(description="Root mean square of the error over data sets and axes, deg/s.")
     max_dps: float
-    bias_dps: float = Field(description="Mean over data sets and axes.")
+    bias_dps: float = Field(description="Mean of the error over data sets and axes, deg/s.")
     axes: dict[str, AxisVerification]
-    outside_validity: int = Field(description="Data sets outside the version's rates or temperatures.")
-    expected_dps: float | None = Field(
-        description="Error that the version states: held-out, or of its own data where that is larger; null: unknown."
+    outside_validity: int = Field(
+        description="Number of data sets outside the rates or temperatures of the calibration."
     )
-    ok: bool = Field(description="Whether the error is at most twice the expected one.")
+    expected_dps: float | None = Field(
+        description="Error that is expected of the version, deg/s: the larger of its held-out error and its error on "
+        "the data of the fit; null: unknown."
+    )
+    ok: bool = Field(description="Whether `rms_dps` is at most twice `expected_dps`.")
 
 
 class CriticismResponse(ResponseModel):
@@ -59,12 +62,16 @@ class CriticismResponse(ResponseModel):
     serial: str
     version: int
     recording: int
-    recordings: list[int] = Field(default_factory=list, description="All recordings; `recording` is the newest.")
+    recordings: list[int] = Field(
+        default_factory=list, description="All recordings that the model is compared with; `recording` is the newest."
+    )
     joint: JointJson | None = Field(
-        default=None, description="Of several recordings: repeatability, agreement, each predicted by the others."
+        default=None,
+        description="Only for several recordings: repeatability, agreement, and the error when each is "
+        "predicted by a fit to the others.",
     )
     verdict: Literal["adequate", "missing", "ambiguous", "unexplained", "insufficient_data"]
-    text: list[str] = Field(description="The verdict in words, the answer first.")
+    text: list[str] = Field(description="The verdict in sentences, the conclusion first.")
     error: CriticisedErrors
     noise: CriticisedNoise
     lack_of_fit: LackOfFit
@@ -73,9 +80,13 @@ class CriticismResponse(ResponseModel):
     named: list[str] = Field(description="The effects that the verdict is based on.")
     depends_on: list[str] = Field(description="Channels that the residual depends on, strongest first.")
     confounded_with: list[str] = Field(
-        default_factory=list, description="Channels that this schedule cannot tell from the first of `depends_on`."
+        default_factory=list,
+        description="Channels that changed together with the first of `depends_on`, so that "
+        "this schedule cannot distinguish them.",
     )
-    remainder: Remainder | None = Field(default=None, description="Share of the excess that no named effect explains.")
+    remainder: Remainder | None = Field(
+        default=None, description="Share of the residual's excess over the noise floor that no named effect explains."
+    )
     not_physical: list[str] = Field(
         default_factory=list,
         description="Effects that explain these data equally well, but at a size that the unit cannot have.",
@@ -90,15 +101,20 @@ class CriticismResponse(ResponseModel):
     not_testable: list[NotTestable]
     experiments: list[Experiment]
     worst: list[WorstDataSet] = Field(default_factory=list, description="Data sets furthest from the model.")
-    maps: list[ResidualMap] = Field(default_factory=list, description="Residual over floor in rate x temperature.")
-    readings_left_out: int = Field(default=0, description="Readings far outside their data set.")
+    maps: list[ResidualMap] = Field(
+        default_factory=list, description="Maps of the residual divided by the noise floor, over rate and temperature."
+    )
+    readings_left_out: int = Field(
+        default=0, description="Number of readings left out because they are far from the others of their data set."
+    )
     warnings: list[DataWarning] = Field(default_factory=list, description=WARNINGS)
     applied: VerificationResponse | None = Field(
         default=None,
-        description="The version without refitting on this recording; everything else is of a refit to it.",
+        description="Result of the version applied to this recording without refitting; all other figures are from a "
+        "refit to this recording.",
     )
     views: Views = Field(
-        default_factory=Views, description="Where and how the model fails, as numbers for pictures, by view."
+        default_factory=Views, description="The data of each picture of where and how the model fails."
     )
 
 
@@ -122,14 +138,16 @@ class ResidualColumns(ResponseModel):
     )
     temperature_c: list[float] = Field(default_factory=list)
     t_s: list[float | None] = Field(default_factory=list)
-    n: list[int | None] = Field(default_factory=list, description="Number of readings of the data set; null: unknown.")
+    n: list[int | None] = Field(default_factory=list, description="Number of readings in the data set; null: unknown.")
     measured_error_dps: list[float] = Field(default_factory=list, description="Output minus own rate.")
     modelled_error_dps: list[float] = Field(default_factory=list)
     residual_dps: list[float] = Field(default_factory=list, description="Measured minus modelled error.")
     floor_dps: list[float | None] = Field(
-        default_factory=list, description="Standard deviation of this mean from noise only, deg/s."
+        default_factory=list, description="Standard deviation of the data set's mean due to noise alone, deg/s."
     )
-    over_floor: list[float | None] = Field(default_factory=list, description="Residual over floor, as in the map.")
+    over_floor: list[float | None] = Field(
+        default_factory=list, description="Residual divided by the noise floor, as in the map."
+    )
 
 
 class ResidualsResponse(ResponseModel):
@@ -138,7 +156,9 @@ class ResidualsResponse(ResponseModel):
     serial: str
     version: int
     recording: int
-    recordings: list[int] = Field(default_factory=list, description="All recordings; `recording` is the newest.")
+    recordings: list[int] = Field(
+        default_factory=list, description="All recordings that the model is compared with; `recording` is the newest."
+    )
     columns: ResidualColumns
 
 

@@ -31,22 +31,34 @@ class PlanRequest(Request):
 
     recipe: RecipeSource
     clip: bool = Field(default=False, description="Leave out points that the bench or a unit cannot do.")
-    visibility: bool = Field(default=False, description="Also say what the plan could find; it takes some seconds.")
-    at: str | None = Field(default=None, max_length=64, description="When it would begin, as of `POST /api/campaigns`.")
-    cron: str | None = Field(default=None, max_length=200, description="The same as a cron line.")
-    time_zone: str | None = Field(default=None, max_length=100, description="Of `at`, `cron` and `attendance`.")
+    visibility: bool = Field(
+        default=False, description="Also compute which effects the plan could detect; takes some seconds."
+    )
+    at: str | None = Field(
+        default=None, max_length=64, description="Intended time of the start, as in `POST /api/campaigns`."
+    )
+    cron: str | None = Field(
+        default=None, max_length=200, description="Cron line of the intended start, instead of `at`."
+    )
+    time_zone: str | None = Field(
+        default=None, max_length=100, description="Time zone of `at`, `cron` and `attendance`, such as Europe/Berlin."
+    )
 
 
 class AttendanceResponse(ResponseModel):
     """When a plan needs a person at the bench, to turn or to switch the units."""
 
-    start: datetime = Field(description="When it begins; all times are in `time_zone`.")
+    start: datetime = Field(description="Start of the campaign; all times are in `time_zone`.")
     time_zone: str
-    needed_at: list[datetime] = Field(description="Expected; prompts close together count as one.")
-    at_night: list[datetime] = Field(description="Those of them between 20:00 and 07:00.")
-    text: str = Field(description="The same in words.")
+    needed_at: list[datetime] = Field(
+        description="Times at which a person is expected to be needed; questions close together count as one."
+    )
+    at_night: list[datetime] = Field(description="The times of `needed_at` between 20:00 and 07:00.")
+    text: str = Field(description="The times of `needed_at` as a sentence.")
     warning: str = Field(default="", description="A warning about times at night; empty when there are none.")
-    better_start: datetime | None = Field(default=None, description="The next start with fewer of them at night.")
+    better_start: datetime | None = Field(
+        default=None, description="The next start for which fewer of these times are at night; null: none is better."
+    )
 
 
 class Visibility(ResponseModel):
@@ -55,7 +67,9 @@ class Visibility(ResponseModel):
     effect: str
     visible: bool
     share: float = Field(description="Share of the effect that the rest of the model does not absorb, 0 to 1.")
-    smallest_size: float | None = Field(default=None, description="Just detectable, in the effect's unit.")
+    smallest_size: float | None = Field(
+        default=None, description="Smallest size of the effect that the plan can detect, in `unit`."
+    )
     unit: str = ""
     why: Literal["channel", "schedule"] | None = None
     needs: list[str] = Field(default_factory=list)
@@ -72,9 +86,13 @@ class PlanResponse(ResponseModel):
     expected_s: float
     clipped: list[str] = Field(description="Points left out because the bench or the unit cannot do them.")
     schedule_hash: str
-    visibility: list[Visibility] | None = Field(default=None, description="What the plan could and could not find.")
+    visibility: list[Visibility] | None = Field(
+        default=None, description="Which effects the plan could and could not detect; null: not requested."
+    )
     attendance: AttendanceResponse | None = Field(
-        default=None, description="When it needs a person; null: the bench turns and switches the units itself."
+        default=None,
+        description="When the campaign needs a person; null: never, since the bench turns the units "
+        "and switches them on and off itself.",
     )
 
 
@@ -91,8 +109,10 @@ class RecipeResponse(ResponseModel):
     steps: int | None = None
     datasets: int | None = None
     expected_s: float | None = None
-    refused: str | None = Field(default=None, description="Why this bench cannot do it; then there are no figures.")
-    remark: str = Field(default="", description="Objections to it although the bench can do it.")
+    refused: str | None = Field(
+        default=None, description="Why this bench cannot run the recipe; steps, data sets and time are then null."
+    )
+    remark: str = Field(default="", description="Objections to the recipe although the bench can run it.")
     by_hand: bool = Field(default=False, description="A person turns the units; no table and no chamber is driven.")
 
 
@@ -101,14 +121,23 @@ class TimelineColumns(ResponseModel):
 
     number: list[int] = Field(description="From 1.")
     kind: list[str]
-    start_s: list[float] = Field(description="From the beginning, if every step takes as long as expected.")
-    expected_s: list[float]
-    temperature_c: list[float | None] = Field(description="Set point in force; null: none was set yet.")
-    rate_dps: list[float | None] = Field(description="Of data sets; null: the table is at rest.")
-    turn_deg: list[float | None] = Field(
-        description="Of turns by hand, positive counter-clockwise seen from above; null: no turn."
+    start_s: list[float] = Field(
+        description="Start of the step, s from the beginning, if every step takes as long as expected."
     )
-    position: list[str | None] = Field(description="In which the units are; null: as they were found.")
+    expected_s: list[float]
+    temperature_c: list[float | None] = Field(
+        description="Set point of the chamber during the step, deg C; null: none was set yet."
+    )
+    rate_dps: list[float | None] = Field(
+        description="Rate of the table in a data set, deg/s; null: the table is at rest."
+    )
+    turn_deg: list[float | None] = Field(
+        description="Angle of a turn by hand, deg, positive counter-clockwise seen from above; null: no turn."
+    )
+    position: list[str | None] = Field(
+        description="Body axis of the units that points along the table axis (by "
+        "hand: up); null: not yet turned by the campaign."
+    )
     dataset: list[int | None]
 
 
@@ -122,10 +151,11 @@ class RunColumns(TimelineColumns):
     """The steps of a campaign, with what became of each."""
 
     state: list[StepState]
-    started_s: list[float | None] = Field(description="Campaign time.")
+    started_s: list[float | None] = Field(description="Start of the step, s of campaign time; null: not yet started.")
     ended_s: list[float | None]
     forecast_s: list[float] = Field(
-        description="When it began, or will begin if the remaining steps take the expected time."
+        description="Start of the step, s of campaign time: measured, or for steps to come forecast from the "
+        "expected times."
     )
 
 
@@ -134,7 +164,10 @@ class CampaignPlanResponse(ResponseModel):
 
     campaign: int
     recipe: str
-    text: str = Field(description="The recipe as it was run, TOML; empty: by an older labctl.")
+    text: str = Field(
+        description="Text of the recipe that was run, TOML; empty: an older labctl ran the campaign "
+        "and did not store the text."
+    )
     bench: str
     state: CampaignState
     schedule_hash: str

@@ -24,10 +24,17 @@ class SimulatedRequest(Request):
     hide: list[str] = Field(
         default_factory=list,
         max_length=20,
-        description="EFFECT, or EFFECT=SIZE in the catalogue's coefficient unit, or EFFECT=z10: ten noise units.",
+        description="Effects to hide in the unit: EFFECT, EFFECT=SIZE with SIZE in the unit of the catalogue's "
+        "coefficient, or EFFECT=z10 for a signal of ten standard deviations of the noise.",
     )
-    seed: int = Field(default=1, ge=0, lt=1 << 63, description="Same seed, same recording.")
-    serial: str | None = Field(default=None, pattern=SERIAL, description="Of the unit; default: the simulated bench's.")
+    seed: int = Field(
+        default=1, ge=0, lt=1 << 63, description="Seed of the random numbers; the same seed gives the same recording."
+    )
+    serial: str | None = Field(
+        default=None,
+        pattern=SERIAL,
+        description="Serial number of the unit; default: the serial number in the simulated bench's file.",
+    )
     clip: bool = Field(default=False, description="Leave out points that the bench or the unit cannot do.")
 
 
@@ -36,7 +43,8 @@ class ExampleRequest(Request):
 
     name: str = Field(
         max_length=100,
-        description="osu-fog: a real fibre-optic gyro; freeimu-warmup: a MEMS gyro at rest; weiss-gyrostar: a table.",
+        description="osu-fog: a real fibre-optic gyro; freeimu-warmup: a real MEMS gyro at rest; weiss-gyrostar: a "
+        "published table of coefficients.",
     )
 
 
@@ -47,7 +55,7 @@ class ImportResponse(ResponseModel):
     recording: int
     datasets: int
     readings: int
-    suggested_model: str = Field(default="bias_scale", description="A published model for such a recording.")
+    suggested_model: str = Field(default="bias_scale", description="Name of a model that suits this kind of recording.")
     warnings: list[DataWarning] = Field(default_factory=list, description=WARNINGS)
 
 
@@ -57,7 +65,9 @@ class SimulatedRecordingResponse(ImportResponse):
     recipe: str
     bench: str
     seed: int
-    hidden: dict[str, float] = Field(description="Effect -> size that is hidden in the unit.")
+    hidden: dict[str, float] = Field(
+        description="For each effect that is hidden in the unit: its size, in the unit of the catalogue's coefficient."
+    )
 
 
 class RecordingResponse(ResponseModel):
@@ -66,13 +76,19 @@ class RecordingResponse(ResponseModel):
     id: int
     serial: str
     kind: str = Field(description="samples, points or coefficients.")
-    campaign: int | None = Field(description="The campaign that made it; null: it was imported.")
+    campaign: int | None = Field(description="The campaign that made the recording; null: the recording was imported.")
     datasets: int
     readings: int
     created_at: datetime
     notes: str = ""
-    motion: Motion = Field(default="rates", description="What moved the unit: a table, nothing, turns, poses.")
-    simulated_time: bool = Field(default=False, description="`created_at` is of a simulated bench's clock.")
+    motion: Motion = Field(
+        default="rates",
+        description="How the unit was moved: at constant table rates, at rest, "
+        "turned by known angles, along a rate profile, or by hand between poses.",
+    )
+    simulated_time: bool = Field(
+        default=False, description="Whether `created_at` is by the clock of a simulated bench."
+    )
 
 
 class RecordingFacts(ResponseModel):
@@ -82,7 +98,9 @@ class RecordingFacts(ResponseModel):
     serial: str
     campaign: int | None
     kind: str = Field(description="samples, points or coefficients.")
-    info: dict[str, JsonValue] = Field(description="Its `recording.toml`: unit, axes, bench, data sheet, notes.")
+    info: dict[str, JsonValue] = Field(
+        description="Content of the file `recording.toml`: unit, axes, bench, data sheet, notes."
+    )
     created_at: str
     simulated_time: bool
     datasets: int
@@ -96,7 +114,10 @@ class RecordingAlone(RecordingFacts):
 class RecordingWithPoints(RecordingFacts):
     """What a recording is, with the means of its data sets."""
 
-    points: Columns = Field(description="Column -> one value per data set, or piece of a long one.")
+    points: Columns = Field(
+        description="For each column: one value per data set; a long data set is divided into "
+        "pieces with one value each."
+    )
 
 
 class SamplesResponse(ResponseModel):
@@ -105,7 +126,7 @@ class SamplesResponse(ResponseModel):
     recording: int
     dataset: int
     readings: int
-    columns: Columns = Field(description="Column -> one value per reading, as many as were asked for.")
+    columns: Columns = Field(description="For each column: one value per reading, as many as were requested.")
 
 
 class ExportedRecording(ResponseModel):
@@ -129,7 +150,7 @@ class DataSetsResponse(ResponseModel):
     recording: int
     number: list[int]
     state: list[str]
-    reason: list[str] = Field(description="Why it is not complete; empty where it is.")
+    reason: list[str] = Field(description="Why the data set is not complete; empty if it is complete.")
     position: list[str]
     run: list[int]
     mounting: list[int]
@@ -151,35 +172,73 @@ class TraceResponse(ResponseModel):
     unit: str
     from_s: float | None
     until_s: float | None
-    raw: bool = Field(description="Binned from the readings themselves; else from envelopes of each data set.")
-    t_s: list[float] = Field(description="Mean time of the bin's readings.")
+    raw: bool = Field(
+        description="true: the bins were computed from all readings; false: from the stored minimum, "
+        "maximum and mean of sections of each data set."
+    )
+    t_s: list[float] = Field(description="Mean time of the readings in each bin, s.")
     min: list[float]
     max: list[float]
     mean: list[float]
     n: list[int]
-    channels: list[str] = Field(description="What can be asked for.")
+    channels: list[str] = Field(description="All channels of the recording that have a trace.")
 
 
 class AllanResponse(ResponseModel):
     """An overlapping Allan deviation, axis by axis, and the figures of IEEE Std 952 that it shows."""
 
-    recording: int | None = Field(description="null: of a file that is not in the database.")
+    recording: int | None = Field(
+        description="Number of the recording; null: the readings came from a file that is not in the database."
+    )
     datasets: list[int] = Field(description="First and last data set of the section at rest.")
     temperature_c: float | None
     duration_s: float | None
     axes: dict[str, AllanJson] = Field(
-        description="tau_s, deviation_dps with its 95 % interval low_dps and high_dps, model_dps, and N, B, K."
+        description="For each axis: averaging times tau_s, deviation_dps with its 95 % interval low_dps to high_dps, "
+        "model_dps, and the terms N, B and K."
     )
-    datasheet: dict[str, float] = Field(default_factory=dict, description="Figures of the data sheet, if it is known.")
+    datasheet: dict[str, float] = Field(
+        default_factory=dict, description="Figures of the unit's data sheet; empty if it is not known."
+    )
+
+
+class StaticBiasResponse(ResponseModel):
+    """The mean output at rest before a mission (Ojeda et al. 2000, eqs. 1, 15 and 16); it contains the Earth's rate."""
+
+    bias_dps: float
+    u_dps: float = Field(description="Standard uncertainty: white noise of the mean, and the bias instability.")
+    readings: int
+    seconds: float
+
+
+class OrientationResponse(ResponseModel):
+    """The angle of one axis, positive counter-clockwise and never wrapped, from its rate."""
+
+    axis: str
+    version: int | None = Field(description="Calibration that the rates were corrected by; null: none.")
+    readings: int
+    left_out: int = Field(description="Readings that were not valid, or no numbers.")
+    seconds: float
+    static_bias: StaticBiasResponse | None = Field(description="Taken off; null: no rest was named.")
+    angle_deg: float = Field(description="At the end; 0 at the end of the rest.")
+    drift_deg_per_min: float | None = Field(
+        description="Angle over time: the drift where the unit stood; null: no time."
+    )
+    offset_dps: float = Field(description="Taken off at the end: the static bias, or learned at standstill since.")
+    standing_s: float = Field(description="Time for which the unit counted as standing, its angle held.")
+    gap_s: float = Field(description="Time without readings, bridged in a straight line.")
+    t_s: list[float] = Field(description="Times of the course below, s.")
+    course_deg: list[float] = Field(description="The angle at these times, deg; at most 2000 points.")
+    warning: str = Field(default="", description="That the calibration is overdue or was revoked; empty: it is not.")
 
 
 class LogColumn(ResponseModel):
     """One column of a log."""
 
     name: str
-    unit: str = Field(description="That the format of the file states; empty: none.")
+    unit: str = Field(description="Unit that the file gives for the column; empty: none.")
     is_text: bool
-    target: str = Field(description="Column of the recording that it becomes; empty: it is not used.")
+    target: str = Field(description="Column of the recording that this column becomes; empty: the column is not used.")
 
 
 class LogTarget(ResponseModel):
@@ -187,15 +246,17 @@ class LogTarget(ResponseModel):
 
     name: str
     meaning: str
-    unit: str = Field(description="Of the recording's column; empty: none.")
-    units: list[str] = Field(description="Units that a log may have it in.")
+    unit: str = Field(description="Unit of the column in the recording; empty: none.")
+    units: list[str] = Field(description="Units that a log may use for this quantity.")
 
 
 class LogTrace(ResponseModel):
     """Least and largest value of a column in bins of equal count, in the file's own unit."""
 
     name: str
-    x: list[float] = Field(description="Middle of each bin: time in s, or the row where time is not known.")
+    x: list[float] = Field(
+        description="Middle of each bin: time in s, or the number of the row if the time is not known."
+    )
     low: list[float | None]
     high: list[float | None]
 
@@ -209,15 +270,17 @@ class LogPreview(ResponseModel):
     rows: int
     columns: list[LogColumn]
     first_rows: list[list[str]]
-    column_map: dict[str, JsonValue] = Field(description="The map: keys and values of a MAP.toml.")
-    map_toml: str = Field(description="The same as TOML.")
+    column_map: dict[str, JsonValue] = Field(description="The column map: keys and values of a MAP.toml.")
+    map_toml: str = Field(description="The column map as TOML text.")
     guesses: list[str] = Field(
         description="Assumptions inferred from the data, such as units that no column name states."
     )
-    problems: list[str] = Field(description="Everything that is wrong; empty: it can be imported.")
+    problems: list[str] = Field(description="Everything that prevents the import; empty: the file can be imported.")
     unused: list[str] = Field(description="Columns of the file that nothing uses.")
     serial: str | None
-    motion: str | None = Field(description="What moved the unit; null: not known while something is wrong.")
+    motion: str | None = Field(
+        description="How the unit was moved, as `motion` in recording.toml; null: not known because of `problems`."
+    )
     datasets: int | None
     duration_s: float | None
     traces: list[LogTrace]

@@ -28,7 +28,7 @@ class ScheduledResponse(ResponseModel):
     bench: str
     recipe: str
     state: str = Field(description="waiting, ended or cancelled.")
-    due_at: datetime | None = Field(description="When it begins next, in its time zone; null when it is over.")
+    due_at: datetime | None = Field(description="Time of the next start, in `time_zone`; null: no start is to come.")
     time_zone: str
     cron: str | None
     priority: int
@@ -38,8 +38,10 @@ class ScheduledResponse(ResponseModel):
     note: str = ""
     history: list[StartEventResponse] = Field(default_factory=list)
     confirmed_by: str = Field(
-        default="", description="Who confirmed that the bench will be clear; empty: a simulated bench, or not asked."
+        default="",
+        description="Person who confirmed that the bench will be clear; empty: the bench is simulated, "
+        "or no confirmation was requested.",
     )
     attendance: AttendanceResponse | None = Field(
-        default=None, description="When the next start needs a person; null: never, or not known."
+        default=None, description="When the next start needs a person at the bench; null: never, or not known."
     )

@@ -15,7 +15,7 @@ class HealthResponse(ResponseModel):
 
     status: Literal["ok", "look at the bench"]
     version: str
-    database: str = Field(description="Name of the file, without folder, or of the database.")
+    database: str = Field(description="Name of the database, or of its file without the folder.")
     since: str = Field(description="When the service was started, ISO 8601, UTC.")
     bench: BenchDescription | None
     schedule_trouble: str = Field(description="Why the schedule could not be read; empty when all is well.")
@@ -42,12 +42,12 @@ class ServiceReady(ResponseModel):
     url: str
     bench_pid: int
     web_pid: int
-    unconfirmed: str = Field(description="What is wrong with its bench; empty when all is well.")
-    cut_short: str = Field(description="Which campaign was left there; empty when none was.")
+    unconfirmed: str = Field(description="What is wrong with the service's bench; empty when all is well.")
+    cut_short: str = Field(description="Interrupted campaigns of that bench, and what is done about them; empty: none.")
 
 
 class SimulatorReady(ResponseModel):
     """Simulated instruments that answer."""
 
-    addresses: dict[str, str] = Field(description="Instrument -> port or address.")
+    addresses: dict[str, str] = Field(description="For each instrument: the port or the address at which it answers.")
     bench_file: str | None

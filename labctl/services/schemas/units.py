@@ -14,7 +14,16 @@ class ExportFormatResponse(ResponseModel):
 
     id: str = Field(description="The value of `format`.")
     title: str
-    suffix: str = Field(description="Of a file name, without the dot.")
+    suffix: str = Field(description="Suffix of a file in this format, without the dot.")
+    options: dict[str, str] = Field(description="Name of an option -> what it is, its unit and its default.")
+
+
+class RecalibrationResponse(ResponseModel):
+    """The campaign that the version in force is from: run again, it calibrates the unit again."""
+
+    recipe: str = Field(description="Recipe of that campaign as TOML text, for `POST /api/campaigns`.")
+    name: str
+    bench: str
 
 
 class UnitResponse(ResponseModel):
@@ -26,7 +35,15 @@ class UnitResponse(ResponseModel):
     recordings: list[int]
     calibrations: list[int]
     certified_version: int | None
-    formats: list[ExportFormatResponse] = Field(description="Formats in which its calibrations are available.")
+    due: datetime | None = Field(
+        default=None, description="Until when the version in force is valid; null: no date, or none is in force."
+    )
+    overdue: bool = Field(default=False, description="Whether that date has passed.")
+    recalibration: RecalibrationResponse | None = Field(
+        default=None,
+        description="Null: the version in force is not from a campaign. Only of one unit, or with `due_within`.",
+    )
+    formats: list[ExportFormatResponse] = Field(description="Formats in which the unit's calibrations are available.")
 
 
 class AppliedVersion(ResponseModel):
@@ -43,11 +60,22 @@ class TrendPoint(ResponseModel):
 
     recording: int
     at: datetime
-    as_found: AppliedVersion | None = Field(description="The newest version of before; null: there was none.")
-    as_left: AppliedVersion | None = Field(description="The newest version fitted to it; null: none was.")
-    rms_dps: float | None = Field(description="Error of the version that the trend is of; null: not applicable.")
-    axes: dict[str, AxisPoint] = Field(description="axis -> what that version leaves of bias and scale factor.")
-    why: str = Field(default="", description="Why the version cannot be applied; empty where it can.")
+    as_found: AppliedVersion | None = Field(
+        description="Error of the newest version fitted only to earlier "
+        "recordings, deg/s; null: there is none, or it cannot be applied."
+    )
+    as_left: AppliedVersion | None = Field(
+        description="Error of the newest version fitted to this recording, deg/s; "
+        "null: there is none, or it cannot be applied."
+    )
+    rms_dps: float | None = Field(
+        description="RMS error of the version that the trend compares with all recordings, "
+        "deg/s; null: that version cannot be applied, see `why`."
+    )
+    axes: dict[str, AxisPoint] = Field(
+        description="For each axis: bias and scale factor error that remain with the version that the trend compares."
+    )
+    why: str = Field(default="", description="Why the version cannot be applied to this recording; else empty.")
 
 
 class AxisPoint(ResponseModel):
@@ -55,24 +83,31 @@ class AxisPoint(ResponseModel):
 
     bias_dps: float
     u_bias_dps: float
-    scale_factor: float | None = Field(description="Left error over rate; null: there was one rate.")
+    scale_factor: float | None = Field(
+        description="Remaining error divided by the rate (1 = 100 %); null: the recording has only one rate."
+    )
     u_scale_factor: float | None
 
 
 class Drift(ResponseModel):
     """A straight line through the figures of the recordings; repeatability from day to day is its noise."""
 
-    axis: str = Field(description="x, y or z; 'all': the RMS error over all axes.")
-    what: str = Field(description="bias, scale_factor or error.")
+    axis: str = Field(description="x, y or z; `all` for the RMS error over all axes.")
+    what: str = Field(description="The figure that changes with time: bias, scale_factor or error.")
     unit: str
     points: int
     per_year: float
-    u: float | None = Field(description="Standard uncertainty; null: it takes three recordings.")
-    low: float | None = Field(description="95 %, by Student's t, from.")
+    u: float | None = Field(description="Standard uncertainty of `per_year`; null with fewer than three recordings.")
+    low: float | None = Field(
+        description="Lower limit of the 95 % interval of `per_year`, by Student's t; null with "
+        "fewer than three recordings."
+    )
     high: float | None
-    repeatability: float | None = Field(description="Standard deviation from recording to recording.")
-    significant: bool = Field(description="Whether 0 is outside the interval.")
-    line: DriftLine = Field(description="The line, for a picture.")
+    repeatability: float | None = Field(
+        description="Standard deviation of the recordings about the line; null with fewer than three recordings."
+    )
+    significant: bool = Field(description="Whether 0 is outside the 95 % interval of `per_year`.")
+    line: DriftLine = Field(description="Points of the line, for a picture.")
 
 
 class DriftLine(ResponseModel):
@@ -80,8 +115,13 @@ class DriftLine(ResponseModel):
     lists of equal length."""
 
     at: list[datetime]
-    value: list[float] = Field(description="In the unit of the figure: deg/s, or a share.")
-    low: list[float | None] = Field(description="95 %, by Student's t, from; null: it takes three recordings.")
+    value: list[float] = Field(
+        description="Values of the line: deg/s for bias and error, a ratio for the scale factor."
+    )
+    low: list[float | None] = Field(
+        description="Lower limit of the 95 % interval of the line, by Student's t; null "
+        "with fewer than three recordings."
+    )
     high: list[float | None]
 
 
@@ -89,7 +129,9 @@ class Leaving(ResponseModel):
     """When the bias of an axis leaves the limit; null: not within 50 years, or not known."""
 
     axis: str
-    outside: bool = Field(description="Whether the line is outside the limit at the newest recording already.")
+    outside: bool = Field(
+        description="Whether the line is already outside the limit at the time of the newest recording."
+    )
     expected: datetime | None
     earliest: datetime | None
     latest: datetime | None

@@ -33,6 +33,6 @@ class Sizing:
         if size is None:
             raise BadInput(
                 f"effect {effect}: no size gives z = {z:g} on recipe {self._plan.recipe.name}; "
-                "this schedule cannot show it, or hardly; give a size in its own unit"
+                "this schedule can hardly show the effect, or not at all; give a size in the unit of the effect"
             )
         return size

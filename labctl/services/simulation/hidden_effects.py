@@ -29,7 +29,8 @@ def hidden_sizes(texts: list[str]) -> dict[str, float]:
                 raise ValueError(size)
         except ValueError:
             raise BadInput(
-                f"hide {text}: size {size!r} is not a finite number; give it in the effect's coefficient unit"
+                f"hide {text}: size {size!r} is not a finite number; give a number in the unit of the effect "
+                "(`labctl effects`)"
             ) from None
     return sizes
 

@@ -21,6 +21,7 @@ export type Schema<Name extends keyof Schemas> = Declared<Schemas[Name]>;
 export type Assessment = Schema<"AssessmentResponse">;
 export type Attendance = Schema<"AttendanceResponse">;
 export type AxisUncertainty = Schema<"AxisUncertainty">;
+export type BenchCheck = Schema<"BenchCheckResponse">;
 export type BenchStatus = Schema<"BenchStatus">;
 export type CalibrationRow = Schema<"CalibrationRow">;
 export type Campaign = Schema<"CampaignResponse">;
@@ -28,6 +29,7 @@ export type CampaignPlan = Schema<"CampaignPlanResponse">;
 export type Certification = Schema<"CertificationResponse">;
 export type Comparison = Schema<"ComparisonResponse">;
 export type ComparisonColumns = Schema<"ComparisonColumns">;
+export type DeviceCheck = Schema<"DeviceCheck">;
 export type DataSets = Schema<"DataSetsResponse">;
 export type Drift = Schema<"Drift">;
 export type Imported = Schema<"ImportResponse">;
@@ -85,6 +87,7 @@ export type Outputs = Record<string, { unit?: string }>;
 
 export interface RecordingInfo {
   motion?: RecordingRow["motion"];
+  rate_reference?: "computed" | "demanded" | "measured" | null;
   axes: string[];
   output?: Outputs;
   model?: string | null;

@@ -78,6 +78,8 @@ export interface paths {
         /**
          * All units
          * @description Every unit that was measured or imported, by serial number.
+         *
+         *     With `due_within` those whose certification ends within that span or has ended, the earliest date first.
          */
         get: operations["units_api_units_get"];
         put?: never;
@@ -188,6 +190,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/benches/{bench}/check": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Check every instrument of the bench
+         * @description Ask every instrument and port of the bench what it is and how it does, while no campaign runs; nothing moves.
+         */
+        post: operations["check_api_benches__bench__check_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/effects": {
         parameters: {
             query?: never;
@@ -218,9 +240,12 @@ export interface paths {
         };
         /**
          * The calibration to use
-         * @description The calibration as a file: the bytes never change, the ETag is their hash. 304 when the caller has them already.
+         * @description The calibration as a file; the ETag is its hash. 304 when the caller has it already.
          *
-         *     A point read of tens of microseconds: it runs in the event loop, without a switch to a thread.
+         *     The file changes only with its certification, which it contains. `X-Labctl-State` is in-force, superseded, revoked
+         *     or not-certified, `X-Labctl-Due` the date until which it is valid; `Warning` says that it is overdue or revoked.
+         *     What a format does not carry of it, with its largest size, is in the header `X-Labctl-Lost`, one for each. JSON is a
+         *     point read of tens of microseconds: it runs in the event loop, without a switch to a thread; others compute.
          */
         get: operations["calibration_api_units__serial__calibration_get"];
         put?: never;
@@ -287,47 +312,6 @@ export interface paths {
          * @description The result of the fit of a version, when and from which data it was made, and whether it is in force.
          */
         get: operations["one_version_api_units__serial__calibrations__version__get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/api/units/{serial}/certifications": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /**
-         * Certifications and revocations
-         * @description Every certification and revocation of a version of the unit, newest first: who, why, when, and until when.
-         */
-        get: operations["certifications_api_units__serial__certifications_get"];
-        put?: never;
-        post?: never;
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
-    "/api/units/{serial}/calibrations/{version}/assessment": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        /**
-         * Objections to certifying a version
-         * @description The verdict on the version from its own recording, its errors, and the objections that certifying it would
-         *     override.
-         */
-        get: operations["assessment_api_units__serial__calibrations__version__assessment_get"];
         put?: never;
         post?: never;
         delete?: never;
@@ -449,7 +433,7 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * A version without refitting, compared with a recording
+         * Compare a version with a recording, without refitting
          * @description Measured and modelled error, data set by data set, and the version's model as lines; nothing is refitted.
          */
         get: operations["comparison_api_units__serial__calibrations__version__comparison_get"];
@@ -536,6 +520,47 @@ export interface paths {
          *     noise floor.
          */
         get: operations["ladder_api_units__serial__ladder_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/units/{serial}/certifications": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Certifications and revocations
+         * @description Every certification and revocation of a version of the unit, newest first: who, why, when, and until when.
+         */
+        get: operations["certifications_api_units__serial__certifications_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/units/{serial}/calibrations/{version}/assessment": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Objections to certifying a version
+         * @description The verdict on the version from its own recording, its errors, and the objections that certifying it would
+         *     override.
+         */
+        get: operations["assessment_api_units__serial__calibrations__version__assessment_get"];
         put?: never;
         post?: never;
         delete?: never;
@@ -1054,6 +1079,27 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/recordings/{recording}/orientation": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Static bias and angle of a recording
+         * @description The angle of one axis from its rate: static bias taken off (Ojeda et al. 2000, eqs. 15 and 16), offset renewed
+         *     at standstill (Weiss).
+         */
+        get: operations["orientation_api_recordings__recording__orientation_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/recordings/{recording}/file": {
         parameters: {
             query?: never;
@@ -1302,7 +1348,7 @@ export interface components {
         AllanResponse: {
             /**
              * Recording
-             * @description null: of a file that is not in the database.
+             * @description Number of the recording; null: the readings came from a file that is not in the database.
              */
             recording: number | null;
             /**
@@ -1316,14 +1362,14 @@ export interface components {
             duration_s: number | null;
             /**
              * Axes
-             * @description tau_s, deviation_dps with its 95 % interval low_dps and high_dps, model_dps, and N, B, K.
+             * @description For each axis: averaging times tau_s, deviation_dps with its 95 % interval low_dps to high_dps, model_dps, and the terms N, B and K.
              */
             axes: {
                 [key: string]: components["schemas"]["AllanJson"];
             };
             /**
              * Datasheet
-             * @description Figures of the data sheet, if it is known.
+             * @description Figures of the unit's data sheet; empty if it is not known.
              */
             datasheet: {
                 [key: string]: number;
@@ -1384,19 +1430,19 @@ export interface components {
             version: number;
             /**
              * Verdict
-             * @description Verdict of the newest criticism on the version's own recording; null: there is none, `verdict_reason` says why.
+             * @description Verdict of the newest criticism of the version on the recording that it was fitted to; null: none, see `verdict_reason`.
              */
             verdict: string | null;
             /**
              * Verdict Reason
-             * @description Why there is no verdict; empty where there is one.
+             * @description Why there is no verdict; empty if there is one.
              */
             verdict_reason: string;
             /** Verdict Recording */
             verdict_recording: number | null;
             /**
              * Verdict Text
-             * @description The verdict in words; empty without one.
+             * @description The verdict in words; empty if there is none.
              */
             verdict_text: string;
             error: components["schemas"]["CertifiedErrors"];
@@ -1404,16 +1450,26 @@ export interface components {
             objections: components["schemas"]["Objection"][];
             /**
              * Override Needed
-             * @description Whether certifying it needs `override`.
+             * @description Whether the version can be certified only with `override`.
              */
             override_needed: boolean;
             /**
              * Least Reason Characters
-             * @description Length of the reason that goes with an override.
+             * @description Smallest number of characters of the reason for an override.
              */
             least_reason_characters: number;
             /** Least Reason Words */
             least_reason_words: number;
+            /**
+             * Due Days
+             * @description Days that the certification is valid where none are given; null: no date.
+             */
+            due_days: number | null;
+            /**
+             * Due From
+             * @description Where the interval is from; null: none is given, and there is no date.
+             */
+            due_from: ("user" | "recipe" | "configuration") | null;
         };
         /**
          * AttendanceResponse
@@ -1423,24 +1479,24 @@ export interface components {
             /**
              * Start
              * Format: date-time
-             * @description When it begins; all times are in `time_zone`.
+             * @description Start of the campaign; all times are in `time_zone`.
              */
             start: string;
             /** Time Zone */
             time_zone: string;
             /**
              * Needed At
-             * @description Expected; prompts close together count as one.
+             * @description Times at which a person is expected to be needed; questions close together count as one.
              */
             needed_at: string[];
             /**
              * At Night
-             * @description Those of them between 20:00 and 07:00.
+             * @description The times of `needed_at` between 20:00 and 07:00.
              */
             at_night: string[];
             /**
              * Text
-             * @description The same in words.
+             * @description The times of `needed_at` as a sentence.
              */
             text: string;
             /**
@@ -1451,7 +1507,7 @@ export interface components {
             warning: string;
             /**
              * Better Start
-             * @description The next start with fewer of them at night.
+             * @description The next start for which fewer of these times are at night; null: none is better.
              */
             better_start: string | null;
         };
@@ -1520,7 +1576,7 @@ export interface components {
             u_bias_dps: number;
             /**
              * Scale Factor
-             * @description Left error over rate; null: there was one rate.
+             * @description Remaining error divided by the rate (1 = 100 %); null: the recording has only one rate.
              */
             scale_factor: number | null;
             /** U Scale Factor */
@@ -1537,7 +1593,7 @@ export interface components {
             u_delay_s: number | null;
             /**
              * Bandwidth Hz
-             * @description At half of the power: 1/(2 pi time constant).
+             * @description Frequency at which the power is halved, 1/(2 pi time constant), Hz.
              */
             bandwidth_hz: number | null;
             /** U Bandwidth Hz */
@@ -1550,42 +1606,42 @@ export interface components {
         AxisUncertainty: {
             /**
              * Coefficients Dps
-             * @description Standard uncertainty from the coefficients' covariance; null: they state none.
+             * @description Standard uncertainty from the covariance of the coefficients, deg/s; null: the coefficients have no uncertainties.
              */
             coefficients_dps: number | null;
             /**
              * Model Dps
-             * @description Error of the model and drift near this rate and temperature, by held-out data sets; null: unknown.
+             * @description Standard uncertainty from errors of the model and drift near this rate and temperature, estimated from held-out data sets, deg/s; null: unknown.
              */
             model_dps: number | null;
             /**
              * Repeatability Dps
-             * @description From one power-on to the next; null: unknown.
+             * @description Standard uncertainty from changes between power-ons, deg/s; null: unknown.
              */
             repeatability_dps: number | null;
             /**
              * Repeatability Source
-             * @description Between runs, data sheet, static record, or none.
+             * @description What `repeatability_dps` was computed from: differences between runs, the data sheet, a static record, or none of these.
              */
             repeatability_source: string;
             /**
              * Same Run Dps
-             * @description Coefficients and model combined: without another power-on; null where one is unknown.
+             * @description Coefficients and model combined, for use in the same power-on as the calibration, deg/s; null if one of the two is unknown.
              */
             same_run_dps: number | null;
             /**
              * Combined Dps
-             * @description All three combined; null where one of them is unknown.
+             * @description Coefficients, model and repeatability combined, deg/s; null if one of the three is unknown.
              */
             combined_dps: number | null;
             /**
              * Expanded Dps
-             * @description Combined, times the coverage factor.
+             * @description `combined_dps` times the coverage factor, deg/s.
              */
             expanded_dps: number | null;
             /**
              * Unknown
-             * @description Of coefficients, model and repeatability those that are unknown, and why, in words.
+             * @description Which of coefficients, model and repeatability are unknown, each with the reason.
              */
             unknown: {
                 [key: string]: string;
@@ -1616,6 +1672,23 @@ export interface components {
             sha256: string;
         };
         /**
+         * BenchCheckResponse
+         * @description Whether every instrument of a bench answered.
+         */
+        BenchCheckResponse: {
+            /** Bench */
+            bench: string;
+            /** Ok */
+            ok: boolean;
+            /**
+             * Checked At
+             * Format: date-time
+             */
+            checked_at: string;
+            /** Devices */
+            devices: components["schemas"]["DeviceCheck"][];
+        };
+        /**
          * BenchDescription
          * @description A bench and what it is doing.
          */
@@ -1630,17 +1703,19 @@ export interface components {
             units: components["schemas"]["BenchUnit"][];
             /**
              * Campaign
-             * @description The campaign that runs now.
+             * @description The campaign that runs now; null: none.
              */
             campaign: number | null;
             /**
              * Unconfirmed
-             * @description What its last safe state could not confirm; empty when all is well.
+             * @description What the last safe state of the bench could not confirm; empty when all is well.
              */
             unconfirmed: string;
+            /** @description What was found when it was last checked since the service was started. */
+            check: components["schemas"]["BenchCheckResponse"] | null;
             /**
              * Heard S
-             * @description Time since the last answer of the process that drives it, s; 0: it is this one.
+             * @description Time since the last answer of the process that drives the bench, s; 0: this process drives the bench.
              * @default 0
              */
             heard_s: number;
@@ -1660,23 +1735,25 @@ export interface components {
             units: components["schemas"]["BenchUnit"][];
             /**
              * Campaign
-             * @description The campaign that runs now.
+             * @description The campaign that runs now; null: none.
              */
             campaign: number | null;
             /**
              * Unconfirmed
-             * @description What its last safe state could not confirm; empty when all is well.
+             * @description What the last safe state of the bench could not confirm; empty when all is well.
              */
             unconfirmed: string;
+            /** @description What was found when it was last checked since the service was started. */
+            check: components["schemas"]["BenchCheckResponse"] | null;
             /**
              * Heard S
-             * @description Time since the last answer of the process that drives it, s; 0: it is this one.
+             * @description Time since the last answer of the process that drives the bench, s; 0: this process drives the bench.
              * @default 0
              */
             heard_s: number;
             /**
              * Start Questions
-             * @description Check -> question; empty for a simulated bench.
+             * @description For each check: the question that a person must confirm before a start; empty for a simulated bench.
              */
             start_questions: {
                 [key: string]: string;
@@ -1696,7 +1773,7 @@ export interface components {
             last_used_at: string;
             /**
              * Unconfirmed
-             * @description Until a person has inspected the bench and clears it; empty when all is well.
+             * @description What the last safe state could not confirm; kept until a person has inspected and cleared the bench; empty when all is well.
              * @default
              */
             unconfirmed: string;
@@ -1704,7 +1781,7 @@ export interface components {
             unconfirmed_at: string | null;
             /**
              * Attempts
-             * @description How often the safe state was tried again since.
+             * @description How often labctl has tried again to set the safe state since `unconfirmed_at`.
              * @default 0
              */
             attempts: number;
@@ -1712,12 +1789,12 @@ export interface components {
             attempted_at: string | null;
             /**
              * Confirmed At
-             * @description When such an attempt confirmed the safe state; a person has still to inspect and clear it.
+             * @description When a later attempt confirmed the safe state; a person must still inspect and clear the bench.
              */
             confirmed_at: string | null;
             /**
              * Left
-             * @description Campaigns that no process runs any more and that have not been ended.
+             * @description Campaigns whose process is gone and that have not been ended.
              */
             left: string[];
         };
@@ -1753,13 +1830,13 @@ export interface components {
             file: string;
             /**
              * Column Map
-             * @description Map of the columns, as JSON or TOML; empty: proposed.
+             * @description Column map, as JSON or TOML: which column of the file is which quantity; empty: labctl proposes a map.
              * @default
              */
             column_map?: string;
             /**
              * Importer
-             * @description Importer; empty: the one that recognises the file best.
+             * @description Importer that reads the file; empty: the importer that recognises the file best.
              * @default
              */
             importer?: string;
@@ -1770,7 +1847,7 @@ export interface components {
             option?: string[] | null;
             /**
              * Modified Ms
-             * @description When the file was last written, ms since 1970.
+             * @description When the file was last written, ms since 1970-01-01 UTC.
              */
             modified_ms?: number | null;
         };
@@ -1785,13 +1862,13 @@ export interface components {
             file: string;
             /**
              * Column Map
-             * @description Map of the columns, as JSON or TOML; empty: proposed.
+             * @description Column map, as JSON or TOML: which column of the file is which quantity; empty: labctl proposes a map.
              * @default
              */
             column_map?: string;
             /**
              * Importer
-             * @description Importer; empty: the one that recognises the file best.
+             * @description Importer that reads the file; empty: the importer that recognises the file best.
              * @default
              */
             importer?: string;
@@ -1802,7 +1879,7 @@ export interface components {
             option?: string[] | null;
             /**
              * Modified Ms
-             * @description When the file was last written, ms since 1970.
+             * @description When the file was last written, ms since 1970-01-01 UTC.
              */
             modified_ms?: number | null;
         };
@@ -1844,7 +1921,7 @@ export interface components {
             recipe: string;
             /**
              * Text
-             * @description The recipe as it was run, TOML; empty: by an older labctl.
+             * @description Text of the recipe that was run, TOML; empty: an older labctl ran the campaign and did not store the text.
              */
             text: string;
             /** Bench */
@@ -1878,17 +1955,17 @@ export interface components {
             clip?: boolean;
             /**
              * Hide
-             * @description Of a simulated bench, now: effects hidden in its units, EFFECT or EFFECT=SIZE in its unit.
+             * @description Effects to hide in the units of a simulated bench, each as EFFECT or EFFECT=SIZE, SIZE in the unit of the effect; not for a later start.
              */
             hide?: string[];
             /**
              * At
-             * @description When to begin, ISO 8601; without offset in `time_zone`. `now`: as soon as the bench is free.
+             * @description Time of the start, ISO 8601; a time without an offset is in `time_zone`. `now`: start as soon as the bench is free. Default: start at once.
              */
             at?: string | null;
             /**
              * Cron
-             * @description Cron line of repeated starts: five fields.
+             * @description Cron line of repeated starts: minute, hour, day of month, month, day of week, such as '30 2 * * MON'.
              */
             cron?: string | null;
             /**
@@ -1898,24 +1975,24 @@ export interface components {
             time_zone?: string | null;
             /**
              * Priority
-             * @description Of the starts that are due, the one with the highest number begins first.
+             * @description When several starts are due, the one with the highest priority begins first.
              * @default 0
              */
             priority?: number;
             /**
              * Late Limit S
-             * @description How much later than due it may begin; 0: a missed start is skipped; absent: any time, once.
+             * @description Largest delay of the start, s: a start that is later is skipped. 0: every missed start is skipped; default: no limit, a missed start begins late, once.
              */
             late_limit_s?: number | null;
             /**
              * Confirmed By
-             * @description Of a bench that is not simulated: the person who confirms `checks`; of a later start, that they will hold then.
+             * @description Needed for a bench that is not simulated: name of the person who confirms `checks`; for a later start, the person confirms that the checks will be met at that time.
              * @default
              */
             confirmed_by?: string;
             /**
              * Checks
-             * @description Of a bench that is not simulated, all three: the chamber is clear, the table is free, the independent temperature limiter is on.
+             * @description Needed for a bench that is not simulated, all three: chamber_clear (the chamber is clear), table_free (the table is free to turn), limiter_on (the independent temperature limiter is on).
              */
             checks?: ("chamber_clear" | "table_free" | "limiter_on")[];
         };
@@ -1954,7 +2031,7 @@ export interface components {
             expected_end: string | null;
             /**
              * T S
-             * @description Campaign time: seconds since it began, on its own clock.
+             * @description Campaign time: seconds since the campaign began, by the campaign's own clock.
              */
             t_s: number | null;
             /** Chamber C */
@@ -1963,11 +2040,18 @@ export interface components {
             setpoint_c: number | null;
             /** Gyro C */
             gyro_c: number | null;
+            /**
+             * References
+             * @description Of a campaign that runs here, now: column -> value of a reference instrument.
+             */
+            references: {
+                [key: string]: number;
+            };
             /** Rate Dps */
             rate_dps: number | null;
             /**
              * Outputs
-             * @description Of a campaign that runs here, now.
+             * @description Present outputs of the units; empty if this process does not run the campaign.
              */
             outputs: components["schemas"]["OutputResponse"][];
             /** Last Error */
@@ -1979,11 +2063,11 @@ export interface components {
             wish: ("pause" | "abort") | null;
             /** @description The question that waits for a person. */
             prompt: components["schemas"]["PromptResponse"] | null;
-            /** @description Of a campaign that runs here: the turn by hand, now. */
+            /** @description The turn by hand that is under way; null: none, or this process does not run the campaign. */
             turn: components["schemas"]["TurnResponse"] | null;
             /**
              * Links
-             * @description Instruments that answer late or not at all.
+             * @description Instruments that answer late or not at all: name -> what is wrong.
              */
             links: {
                 [key: string]: string;
@@ -1997,7 +2081,7 @@ export interface components {
             };
             /**
              * Abandoned
-             * @description No process runs it any more, and it has no end.
+             * @description The process that ran the campaign is gone, and the campaign was neither resumed nor ended.
              * @default false
              */
             abandoned: boolean;
@@ -2014,33 +2098,42 @@ export interface components {
             };
             /**
              * Drivers
-             * @description table, chamber or gyro name -> its driver when the campaign began.
+             * @description For each table, chamber and gyro: the driver that was used when the campaign began.
              */
             drivers: {
                 [key: string]: components["schemas"]["DriverResponse"];
             };
             /**
              * Unrecorded
-             * @description Of a request that was carried out: what could not be written.
+             * @description What could not be written to the database although the request was carried out; else empty.
              * @default
              */
             unrecorded: string;
             /**
+             * Reported
+             * @description table, chamber or gyro name -> what it and its USB adapter said of themselves when the campaign began: serial, firmware, revision, output_unit, adapter; what says nothing is left out.
+             */
+            reported: {
+                [key: string]: {
+                    [key: string]: string;
+                };
+            };
+            /**
              * Simulated Time
-             * @description Its times are those of a simulated bench, which may run faster than real time.
+             * @description All times are those of a simulated bench, which may run faster than real time.
              * @default false
              */
             simulated_time: boolean;
-            /** @description Of a failed campaign. */
+            /** @description What happened and what to do; only for a failed campaign. */
             advice: components["schemas"]["AdviceResponse"] | null;
             /**
              * Ended
-             * @description Over: nothing happens any more unless a person resumes it.
+             * @description The campaign has ended; it goes on only if a person resumes it.
              */
             ended: boolean;
             /**
              * Active
-             * @description A process has it in hand: planned, running, paused or waiting, and not abandoned.
+             * @description A process runs the campaign: the state is planned, running, paused or waiting, and `abandoned` is false.
              */
             active: boolean;
             /**
@@ -2050,7 +2143,7 @@ export interface components {
             resumable: boolean | null;
             /**
              * Resume Reason
-             * @description Why it would not be accepted, or the objections although it would be.
+             * @description Why `resume` would be refused; if it would be accepted, objections to it, or empty.
              * @default
              */
             resume_reason: string;
@@ -2138,20 +2231,25 @@ export interface components {
             /** Due */
             due: string | null;
             /**
+             * Due From
+             * @description Where the interval is from; null: none is given, and there is no date.
+             */
+            due_from: ("user" | "recipe" | "configuration") | null;
+            /**
              * Verdict
-             * @description Verdict of the newest criticism on the version's own recording; null: there is none, `verdict_reason` says why.
+             * @description Verdict of the newest criticism of the version on the recording that it was fitted to; null: none, see `verdict_reason`.
              */
             verdict: string | null;
             /**
              * Verdict Reason
-             * @description Why there is no verdict; empty where there is one.
+             * @description Why there is no verdict; empty if there is one.
              */
             verdict_reason: string | null;
             /** Verdict Recording */
             verdict_recording: number | null;
             /**
              * Verdict At
-             * @description When the verdict was taken: at the certification.
+             * @description Time of the verdict, which is the time of the certification.
              */
             verdict_at: string | null;
             /**
@@ -2162,7 +2260,7 @@ export interface components {
             error: components["schemas"]["CertifiedErrors"] | null;
             /**
              * Override
-             * @description Whether it was certified against objections.
+             * @description Whether the version was certified although there were objections.
              */
             override: boolean | null;
             /** Objections */
@@ -2193,12 +2291,12 @@ export interface components {
             reason: string;
             /**
              * Due Days
-             * @description Days until the unit is due again.
+             * @description Of a certification: days until the unit is due for its next calibration; 0: no date; absent: those of the recipe (`recalibrate_after_days`), else of the service ($LABCTL_DUE_DAYS), else no date.
              */
             due_days?: number | null;
             /**
              * Override
-             * @description Certify against objections; the reason must then be a sentence.
+             * @description Certify although there are objections; the reason must then be a sentence.
              * @default false
              */
             override?: boolean;
@@ -2235,6 +2333,11 @@ export interface components {
             /** Z */
             z: number | null;
         };
+        /**
+         * CheckRequest
+         * @description A check of the whole bench; it needs no answers.
+         */
+        CheckRequest: Record<string, never>;
         /**
          * ClearRequest
          * @description Who has inspected a bench whose safe state was not confirmed.
@@ -2318,12 +2421,12 @@ export interface components {
             temperature_c: number[];
             /**
              * Temperature Level C
-             * @description Centre of its temperature level.
+             * @description Centre of the temperature level that the data set belongs to, deg C.
              */
             temperature_level_c: number[];
             /**
              * Rate Level Dps
-             * @description Centre of its level of the table rate.
+             * @description Centre of the table-rate level that the data set belongs to, deg/s.
              */
             rate_level_dps: number[];
             /**
@@ -2343,12 +2446,12 @@ export interface components {
             residual_dps: number[];
             /**
              * Turn Before Deg
-             * @description Error after a full turn with the static bias alone taken off; null: too slow, another axis turns, or the recording has nothing at rest.
+             * @description Error of the integrated angle after a full turn with only the static bias subtracted, deg; null: the rate is too low, another axis turns, or the recording has no data set at rest.
              */
             turn_before_deg: (number | null)[];
             /**
              * Turn After Deg
-             * @description The same after the calibration.
+             * @description Error of the integrated angle after a full turn with the calibration applied, deg; null as for `turn_before_deg`.
              */
             turn_after_deg: (number | null)[];
         };
@@ -2365,7 +2468,7 @@ export interface components {
             recording: number;
             /**
              * Recordings
-             * @description All recordings; `recording` is the newest.
+             * @description All recordings that the version is compared with; `recording` is the newest.
              */
             recordings: number[];
             /**
@@ -2375,12 +2478,12 @@ export interface components {
             fitted_to: number | null;
             /**
              * Source
-             * @description Which model all numbers here come from, in words.
+             * @description A sentence that names the model and the data from which the numbers were computed.
              */
             source: string;
             /**
              * Held
-             * @description Other channels that the lines need: their means in this recording.
+             * @description Other channels that the lines depend on, held constant at their mean in this recording.
              */
             held: {
                 [key: string]: number;
@@ -2392,12 +2495,12 @@ export interface components {
             left_out: components["schemas"]["LeftOut"][];
             /**
              * Least Turn Rate Dps
-             * @description The error per turn is given from this rate on.
+             * @description The error per turn is computed where the magnitude of the rate is at least this, deg/s.
              */
             least_turn_rate_dps: number;
             /**
              * At Rest Dps
-             * @description Below this table rate a data set is at rest.
+             * @description A data set counts as at rest if the magnitude of its table rate is below this, deg/s.
              */
             at_rest_dps: number;
             columns: components["schemas"]["ComparisonColumns"];
@@ -2423,13 +2526,13 @@ export interface components {
             by: string;
             /**
              * Confirmed
-             * @description False: it cannot be done, and the campaign ends.
+             * @description true: the requested action is done; false: the action cannot be done, and the campaign ends.
              * @default true
              */
             confirmed?: boolean;
             /**
              * Again
-             * @description Of a turn by hand: it did not go well and is to be asked again.
+             * @description Only for a turn by hand: true if the turn went wrong and is to be requested again.
              * @default false
              */
             again?: boolean;
@@ -2485,10 +2588,10 @@ export interface components {
             recording: number;
             /**
              * Recordings
-             * @description All recordings; `recording` is the newest.
+             * @description All recordings that the model is compared with; `recording` is the newest.
              */
             recordings: number[];
-            /** @description Of several recordings: repeatability, agreement, each predicted by the others. */
+            /** @description Only for several recordings: repeatability, agreement, and the error when each is predicted by a fit to the others. */
             joint: components["schemas"]["JointJson"] | null;
             /**
              * Verdict
@@ -2497,7 +2600,7 @@ export interface components {
             verdict: "adequate" | "missing" | "ambiguous" | "unexplained" | "insufficient_data";
             /**
              * Text
-             * @description The verdict in words, the answer first.
+             * @description The verdict in sentences, the conclusion first.
              */
             text: string[];
             error: components["schemas"]["CriticisedErrors"];
@@ -2522,10 +2625,10 @@ export interface components {
             depends_on: string[];
             /**
              * Confounded With
-             * @description Channels that this schedule cannot tell from the first of `depends_on`.
+             * @description Channels that changed together with the first of `depends_on`, so that this schedule cannot distinguish them.
              */
             confounded_with: string[];
-            /** @description Share of the excess that no named effect explains. */
+            /** @description Share of the residual's excess over the noise floor that no named effect explains. */
             remainder: components["schemas"]["Remainder"] | null;
             /**
              * Not Physical
@@ -2555,23 +2658,23 @@ export interface components {
             worst: components["schemas"]["WorstDataSet"][];
             /**
              * Maps
-             * @description Residual over floor in rate x temperature.
+             * @description Maps of the residual divided by the noise floor, over rate and temperature.
              */
             maps: components["schemas"]["ResidualMap"][];
             /**
              * Readings Left Out
-             * @description Readings far outside their data set.
+             * @description Number of readings left out because they are far from the others of their data set.
              * @default 0
              */
             readings_left_out: number;
             /**
              * Warnings
-             * @description Errors of the data or the fit that are certain or probable, the certain ones first; empty where there are none.
+             * @description Certain and probable errors of the data or of the fit, the certain errors first; empty if there are none.
              */
             warnings: components["schemas"]["DataWarning"][];
-            /** @description The version without refitting on this recording; everything else is of a refit to it. */
+            /** @description Result of the version applied to this recording without refitting; all other figures are from a refit to this recording. */
             applied: components["schemas"]["VerificationResponse"] | null;
-            /** @description Where and how the model fails, as numbers for pictures, by view. */
+            /** @description The data of each picture of where and how the model fails. */
             views: components["schemas"]["Views"];
         };
         /**
@@ -2621,7 +2724,7 @@ export interface components {
             state: string[];
             /**
              * Reason
-             * @description Why it is not complete; empty where it is.
+             * @description Why the data set is not complete; empty if it is complete.
              */
             reason: string[];
             /** Position */
@@ -2656,18 +2759,18 @@ export interface components {
         DataWarning: {
             /**
              * What
-             * @description A word for programs: sign, unit, scale, axes, one_data_set, time_unit, worse ...
+             * @description Kind of error, as a word for programs: sign, unit, scale, axes, one_data_set, time_unit, worse ...
              */
             what: string;
             /**
              * Severity
-             * @description certain: a fit is refused; likely: it is only said.
+             * @description certain: a fit is refused; likely: a fit is made and shows the warning.
              * @enum {string}
              */
             severity: "certain" | "likely";
             /**
              * Where
-             * @description Axis, position, data sets or column.
+             * @description The axis, position, data sets or column that the warning concerns.
              */
             where: string;
             /** Said */
@@ -2682,9 +2785,70 @@ export interface components {
             do: string;
             /**
              * Text
-             * @description All of it as one sentence.
+             * @description The whole warning as one sentence.
              */
             text: string;
+        };
+        /**
+         * DeviceCheck
+         * @description What one instrument of a bench answered.
+         */
+        DeviceCheck: {
+            /** Device */
+            device: string;
+            /** Ok */
+            ok: boolean;
+            /**
+             * Text
+             * @description What is bad or, where nothing is, everything in one line.
+             */
+            text: string;
+            /**
+             * Kind
+             * @default other
+             * @enum {string}
+             */
+            kind: "table" | "chamber" | "reference" | "gyro" | "other";
+            /**
+             * State
+             * @description doubtful: a campaign can run, its figures may be worse. bad: it cannot, or they would be wrong.
+             * @default good
+             * @enum {string}
+             */
+            state: "good" | "doubtful" | "bad";
+            /**
+             * Address
+             * @description Its port, or host and TCP port.
+             * @default
+             */
+            address: string;
+            /** Findings */
+            findings: components["schemas"]["FindingResponse"][];
+            /**
+             * Reported
+             * @description What it and its USB adapter say of themselves: serial, firmware, adapter ...
+             */
+            reported: {
+                [key: string]: string;
+            };
+            /**
+             * Driver
+             * @description Name of its driver.
+             * @default
+             */
+            driver: string;
+            /**
+             * Distribution
+             * @description Python distribution (installed package) that provides the driver.
+             * @default
+             */
+            distribution: string;
+            /**
+             * Version
+             * @description Version of that distribution.
+             * @default
+             */
+            version: string;
         };
         /**
          * Drift
@@ -2693,12 +2857,12 @@ export interface components {
         Drift: {
             /**
              * Axis
-             * @description x, y or z; 'all': the RMS error over all axes.
+             * @description x, y or z; `all` for the RMS error over all axes.
              */
             axis: string;
             /**
              * What
-             * @description bias, scale_factor or error.
+             * @description The figure that changes with time: bias, scale_factor or error.
              */
             what: string;
             /** Unit */
@@ -2709,27 +2873,27 @@ export interface components {
             per_year: number;
             /**
              * U
-             * @description Standard uncertainty; null: it takes three recordings.
+             * @description Standard uncertainty of `per_year`; null with fewer than three recordings.
              */
             u: number | null;
             /**
              * Low
-             * @description 95 %, by Student's t, from.
+             * @description Lower limit of the 95 % interval of `per_year`, by Student's t; null with fewer than three recordings.
              */
             low: number | null;
             /** High */
             high: number | null;
             /**
              * Repeatability
-             * @description Standard deviation from recording to recording.
+             * @description Standard deviation of the recordings about the line; null with fewer than three recordings.
              */
             repeatability: number | null;
             /**
              * Significant
-             * @description Whether 0 is outside the interval.
+             * @description Whether 0 is outside the 95 % interval of `per_year`.
              */
             significant: boolean;
-            /** @description The line, for a picture. */
+            /** @description Points of the line, for a picture. */
             line: components["schemas"]["DriftLine"];
         };
         /**
@@ -2742,12 +2906,12 @@ export interface components {
             at: string[];
             /**
              * Value
-             * @description In the unit of the figure: deg/s, or a share.
+             * @description Values of the line: deg/s for bias and error, a ratio for the scale factor.
              */
             value: number[];
             /**
              * Low
-             * @description 95 %, by Student's t, from; null: it takes three recordings.
+             * @description Lower limit of the 95 % interval of the line, by Student's t; null with fewer than three recordings.
              */
             low: (number | null)[];
             /** High */
@@ -2796,22 +2960,22 @@ export interface components {
         ErrorFigures: {
             /**
              * Raw Rms Dps
-             * @description Before any compensation.
+             * @description Error before any compensation, deg/s.
              */
             raw_rms_dps: number | null;
             /**
              * Rms Dps
-             * @description After compensation, on the data of the fit.
+             * @description Error after compensation, on the data that were fitted, deg/s.
              */
             rms_dps: number | null;
             /**
              * Heldout Rms Dps
-             * @description Each temperature predicted by a fit without its data.
+             * @description Error at temperatures that were left out of the fit, deg/s.
              */
             heldout_rms_dps: number | null;
             /**
              * Noise Floor Dps
-             * @description Root of the mean variance of a data-set mean: white and drift.
+             * @description Error of data-set means due to noise and drift alone, deg/s.
              */
             noise_floor_dps: number | null;
             /**
@@ -2822,7 +2986,7 @@ export interface components {
             noise_floor_source: string;
             /**
              * Heldout By Leg
-             * @description Heating by a fit to cooling and so on; empty: the temperature goes one way.
+             * @description Error of heating by a fit to cooling, and the reverse; empty: one leg.
              */
             heldout_by_leg: components["schemas"]["LegError"][];
         };
@@ -2851,17 +3015,17 @@ export interface components {
             message: string;
             /**
              * Device
-             * @description The instrument or unit that it is about.
+             * @description The instrument or unit that the event concerns.
              */
             device: string | null;
             /**
              * Value
-             * @description What was measured, in `unit`.
+             * @description Measured value, in `unit`.
              */
             value: number | null;
             /**
              * Limit
-             * @description Which limit it was compared with, in `unit`.
+             * @description Limit that `value` was compared with, in `unit`.
              */
             limit: number | null;
             /** Unit */
@@ -2874,7 +3038,7 @@ export interface components {
         ExampleRequest: {
             /**
              * Name
-             * @description osu-fog: a real fibre-optic gyro; freeimu-warmup: a MEMS gyro at rest; weiss-gyrostar: a table.
+             * @description osu-fog: a real fibre-optic gyro; freeimu-warmup: a real MEMS gyro at rest; weiss-gyrostar: a published table of coefficients.
              */
             name: string;
         };
@@ -2914,9 +3078,16 @@ export interface components {
             title: string;
             /**
              * Suffix
-             * @description Of a file name, without the dot.
+             * @description Suffix of a file in this format, without the dot.
              */
             suffix: string;
+            /**
+             * Options
+             * @description Name of an option -> what it is, its unit and its default.
+             */
+            options: {
+                [key: string]: string;
+            };
         };
         /** FailingRange */
         FailingRange: {
@@ -2932,6 +3103,31 @@ export interface components {
             rms_dps: number;
             /** Z */
             z: number;
+        };
+        /**
+         * FindingResponse
+         * @description One thing that was found out about an instrument.
+         */
+        FindingResponse: {
+            /** What */
+            what: string;
+            /**
+             * Text
+             * @description Of one that is not good: what is wrong and what to do.
+             */
+            text: string;
+            /**
+             * State
+             * @enum {string}
+             */
+            state: "good" | "doubtful" | "bad";
+            /** Value */
+            value: number | null;
+            /**
+             * Unit
+             * @default
+             */
+            unit: string;
         };
         /**
          * FitEnvironment
@@ -2970,17 +3166,17 @@ export interface components {
             recordings?: number[];
             /**
              * Model
-             * @description ojeda2000, yang2018, single_temperature, weiss1995 ...
+             * @description Name of a model, such as yang2018; default: only `effects`.
              */
             model?: string | null;
             /**
              * Effects
-             * @description Effect ids, `name:2` sets an order. Without `model` a complete model, with it added to it.
+             * @description Effect ids; `name:2` sets the polynomial order to 2. Without `model`, these effects are the whole model; with `model`, they are added to that model.
              */
             effects?: string[];
             /**
              * Accept Warnings
-             * @description Fit also what is certainly wrong, or worse than no correction; the answer still holds the warnings.
+             * @description Fit data that are certainly wrong, and keep a fit that is worse than no correction; the response still lists the warnings.
              * @default false
              */
             accept_warnings?: boolean;
@@ -2995,7 +3191,7 @@ export interface components {
             model: components["schemas"]["ModelResponse"];
             /**
              * Axes
-             * @description axis -> coefficients with value, standard uncertainty u, and unit.
+             * @description For each axis: the coefficients with value, standard uncertainty u, and unit.
              */
             axes: {
                 [key: string]: components["schemas"]["AxisCoefficients"];
@@ -3004,42 +3200,42 @@ export interface components {
             validity: components["schemas"]["Validity"];
             /**
              * Warnings
-             * @description Errors of the data or the fit that are certain or probable, the certain ones first; empty where there are none.
+             * @description Certain and probable errors of the data or of the fit, the certain errors first; empty if there are none.
              */
             warnings: components["schemas"]["DataWarning"][];
             /**
              * Noise
-             * @description axis -> white noise and drift that the data were weighted by, deg/s.
+             * @description For each axis: white noise and drift that set the weights of the fit, deg/s.
              */
             noise: {
                 [key: string]: components["schemas"]["AxisNoiseJson"];
             };
-            /** @description Which thermometer was used, how the Earth's rate was treated. */
+            /** @description Which thermometer was used; whether the Earth's rate was subtracted. */
             environment: components["schemas"]["FitEnvironment"];
             /**
              * Reference Temperature C
-             * @description Temperature terms are centred on it.
+             * @description Zero point of temperature terms, deg C.
              */
             reference_temperature_c: number | null;
             /**
              * Recording
-             * @description The recording that it was fitted to.
+             * @description The recording that the model was fitted to.
              */
             recording: number | null;
-            /** @description Of a calibration by hand: rests, the accelerometer, moves, held-out moves. */
+            /** @description Only by hand: results for rests, accelerometer, moves, held-out moves. */
             poses: components["schemas"]["PosesJson"] | null;
             /**
              * Recordings
-             * @description All recordings that it was fitted to; `recording` is the newest of them.
+             * @description All recordings that the model was fitted to; `recording` is the newest of these.
              */
             recordings: number[];
-            /** @description Of several recordings: repeatability, agreement, each predicted by the others. */
+            /** @description Only for several: repeatability, agreement, each predicted by the others. */
             joint: components["schemas"]["JointJson"] | null;
             /** Version */
             version: number;
             /**
              * Campaign
-             * @description The campaign of the recording; null: it was imported.
+             * @description Campaign that made the recording; null: imported.
              */
             campaign: number | null;
             /** Recipe */
@@ -3074,7 +3270,7 @@ export interface components {
             unit: "s" | "K";
             /**
              * Size
-             * @description axis -> deg/s for each K that the lag is behind, or at an edge of the play.
+             * @description For each axis, deg/s: error per K of lag, or error at an edge of the play.
              */
             size: {
                 [key: string]: number;
@@ -3115,7 +3311,7 @@ export interface components {
             version: string;
             /**
              * Database
-             * @description Name of the file, without folder, or of the database.
+             * @description Name of the database, or of its file without the folder.
              */
             database: string;
             /**
@@ -3188,13 +3384,13 @@ export interface components {
             readings: number;
             /**
              * Suggested Model
-             * @description A published model for such a recording.
+             * @description Name of a model that suits this kind of recording.
              * @default bias_scale
              */
             suggested_model: string;
             /**
              * Warnings
-             * @description Errors of the data or the fit that are certain or probable, the certain ones first; empty where there are none.
+             * @description Certain and probable errors of the data or of the fit, the certain errors first; empty if there are none.
              */
             warnings: components["schemas"]["DataWarning"][];
         };
@@ -3205,17 +3401,17 @@ export interface components {
         ImproveRequest: {
             /**
              * Add
-             * @description Effect ids; `name:2` sets an order.
+             * @description Ids of effects to add; `name:2` sets polynomial order 2.
              */
             add?: string[];
             /**
              * Remove
-             * @description Effect ids that are in the version.
+             * @description Ids of the version's effects to remove.
              */
             remove?: string[];
             /**
              * Formula
-             * @description Effects of your own: 'name: expression'.
+             * @description Your own effects to add, each as 'name: expression'.
              */
             formula?: string[];
             /**
@@ -3230,12 +3426,12 @@ export interface components {
             recording?: number | null;
             /**
              * Recordings
-             * @description Several recordings of the unit, fitted together; instead of `recording`. Default: those of a joint version.
+             * @description Several recordings of the unit, fitted together; instead of `recording`. Default: the recordings of the version, if it was fitted to several.
              */
             recordings?: number[];
             /**
              * Accept Warnings
-             * @description Fit also what is certainly wrong, or worse than no correction; the answer still holds the warnings.
+             * @description Fit data that are certainly wrong, and keep a fit that is worse than no correction; the response still lists the warnings.
              * @default false
              */
             accept_warnings?: boolean;
@@ -3250,7 +3446,7 @@ export interface components {
             model: components["schemas"]["ModelResponse"];
             /**
              * Axes
-             * @description axis -> coefficients with value, standard uncertainty u, and unit.
+             * @description For each axis: the coefficients with value, standard uncertainty u, and unit.
              */
             axes: {
                 [key: string]: components["schemas"]["AxisCoefficients"];
@@ -3259,47 +3455,47 @@ export interface components {
             validity: components["schemas"]["Validity"];
             /**
              * Warnings
-             * @description Errors of the data or the fit that are certain or probable, the certain ones first; empty where there are none.
+             * @description Certain and probable errors of the data or of the fit, the certain errors first; empty if there are none.
              */
             warnings: components["schemas"]["DataWarning"][];
             /**
              * Noise
-             * @description axis -> white noise and drift that the data were weighted by, deg/s.
+             * @description For each axis: white noise and drift that set the weights of the fit, deg/s.
              */
             noise: {
                 [key: string]: components["schemas"]["AxisNoiseJson"];
             };
-            /** @description Which thermometer was used, how the Earth's rate was treated. */
+            /** @description Which thermometer was used; whether the Earth's rate was subtracted. */
             environment: components["schemas"]["FitEnvironment"];
             /**
              * Reference Temperature C
-             * @description Temperature terms are centred on it.
+             * @description Zero point of temperature terms, deg C.
              */
             reference_temperature_c: number | null;
             /**
              * Recording
-             * @description The recording that it was fitted to.
+             * @description The recording that the model was fitted to.
              */
             recording: number | null;
-            /** @description Of a calibration by hand: rests, the accelerometer, moves, held-out moves. */
+            /** @description Only by hand: results for rests, accelerometer, moves, held-out moves. */
             poses: components["schemas"]["PosesJson"] | null;
             /**
              * Recordings
-             * @description All recordings that it was fitted to; `recording` is the newest of them.
+             * @description All recordings that the model was fitted to; `recording` is the newest of these.
              */
             recordings: number[];
-            /** @description Of several recordings: repeatability, agreement, each predicted by the others. */
+            /** @description Only for several: repeatability, agreement, each predicted by the others. */
             joint: components["schemas"]["JointJson"] | null;
             /**
              * Improved From
              * @description The version that was changed.
              */
             improved_from: number;
-            /** @description Errors of the version that was changed, fitted to the same recording. */
+            /** @description Errors of the model before the change, on the same recording, deg/s. */
             before: components["schemas"]["ErrorFigures"];
             /**
              * Plausible
-             * @description Effect -> the usual range, and whether it is inside.
+             * @description For each effect: its usual range, and whether the size is inside.
              */
             plausible: {
                 [key: string]: components["schemas"]["UsualRange"];
@@ -3329,7 +3525,7 @@ export interface components {
             model: components["schemas"]["ModelResponse"];
             /**
              * Axes
-             * @description axis -> coefficients with value, standard uncertainty u, and unit.
+             * @description For each axis: the coefficients with value, standard uncertainty u, and unit.
              */
             axes: {
                 [key: string]: components["schemas"]["AxisCoefficients"];
@@ -3338,47 +3534,47 @@ export interface components {
             validity: components["schemas"]["Validity"];
             /**
              * Warnings
-             * @description Errors of the data or the fit that are certain or probable, the certain ones first; empty where there are none.
+             * @description Certain and probable errors of the data or of the fit, the certain errors first; empty if there are none.
              */
             warnings: components["schemas"]["DataWarning"][];
             /**
              * Noise
-             * @description axis -> white noise and drift that the data were weighted by, deg/s.
+             * @description For each axis: white noise and drift that set the weights of the fit, deg/s.
              */
             noise: {
                 [key: string]: components["schemas"]["AxisNoiseJson"];
             };
-            /** @description Which thermometer was used, how the Earth's rate was treated. */
+            /** @description Which thermometer was used; whether the Earth's rate was subtracted. */
             environment: components["schemas"]["FitEnvironment"];
             /**
              * Reference Temperature C
-             * @description Temperature terms are centred on it.
+             * @description Zero point of temperature terms, deg C.
              */
             reference_temperature_c: number | null;
             /**
              * Recording
-             * @description The recording that it was fitted to.
+             * @description The recording that the model was fitted to.
              */
             recording: number | null;
-            /** @description Of a calibration by hand: rests, the accelerometer, moves, held-out moves. */
+            /** @description Only by hand: results for rests, accelerometer, moves, held-out moves. */
             poses: components["schemas"]["PosesJson"] | null;
             /**
              * Recordings
-             * @description All recordings that it was fitted to; `recording` is the newest of them.
+             * @description All recordings that the model was fitted to; `recording` is the newest of these.
              */
             recordings: number[];
-            /** @description Of several recordings: repeatability, agreement, each predicted by the others. */
+            /** @description Only for several: repeatability, agreement, each predicted by the others. */
             joint: components["schemas"]["JointJson"] | null;
             /**
              * Improved From
              * @description The version that was changed.
              */
             improved_from: number;
-            /** @description Errors of the version that was changed, fitted to the same recording. */
+            /** @description Errors of the model before the change, on the same recording, deg/s. */
             before: components["schemas"]["ErrorFigures"];
             /**
              * Plausible
-             * @description Effect -> the usual range, and whether it is inside.
+             * @description For each effect: its usual range, and whether the size is inside.
              */
             plausible: {
                 [key: string]: components["schemas"]["UsualRange"];
@@ -3409,11 +3605,17 @@ export interface components {
              * @description Date until which the certification is valid; null: no date.
              */
             due: string | null;
-            /** @description The newest act on this version; null: there was none. */
+            /** @description The newest certification or revocation of this version; null: there was none. */
             certification: components["schemas"]["CertificationResponse"] | null;
             /**
+             * Rate Reference
+             * @description What the rates of its recordings were known from; empty: not known.
+             * @default
+             */
+            rate_reference: string;
+            /**
              * Remembers
-             * @description What follows the temperature from sample to sample in use: the state.
+             * @description Lags and plays to be updated with the temperature of every sample.
              */
             remembers: components["schemas"]["Follower"][];
         };
@@ -3447,7 +3649,7 @@ export interface components {
         KeyRequest: {
             /**
              * Name
-             * @description Owner's name, shown in the audit trail; each name is used once.
+             * @description Name of the key's owner, shown in the audit trail; a name cannot be used for a second key.
              */
             name: string;
             role: components["schemas"]["Role"];
@@ -3487,19 +3689,19 @@ export interface components {
             serial: string;
             /**
              * Recording
-             * @description The recording of all steps.
+             * @description Recording that all `steps` were fitted to.
              */
             recording: number | null;
             /**
              * Recordings
-             * @description All recordings of the steps.
+             * @description All recordings that `steps` were fitted to.
              */
             recordings: number[];
             /** Steps */
             steps: components["schemas"]["LadderRow"][];
             /**
              * Others
-             * @description Versions of other recordings, and their error on this one.
+             * @description Versions fitted to other recordings, with their error on this recording.
              */
             others: components["schemas"]["LadderRow"][];
             /** Noise Floor Dps */
@@ -3521,7 +3723,7 @@ export interface components {
             recording: number | null;
             /**
              * Recordings
-             * @description All recordings that it was fitted to; `recording` is the newest of them.
+             * @description All recordings that the model was fitted to; `recording` is the newest of these.
              */
             recordings: number[];
             /** Model */
@@ -3530,7 +3732,7 @@ export interface components {
             effects: string[];
             /**
              * Applied Rms Dps
-             * @description Of a version of another recording: its error on this one, applied without refitting.
+             * @description Only in `others`: RMS error on this recording without refitting, deg/s.
              */
             applied_rms_dps: number | null;
             /** Raw Rms Dps */
@@ -3551,7 +3753,7 @@ export interface components {
             axis: string;
             /**
              * Outside
-             * @description Whether the line is outside the limit at the newest recording already.
+             * @description Whether the line is already outside the limit at the time of the newest recording.
              */
             outside: boolean;
             /** Expected */
@@ -3580,29 +3782,29 @@ export interface components {
         };
         /**
          * LegError
-         * @description How well data sets of one direction of the temperature are predicted by a fit to the others.
+         * @description How well one leg, a stretch of heating or of cooling, is predicted by a fit to the others.
          */
         LegError: {
             /**
              * Fitted
-             * @description heating, cooling, or all legs but one.
+             * @description Data sets that were fitted: heating, cooling, or all legs but one.
              */
             fitted: string;
             /**
              * Tested
-             * @description cooling, heating, or each leg in turn.
+             * @description Data sets that were predicted by the fit: cooling, heating, or each leg in turn.
              */
             tested: string;
             /**
              * Rms Dps
-             * @description Root mean square over the data sets tested; null: see `why`.
+             * @description RMS prediction error of the data sets tested, deg/s; null: see `why`.
              */
             rms_dps: number | null;
             /** Datasets */
             datasets: number;
             /**
              * Why
-             * @description Why there is no figure; empty where there is one.
+             * @description Why `rms_dps` is null; else empty.
              * @default
              */
             why: string;
@@ -3638,14 +3840,14 @@ export interface components {
             name: string;
             /**
              * Unit
-             * @description That the format of the file states; empty: none.
+             * @description Unit that the file gives for the column; empty: none.
              */
             unit: string;
             /** Is Text */
             is_text: boolean;
             /**
              * Target
-             * @description Column of the recording that it becomes; empty: it is not used.
+             * @description Column of the recording that this column becomes; empty: the column is not used.
              */
             target: string;
         };
@@ -3671,14 +3873,14 @@ export interface components {
             first_rows: string[][];
             /**
              * Column Map
-             * @description The map: keys and values of a MAP.toml.
+             * @description The column map: keys and values of a MAP.toml.
              */
             column_map: {
                 [key: string]: components["schemas"]["JsonValue"];
             };
             /**
              * Map Toml
-             * @description The same as TOML.
+             * @description The column map as TOML text.
              */
             map_toml: string;
             /**
@@ -3688,7 +3890,7 @@ export interface components {
             guesses: string[];
             /**
              * Problems
-             * @description Everything that is wrong; empty: it can be imported.
+             * @description Everything that prevents the import; empty: the file can be imported.
              */
             problems: string[];
             /**
@@ -3700,7 +3902,7 @@ export interface components {
             serial: string | null;
             /**
              * Motion
-             * @description What moved the unit; null: not known while something is wrong.
+             * @description How the unit was moved, as `motion` in recording.toml; null: not known because of `problems`.
              */
             motion: string | null;
             /** Datasets */
@@ -3723,12 +3925,12 @@ export interface components {
             meaning: string;
             /**
              * Unit
-             * @description Of the recording's column; empty: none.
+             * @description Unit of the column in the recording; empty: none.
              */
             unit: string;
             /**
              * Units
-             * @description Units that a log may have it in.
+             * @description Units that a log may use for this quantity.
              */
             units: string[];
         };
@@ -3741,7 +3943,7 @@ export interface components {
             name: string;
             /**
              * X
-             * @description Middle of each bin: time in s, or the row where time is not known.
+             * @description Middle of each bin: time in s, or the number of the row if the time is not known.
              */
             x: number[];
             /** Low */
@@ -3762,17 +3964,17 @@ export interface components {
             position: string;
             /**
              * Level
-             * @description Temperature, deg C, or table rate, deg/s, of each line.
+             * @description Temperature, deg C, of each line over the rate; table rate, deg/s, of each line over the temperature.
              */
             level: number[];
             /**
              * Levels
-             * @description How many levels the recording has; more than lines: evenly picked.
+             * @description Number of levels in the recording; if there are more levels than lines, the lines are for evenly spaced levels.
              */
             levels: number;
             /**
              * At
-             * @description Table rate, deg/s, or temperature, deg C, along the lines.
+             * @description Points of the lines: table rate, deg/s, of lines over the rate; temperature, deg C, of lines over the temperature.
              */
             at: number[];
             /** Error Dps */
@@ -3789,18 +3991,18 @@ export interface components {
             effects: string[];
             /**
              * Argument
-             * @description Whether the regressors see the true rate (forward law) or the gyro's output (direct law).
+             * @description What the regressors are computed from: `rate`, the true rate (forward law), or `output`, the gyro's output (direct law).
              * @enum {string}
              */
             argument: "rate" | "output";
             /**
              * Terms
-             * @description The effects with orders and nonlinear parameters.
+             * @description Effects, with orders and parameters.
              */
             terms: components["schemas"]["TermJson"][] | null;
-            /** @description How temperature enters. */
+            /** @description How temperature enters the model. */
             temperature: components["schemas"]["TemperatureBasisJson"] | null;
-            /** @description What the terms are centred on. */
+            /** @description Zero point of the temperature terms. */
             reference: components["schemas"]["ReferenceJson"] | null;
         };
         /**
@@ -3814,7 +4016,7 @@ export interface components {
             recording: number;
             /**
              * Version
-             * @description Version that is applied without refitting; null: the outputs as they are.
+             * @description Version that is applied without refitting; null: none, the outputs are not corrected.
              */
             version: number | null;
             /**
@@ -3824,17 +4026,17 @@ export interface components {
             motion: "rates" | "rest" | "turns" | "profile" | "poses";
             /**
              * Source
-             * @description What the numbers are of, in words.
+             * @description A sentence that names the version and the recording from which the numbers were computed.
              */
             source: string;
             /**
              * Rows
-             * @description Rows of each axis that are here.
+             * @description Number of rows of each axis in this response.
              */
             rows: number;
             /**
              * Of
-             * @description Rows that the recording has; more than `rows`: evenly picked.
+             * @description Number of rows of each axis in the recording; if larger than `rows`, evenly spaced rows were chosen.
              */
             of: number;
             rest: components["schemas"]["RestColumns"] | null;
@@ -3843,14 +4045,14 @@ export interface components {
             poses: components["schemas"]["PoseColumns"] | null;
             /**
              * Responses
-             * @description Of a profile, by axis.
+             * @description Delay and bandwidth of each axis; only for a rate profile.
              */
             responses: {
                 [key: string]: components["schemas"]["AxisResponse"];
             };
             /**
              * Left Out
-             * @description What could not be used, and why.
+             * @description Parts of the recording that could not be used, each with the reason.
              */
             left_out: string[];
         };
@@ -3964,9 +4166,74 @@ export interface components {
             text: string;
             /**
              * Do
-             * @description What to do instead of certifying it.
+             * @description What to do instead of certifying this version.
              */
             do: string;
+        };
+        /**
+         * OrientationResponse
+         * @description The angle of one axis, positive counter-clockwise and never wrapped, from its rate.
+         */
+        OrientationResponse: {
+            /** Axis */
+            axis: string;
+            /**
+             * Version
+             * @description Calibration that the rates were corrected by; null: none.
+             */
+            version: number | null;
+            /** Readings */
+            readings: number;
+            /**
+             * Left Out
+             * @description Readings that were not valid, or no numbers.
+             */
+            left_out: number;
+            /** Seconds */
+            seconds: number;
+            /** @description Taken off; null: no rest was named. */
+            static_bias: components["schemas"]["StaticBiasResponse"] | null;
+            /**
+             * Angle Deg
+             * @description At the end; 0 at the end of the rest.
+             */
+            angle_deg: number;
+            /**
+             * Drift Deg Per Min
+             * @description Angle over time: the drift where the unit stood; null: no time.
+             */
+            drift_deg_per_min: number | null;
+            /**
+             * Offset Dps
+             * @description Taken off at the end: the static bias, or learned at standstill since.
+             */
+            offset_dps: number;
+            /**
+             * Standing S
+             * @description Time for which the unit counted as standing, its angle held.
+             */
+            standing_s: number;
+            /**
+             * Gap S
+             * @description Time without readings, bridged in a straight line.
+             */
+            gap_s: number;
+            /**
+             * T S
+             * @description Times of the course below, s.
+             */
+            t_s: number[];
+            /**
+             * Course Deg
+             * @description The angle at these times, deg; at most 2000 points.
+             */
+            course_deg: number[];
+            /**
+             * Warning
+             * @description That the calibration is overdue or was revoked; empty: it is not.
+             * @default
+             */
+            warning: string;
         };
         /**
          * OutputResponse
@@ -3986,14 +4253,14 @@ export interface components {
             mean: number;
             /**
              * Std
-             * @description Of single readings.
+             * @description Standard deviation of single readings.
              */
             std: number;
             /** N */
             n: number;
             /**
              * T S
-             * @description Time of the last reading since the campaign began.
+             * @description Time of the last reading, s since the campaign began.
              */
             t_s: number;
         };
@@ -4053,23 +4320,23 @@ export interface components {
             clip?: boolean;
             /**
              * Visibility
-             * @description Also say what the plan could find; it takes some seconds.
+             * @description Also compute which effects the plan could detect; takes some seconds.
              * @default false
              */
             visibility?: boolean;
             /**
              * At
-             * @description When it would begin, as of `POST /api/campaigns`.
+             * @description Intended time of the start, as in `POST /api/campaigns`.
              */
             at?: string | null;
             /**
              * Cron
-             * @description The same as a cron line.
+             * @description Cron line of the intended start, instead of `at`.
              */
             cron?: string | null;
             /**
              * Time Zone
-             * @description Of `at`, `cron` and `attendance`.
+             * @description Time zone of `at`, `cron` and `attendance`, such as Europe/Berlin.
              */
             time_zone?: string | null;
         };
@@ -4097,10 +4364,10 @@ export interface components {
             schedule_hash: string;
             /**
              * Visibility
-             * @description What the plan could and could not find.
+             * @description Which effects the plan could and could not detect; null: not requested.
              */
             visibility: components["schemas"]["Visibility"][] | null;
-            /** @description When it needs a person; null: the bench turns and switches the units itself. */
+            /** @description When the campaign needs a person; null: never, since the bench turns the units and switches them on and off itself. */
             attendance: components["schemas"]["AttendanceResponse"] | null;
             timeline: components["schemas"]["TimelineColumns"];
         };
@@ -4115,17 +4382,17 @@ export interface components {
             until_s: number[];
             /**
              * Accelerometer Deg
-             * @description Angle between gravity before and after, by the accelerometer.
+             * @description Angle between gravity before and after the move, from the accelerometer, deg.
              */
             accelerometer_deg: number[];
             /**
              * Gyro Deg
-             * @description The same by the gyro's rates, integrated.
+             * @description Angle between gravity before and after the move, from the integrated rates of the gyro, deg.
              */
             gyro_deg: number[];
             /**
              * Residual Deg
-             * @description Angle between gravity after the move by the gyro and by the accelerometer.
+             * @description Angle between gravity after the move from the gyro and from the accelerometer, deg.
              */
             residual_deg: number[];
         };
@@ -4161,7 +4428,7 @@ export interface components {
             model: components["schemas"]["ModelResponse"];
             /**
              * Axes
-             * @description axis -> coefficients with value, standard uncertainty u, and unit.
+             * @description For each axis: the coefficients with value, standard uncertainty u, and unit.
              */
             axes: {
                 [key: string]: components["schemas"]["AxisCoefficients"];
@@ -4170,47 +4437,47 @@ export interface components {
             validity: components["schemas"]["Validity"];
             /**
              * Warnings
-             * @description Errors of the data or the fit that are certain or probable, the certain ones first; empty where there are none.
+             * @description Certain and probable errors of the data or of the fit, the certain errors first; empty if there are none.
              */
             warnings: components["schemas"]["DataWarning"][];
             /**
              * Noise
-             * @description axis -> white noise and drift that the data were weighted by, deg/s.
+             * @description For each axis: white noise and drift that set the weights of the fit, deg/s.
              */
             noise: {
                 [key: string]: components["schemas"]["AxisNoiseJson"];
             };
-            /** @description Which thermometer was used, how the Earth's rate was treated. */
+            /** @description Which thermometer was used; whether the Earth's rate was subtracted. */
             environment: components["schemas"]["FitEnvironment"];
             /**
              * Reference Temperature C
-             * @description Temperature terms are centred on it.
+             * @description Zero point of temperature terms, deg C.
              */
             reference_temperature_c: number | null;
             /**
              * Recording
-             * @description The recording that it was fitted to.
+             * @description The recording that the model was fitted to.
              */
             recording: number | null;
-            /** @description Of a calibration by hand: rests, the accelerometer, moves, held-out moves. */
+            /** @description Only by hand: results for rests, accelerometer, moves, held-out moves. */
             poses: components["schemas"]["PosesJson"] | null;
             /**
              * Recordings
-             * @description All recordings that it was fitted to; `recording` is the newest of them.
+             * @description All recordings that the model was fitted to; `recording` is the newest of these.
              */
             recordings: number[];
-            /** @description Of several recordings: repeatability, agreement, each predicted by the others. */
+            /** @description Only for several: repeatability, agreement, each predicted by the others. */
             joint: components["schemas"]["JointJson"] | null;
             /**
              * Improved From
              * @description The version that was changed.
              */
             improved_from: number;
-            /** @description Errors of the version that was changed, fitted to the same recording. */
+            /** @description Errors of the model before the change, on the same recording, deg/s. */
             before: components["schemas"]["ErrorFigures"];
             /**
              * Plausible
-             * @description Effect -> the usual range, and whether it is inside.
+             * @description For each effect: its usual range, and whether the size is inside.
              */
             plausible: {
                 [key: string]: components["schemas"]["UsualRange"];
@@ -4248,7 +4515,7 @@ export interface components {
         ProfileColumns: {
             /**
              * Axis
-             * @description The output axis.
+             * @description The gyro axis whose output is compared.
              */
             axis: string[];
             /** Dataset */
@@ -4257,19 +4524,19 @@ export interface components {
             t_s: number[];
             /**
              * True Dps
-             * @description Rate of the table along the axis.
+             * @description Component of the table's rate along the axis, deg/s.
              */
             true_dps: number[];
             /** Output Dps */
             output_dps: number[];
             /**
              * Residual Dps
-             * @description Corrected minus true rate, as a consumer has it; null: without a version.
+             * @description Corrected rate minus true rate, as a user of the calibration obtains it, deg/s; null: no version is applied.
              */
             residual_dps: (number | null)[];
             /**
              * Followed Dps
-             * @description Corrected rate minus the true rate through the version's delay and bandwidth; null: it has none.
+             * @description Corrected rate minus the true rate filtered by the version's delay and bandwidth, deg/s; null: the version has neither.
              */
             followed_dps: (number | null)[];
         };
@@ -4288,12 +4555,12 @@ export interface components {
             position: string | null;
             /**
              * Turn Deg
-             * @description Of a turn by hand: its angle, positive counter-clockwise seen from above.
+             * @description Only for a turn by hand: angle to turn by, deg, positive counter-clockwise seen from above.
              */
             turn_deg: number | null;
             /**
              * Within S
-             * @description How long the answer is waited for, by the campaign's clock; null: no limit.
+             * @description Time within which the answer must arrive, s by the campaign's clock; null: no limit.
              */
             within_s: number | null;
         };
@@ -4325,6 +4592,21 @@ export interface components {
             by?: string;
         };
         /**
+         * RecalibrationResponse
+         * @description The campaign that the version in force is from: run again, it calibrates the unit again.
+         */
+        RecalibrationResponse: {
+            /**
+             * Recipe
+             * @description Recipe of that campaign as TOML text, for `POST /api/campaigns`.
+             */
+            recipe: string;
+            /** Name */
+            name: string;
+            /** Bench */
+            bench: string;
+        };
+        /**
          * RecipeResponse
          * @description A recipe that comes with labctl, and what it would take.
          */
@@ -4348,12 +4630,12 @@ export interface components {
             expected_s: number | null;
             /**
              * Refused
-             * @description Why this bench cannot do it; then there are no figures.
+             * @description Why this bench cannot run the recipe; steps, data sets and time are then null.
              */
             refused: string | null;
             /**
              * Remark
-             * @description Objections to it although the bench can do it.
+             * @description Objections to the recipe although the bench can run it.
              * @default
              */
             remark: string;
@@ -4382,7 +4664,7 @@ export interface components {
             kind: string;
             /**
              * Info
-             * @description Its `recording.toml`: unit, axes, bench, data sheet, notes.
+             * @description Content of the file `recording.toml`: unit, axes, bench, data sheet, notes.
              */
             info: {
                 [key: string]: components["schemas"]["JsonValue"];
@@ -4412,7 +4694,7 @@ export interface components {
             kind: string;
             /**
              * Campaign
-             * @description The campaign that made it; null: it was imported.
+             * @description The campaign that made the recording; null: the recording was imported.
              */
             campaign: number | null;
             /** Datasets */
@@ -4431,14 +4713,14 @@ export interface components {
             notes: string;
             /**
              * Motion
-             * @description What moved the unit: a table, nothing, turns, poses.
+             * @description How the unit was moved: at constant table rates, at rest, turned by known angles, along a rate profile, or by hand between poses.
              * @default rates
              * @enum {string}
              */
             motion: "rates" | "rest" | "turns" | "profile" | "poses";
             /**
              * Simulated Time
-             * @description `created_at` is of a simulated bench's clock.
+             * @description Whether `created_at` is by the clock of a simulated bench.
              * @default false
              */
             simulated_time: boolean;
@@ -4461,7 +4743,7 @@ export interface components {
             kind: string;
             /**
              * Info
-             * @description Its `recording.toml`: unit, axes, bench, data sheet, notes.
+             * @description Content of the file `recording.toml`: unit, axes, bench, data sheet, notes.
              */
             info: {
                 [key: string]: components["schemas"]["JsonValue"];
@@ -4476,7 +4758,7 @@ export interface components {
             readings: number;
             /**
              * Points
-             * @description Column -> one value per data set, or piece of a long one.
+             * @description For each column: one value per data set; a long data set is divided into pieces with one value each.
              */
             points: {
                 [key: string]: (number | null)[] | number[] | string[] | boolean[];
@@ -4588,7 +4870,7 @@ export interface components {
             t_s: (number | null)[];
             /**
              * N
-             * @description Number of readings of the data set; null: unknown.
+             * @description Number of readings in the data set; null: unknown.
              */
             n: (number | null)[];
             /**
@@ -4605,12 +4887,12 @@ export interface components {
             residual_dps: number[];
             /**
              * Floor Dps
-             * @description Standard deviation of this mean from noise only, deg/s.
+             * @description Standard deviation of the data set's mean due to noise alone, deg/s.
              */
             floor_dps: (number | null)[];
             /**
              * Over Floor
-             * @description Residual over floor, as in the map.
+             * @description Residual divided by the noise floor, as in the map.
              */
             over_floor: (number | null)[];
         };
@@ -4653,7 +4935,7 @@ export interface components {
             recording: number;
             /**
              * Recordings
-             * @description All recordings; `recording` is the newest.
+             * @description All recordings that the model is compared with; `recording` is the newest.
              */
             recordings: number[];
             columns: components["schemas"]["ResidualColumns"];
@@ -4665,44 +4947,44 @@ export interface components {
         RestColumns: {
             /**
              * Axis
-             * @description The output axis.
+             * @description The gyro axis whose output is compared.
              */
             axis: string[];
             /** Dataset */
             dataset: number[];
             /**
              * T S
-             * @description Since the recording began; null: not known.
+             * @description Time since the recording began, s; null: not known.
              */
             t_s: (number | null)[];
             /**
              * Temperature C
-             * @description null: there was no thermometer.
+             * @description Temperature, deg C; null: there was no thermometer.
              */
             temperature_c: (number | null)[];
             /**
              * Leg
-             * @description heating or cooling; empty where the temperature does not move.
+             * @description Whether the temperature rises (heating) or falls (cooling); empty where it is constant.
              */
             leg: string[];
             /**
              * Bias Dps
-             * @description Output minus the Earth's rate, which is 0 where the latitude is not known.
+             * @description Output minus the Earth's rate, deg/s; where the latitude is not known, nothing is subtracted.
              */
             bias_dps: number[];
             /**
              * U Dps
-             * @description Standard uncertainty of the mean by white noise; null: not known.
+             * @description Standard uncertainty of the mean due to white noise, deg/s; null: not known.
              */
             u_dps: (number | null)[];
             /**
              * Modelled Dps
-             * @description What the version subtracts there, with what it remembers; null: without a version.
+             * @description Error that the version subtracts, lag and hysteresis of the temperature included, deg/s; null: no version is applied.
              */
             modelled_dps: (number | null)[];
             /**
              * Residual Dps
-             * @description What it leaves; null: without a version.
+             * @description Bias that remains after the correction, deg/s; null: no version is applied.
              */
             residual_dps: (number | null)[];
         };
@@ -4748,7 +5030,7 @@ export interface components {
             reason?: string;
             /**
              * Power
-             * @description Whether the units were off meanwhile; absent: yes when the host was.
+             * @description Whether the units lost power during the interruption; default: `lost` if the computer was restarted meanwhile, else `kept`.
              */
             power?: ("lost" | "kept") | null;
         };
@@ -4763,7 +5045,7 @@ export interface components {
             reason: string;
             /**
              * Due Days
-             * @description Days until the unit is due again.
+             * @description Of a certification: days until the unit is due for its next calibration; 0: no date; absent: those of the recipe (`recalibrate_after_days`), else of the service ($LABCTL_DUE_DAYS), else no date.
              */
             due_days?: number | null;
         };
@@ -4787,29 +5069,29 @@ export interface components {
             kind: string[];
             /**
              * Start S
-             * @description From the beginning, if every step takes as long as expected.
+             * @description Start of the step, s from the beginning, if every step takes as long as expected.
              */
             start_s: number[];
             /** Expected S */
             expected_s: number[];
             /**
              * Temperature C
-             * @description Set point in force; null: none was set yet.
+             * @description Set point of the chamber during the step, deg C; null: none was set yet.
              */
             temperature_c: (number | null)[];
             /**
              * Rate Dps
-             * @description Of data sets; null: the table is at rest.
+             * @description Rate of the table in a data set, deg/s; null: the table is at rest.
              */
             rate_dps: (number | null)[];
             /**
              * Turn Deg
-             * @description Of turns by hand, positive counter-clockwise seen from above; null: no turn.
+             * @description Angle of a turn by hand, deg, positive counter-clockwise seen from above; null: no turn.
              */
             turn_deg: (number | null)[];
             /**
              * Position
-             * @description In which the units are; null: as they were found.
+             * @description Body axis of the units that points along the table axis (by hand: up); null: not yet turned by the campaign.
              */
             position: (string | null)[];
             /** Dataset */
@@ -4818,14 +5100,14 @@ export interface components {
             state: ("to come" | "running" | "done" | "failed" | "interrupted" | "skipped")[];
             /**
              * Started S
-             * @description Campaign time.
+             * @description Start of the step, s of campaign time; null: not yet started.
              */
             started_s: (number | null)[];
             /** Ended S */
             ended_s: (number | null)[];
             /**
              * Forecast S
-             * @description When it began, or will begin if the remaining steps take the expected time.
+             * @description Start of the step, s of campaign time: measured, or for steps to come forecast from the expected times.
              */
             forecast_s: number[];
         };
@@ -4842,7 +5124,7 @@ export interface components {
             readings: number;
             /**
              * Columns
-             * @description Column -> one value per reading, as many as were asked for.
+             * @description For each column: one value per reading, as many as were requested.
              */
             columns: {
                 [key: string]: (number | null)[] | number[] | string[] | boolean[];
@@ -4866,7 +5148,7 @@ export interface components {
             state: string;
             /**
              * Due At
-             * @description When it begins next, in its time zone; null when it is over.
+             * @description Time of the next start, in `time_zone`; null: no start is to come.
              */
             due_at: string | null;
             /** Time Zone */
@@ -4893,11 +5175,11 @@ export interface components {
             history: components["schemas"]["StartEventResponse"][];
             /**
              * Confirmed By
-             * @description Who confirmed that the bench will be clear; empty: a simulated bench, or not asked.
+             * @description Person who confirmed that the bench will be clear; empty: the bench is simulated, or no confirmation was requested.
              * @default
              */
             confirmed_by: string;
-            /** @description When the next start needs a person; null: never, or not known. */
+            /** @description When the next start needs a person at the bench; null: never, or not known. */
             attendance: components["schemas"]["AttendanceResponse"] | null;
         };
         /**
@@ -4931,13 +5213,13 @@ export interface components {
             readings: number;
             /**
              * Suggested Model
-             * @description A published model for such a recording.
+             * @description Name of a model that suits this kind of recording.
              * @default bias_scale
              */
             suggested_model: string;
             /**
              * Warnings
-             * @description Errors of the data or the fit that are certain or probable, the certain ones first; empty where there are none.
+             * @description Certain and probable errors of the data or of the fit, the certain errors first; empty if there are none.
              */
             warnings: components["schemas"]["DataWarning"][];
             /** Recipe */
@@ -4948,7 +5230,7 @@ export interface components {
             seed: number;
             /**
              * Hidden
-             * @description Effect -> size that is hidden in the unit.
+             * @description For each effect that is hidden in the unit: its size, in the unit of the catalogue's coefficient.
              */
             hidden: {
                 [key: string]: number;
@@ -4966,18 +5248,18 @@ export interface components {
             recipe: string;
             /**
              * Hide
-             * @description EFFECT, or EFFECT=SIZE in the catalogue's coefficient unit, or EFFECT=z10: ten noise units.
+             * @description Effects to hide in the unit: EFFECT, EFFECT=SIZE with SIZE in the unit of the catalogue's coefficient, or EFFECT=z10 for a signal of ten standard deviations of the noise.
              */
             hide?: string[];
             /**
              * Seed
-             * @description Same seed, same recording.
+             * @description Seed of the random numbers; the same seed gives the same recording.
              * @default 1
              */
             seed?: number;
             /**
              * Serial
-             * @description Of the unit; default: the simulated bench's.
+             * @description Serial number of the unit; default: the serial number in the simulated bench's file.
              */
             serial?: string | null;
             /**
@@ -5041,6 +5323,23 @@ export interface components {
             per_step_band?: (number | null)[];
         };
         /**
+         * StaticBiasResponse
+         * @description The mean output at rest before a mission (Ojeda et al. 2000, eqs. 1, 15 and 16); it contains the Earth's rate.
+         */
+        StaticBiasResponse: {
+            /** Bias Dps */
+            bias_dps: number;
+            /**
+             * U Dps
+             * @description Standard uncertainty: white noise of the mean, and the bias instability.
+             */
+            u_dps: number;
+            /** Readings */
+            readings: number;
+            /** Seconds */
+            seconds: number;
+        };
+        /**
          * StaticNoiseJson
          * @description Noise of one reading at rest, by axis.
          */
@@ -5077,7 +5376,7 @@ export interface components {
             temperature_c: number[];
             /**
              * Error Dps
-             * @description Output minus true rate: a row per temperature, one per rate in it.
+             * @description Output minus true rate, deg/s: one row per temperature, one value per rate in each row.
              */
             error_dps: number[][];
         };
@@ -5093,7 +5392,7 @@ export interface components {
             validity: components["schemas"]["Validity"];
             /**
              * Held
-             * @description Channels that the model needs besides: their means in its recording.
+             * @description Other channels that the model needs, held at their mean in the fit.
              */
             held: {
                 [key: string]: number;
@@ -5239,29 +5538,29 @@ export interface components {
             kind: string[];
             /**
              * Start S
-             * @description From the beginning, if every step takes as long as expected.
+             * @description Start of the step, s from the beginning, if every step takes as long as expected.
              */
             start_s: number[];
             /** Expected S */
             expected_s: number[];
             /**
              * Temperature C
-             * @description Set point in force; null: none was set yet.
+             * @description Set point of the chamber during the step, deg C; null: none was set yet.
              */
             temperature_c: (number | null)[];
             /**
              * Rate Dps
-             * @description Of data sets; null: the table is at rest.
+             * @description Rate of the table in a data set, deg/s; null: the table is at rest.
              */
             rate_dps: (number | null)[];
             /**
              * Turn Deg
-             * @description Of turns by hand, positive counter-clockwise seen from above; null: no turn.
+             * @description Angle of a turn by hand, deg, positive counter-clockwise seen from above; null: no turn.
              */
             turn_deg: (number | null)[];
             /**
              * Position
-             * @description In which the units are; null: as they were found.
+             * @description Body axis of the units that points along the table axis (by hand: up); null: not yet turned by the campaign.
              */
             position: (string | null)[];
             /** Dataset */
@@ -5284,12 +5583,12 @@ export interface components {
             until_s: number | null;
             /**
              * Raw
-             * @description Binned from the readings themselves; else from envelopes of each data set.
+             * @description true: the bins were computed from all readings; false: from the stored minimum, maximum and mean of sections of each data set.
              */
             raw: boolean;
             /**
              * T S
-             * @description Mean time of the bin's readings.
+             * @description Mean time of the readings in each bin, s.
              */
             t_s: number[];
             /** Min */
@@ -5302,7 +5601,7 @@ export interface components {
             n: number[];
             /**
              * Channels
-             * @description What can be asked for.
+             * @description All channels of the recording that have a trace.
              */
             channels: string[];
         };
@@ -5318,25 +5617,25 @@ export interface components {
              * Format: date-time
              */
             at: string;
-            /** @description The newest version of before; null: there was none. */
+            /** @description Error of the newest version fitted only to earlier recordings, deg/s; null: there is none, or it cannot be applied. */
             as_found: components["schemas"]["AppliedVersion"] | null;
-            /** @description The newest version fitted to it; null: none was. */
+            /** @description Error of the newest version fitted to this recording, deg/s; null: there is none, or it cannot be applied. */
             as_left: components["schemas"]["AppliedVersion"] | null;
             /**
              * Rms Dps
-             * @description Error of the version that the trend is of; null: not applicable.
+             * @description RMS error of the version that the trend compares with all recordings, deg/s; null: that version cannot be applied, see `why`.
              */
             rms_dps: number | null;
             /**
              * Axes
-             * @description axis -> what that version leaves of bias and scale factor.
+             * @description For each axis: bias and scale factor error that remain with the version that the trend compares.
              */
             axes: {
                 [key: string]: components["schemas"]["AxisPoint"];
             };
             /**
              * Why
-             * @description Why the version cannot be applied; empty where it can.
+             * @description Why the version cannot be applied to this recording; else empty.
              * @default
              */
             why: string;
@@ -5368,7 +5667,7 @@ export interface components {
         TurnColumns: {
             /**
              * Axis
-             * @description The output axis.
+             * @description The gyro axis whose output is compared.
              */
             axis: string[];
             /** Dataset */
@@ -5380,27 +5679,27 @@ export interface components {
             about: string[];
             /**
              * Asked Deg
-             * @description Angle that the output axis turned by.
+             * @description True angle that the output axis turned by, deg.
              */
             asked_deg: number[];
             /**
              * Output Deg
-             * @description Integral of the output as it is.
+             * @description Integral of the uncorrected output, deg.
              */
             output_deg: number[];
             /**
              * Corrected Deg
-             * @description Integral of the corrected rate; null: without a version.
+             * @description Integral of the corrected rate, deg; null: no version is applied.
              */
             corrected_deg: (number | null)[];
             /**
              * Residual Deg
-             * @description Corrected minus asked.
+             * @description `corrected_deg` minus `asked_deg`, deg.
              */
             residual_deg: (number | null)[];
             /**
              * U Deg
-             * @description Standard uncertainty of an integral minus the angle: angle, time stamps and noise; null: unknown.
+             * @description Standard uncertainty of the integral minus the true angle, from angle, time stamps and noise, deg; null: unknown.
              */
             u_deg: (number | null)[];
         };
@@ -5416,30 +5715,30 @@ export interface components {
             position: string;
             /**
              * Asked Deg
-             * @description Positive counter-clockwise seen from above.
+             * @description Angle that is requested, deg, positive counter-clockwise seen from above.
              */
             asked_deg: number;
             /**
              * Phase
-             * @description What the units are to do now.
+             * @description Whether the units must now be kept at rest (`rest`) or be turned (`turn`).
              * @enum {string}
              */
             phase: "rest" | "turn";
             /**
              * Attempt
-             * @description From 1; a turn that was refused is asked again.
+             * @description Number of this attempt, from 1; a turn that was refused is requested again.
              */
             attempt: number;
             /**
              * Came Deg
-             * @description Unit -> what has come out so far, by its nominal scale factor.
+             * @description For each unit: angle turned so far, deg, computed with the nominal scale factor.
              */
             came_deg: {
                 [key: string]: number;
             };
             /**
              * Refused
-             * @description Why the attempt before was refused; empty for the first.
+             * @description Why the previous attempt was refused; empty for the first.
              * @default
              */
             refused: string;
@@ -5451,17 +5750,17 @@ export interface components {
         UncertaintyGrid: {
             /**
              * Rate Dps
-             * @description Zero, the limits and half of them, as far as they are calibrated.
+             * @description Rates of the grid, deg/s: zero, the limits of the calibrated range, and half of each limit, if calibrated.
              */
             rate_dps: number[];
             /**
              * Temperature C
-             * @description Lowest, middle and highest.
+             * @description Lowest, middle and highest calibrated temperature, deg C.
              */
             temperature_c: number[];
             /**
              * Axes
-             * @description Axis -> a row for each temperature, in it one for each rate.
+             * @description For each axis: one row per temperature, one entry per rate in each row.
              */
             axes: {
                 [key: string]: components["schemas"]["AxisUncertainty"][][];
@@ -5484,14 +5783,14 @@ export interface components {
             coverage_factor: number;
             /**
              * Inside
-             * @description Whether rate and temperature are within what was calibrated.
+             * @description Whether rate and temperature are within the calibrated range.
              */
             inside: boolean;
             /** Axes */
             axes: {
                 [key: string]: components["schemas"]["AxisUncertainty"];
             };
-            /** @description Present where `grid` was requested. */
+            /** @description The uncertainty over the calibrated range; null unless `grid` was requested. */
             grid: components["schemas"]["UncertaintyGrid"] | null;
         };
         /**
@@ -5512,8 +5811,21 @@ export interface components {
             /** Certified Version */
             certified_version: number | null;
             /**
+             * Due
+             * @description Until when the version in force is valid; null: no date, or none is in force.
+             */
+            due: string | null;
+            /**
+             * Overdue
+             * @description Whether that date has passed.
+             * @default false
+             */
+            overdue: boolean;
+            /** @description Null: the version in force is not from a campaign. Only of one unit, or with `due_within`. */
+            recalibration: components["schemas"]["RecalibrationResponse"] | null;
+            /**
              * Formats
-             * @description Formats in which its calibrations are available.
+             * @description Formats in which the unit's calibrations are available.
              */
             formats: components["schemas"]["ExportFormatResponse"][];
         };
@@ -5546,7 +5858,7 @@ export interface components {
         Validity: {
             /**
              * Temperature C
-             * @description Lowest and highest of the readings, deg C; null: no thermometer, and no law of temperature.
+             * @description Lowest and highest measured temperature, deg C; null: not measured, and no term depends on it.
              */
             temperature_c: [
                 number | null,
@@ -5554,7 +5866,7 @@ export interface components {
             ];
             /**
              * Rate Dps
-             * @description Lowest and highest true rate, deg/s; null: no limit, nothing of the model depends on the rate.
+             * @description Lowest and highest true rate, deg/s; null: no limit, no term of the model depends on the rate.
              */
             rate_dps: [
                 number | null,
@@ -5587,14 +5899,14 @@ export interface components {
             datasets: number;
             /**
              * Rms Dps
-             * @description Over data sets and axes.
+             * @description Root mean square of the error over data sets and axes, deg/s.
              */
             rms_dps: number;
             /** Max Dps */
             max_dps: number;
             /**
              * Bias Dps
-             * @description Mean over data sets and axes.
+             * @description Mean of the error over data sets and axes, deg/s.
              */
             bias_dps: number;
             /** Axes */
@@ -5603,17 +5915,17 @@ export interface components {
             };
             /**
              * Outside Validity
-             * @description Data sets outside the version's rates or temperatures.
+             * @description Number of data sets outside the rates or temperatures of the calibration.
              */
             outside_validity: number;
             /**
              * Expected Dps
-             * @description Error that the version states: held-out, or of its own data where that is larger; null: unknown.
+             * @description Error that is expected of the version, deg/s: the larger of its held-out error and its error on the data of the fit; null: unknown.
              */
             expected_dps: number | null;
             /**
              * Ok
-             * @description Whether the error is at most twice the expected one.
+             * @description Whether `rms_dps` is at most twice `expected_dps`.
              */
             ok: boolean;
         };
@@ -5627,7 +5939,7 @@ export interface components {
             model: components["schemas"]["ModelResponse"];
             /**
              * Axes
-             * @description axis -> coefficients with value, standard uncertainty u, and unit.
+             * @description For each axis: the coefficients with value, standard uncertainty u, and unit.
              */
             axes: {
                 [key: string]: components["schemas"]["AxisCoefficients"];
@@ -5636,42 +5948,42 @@ export interface components {
             validity: components["schemas"]["Validity"];
             /**
              * Warnings
-             * @description Errors of the data or the fit that are certain or probable, the certain ones first; empty where there are none.
+             * @description Certain and probable errors of the data or of the fit, the certain errors first; empty if there are none.
              */
             warnings: components["schemas"]["DataWarning"][];
             /**
              * Noise
-             * @description axis -> white noise and drift that the data were weighted by, deg/s.
+             * @description For each axis: white noise and drift that set the weights of the fit, deg/s.
              */
             noise: {
                 [key: string]: components["schemas"]["AxisNoiseJson"];
             };
-            /** @description Which thermometer was used, how the Earth's rate was treated. */
+            /** @description Which thermometer was used; whether the Earth's rate was subtracted. */
             environment: components["schemas"]["FitEnvironment"];
             /**
              * Reference Temperature C
-             * @description Temperature terms are centred on it.
+             * @description Zero point of temperature terms, deg C.
              */
             reference_temperature_c: number | null;
             /**
              * Recording
-             * @description The recording that it was fitted to.
+             * @description The recording that the model was fitted to.
              */
             recording: number | null;
-            /** @description Of a calibration by hand: rests, the accelerometer, moves, held-out moves. */
+            /** @description Only by hand: results for rests, accelerometer, moves, held-out moves. */
             poses: components["schemas"]["PosesJson"] | null;
             /**
              * Recordings
-             * @description All recordings that it was fitted to; `recording` is the newest of them.
+             * @description All recordings that the model was fitted to; `recording` is the newest of these.
              */
             recordings: number[];
-            /** @description Of several recordings: repeatability, agreement, each predicted by the others. */
+            /** @description Only for several: repeatability, agreement, each predicted by the others. */
             joint: components["schemas"]["JointJson"] | null;
             /** Version */
             version: number;
             /**
              * Campaign
-             * @description The campaign of the recording; null: it was imported.
+             * @description Campaign that made the recording; null: imported.
              */
             campaign: number | null;
             /** Recipe */
@@ -5695,8 +6007,14 @@ export interface components {
              * @description Date until which the certification is valid; null: no date.
              */
             due: string | null;
-            /** @description The newest act on this version; null: there was none. */
+            /** @description The newest certification or revocation of this version; null: there was none. */
             certification: components["schemas"]["CertificationResponse"] | null;
+            /**
+             * Rate Reference
+             * @description What the rates of its recordings were known from; empty: not known.
+             * @default
+             */
+            rate_reference: string;
             /**
              * Left Out
              * @description Effects of the fit that are not exported, each with its RMS, deg/s.
@@ -5704,7 +6022,7 @@ export interface components {
             left_out: components["schemas"]["LeftOut"][];
             /**
              * Remembers
-             * @description What follows the temperature from sample to sample in use: the state.
+             * @description Lags and plays to be updated with the temperature of every sample.
              */
             remembers: components["schemas"]["Follower"][];
             /** Parent */
@@ -5755,7 +6073,7 @@ export interface components {
             share: number;
             /**
              * Smallest Size
-             * @description Just detectable, in the effect's unit.
+             * @description Smallest size of the effect that the plan can detect, in `unit`.
              */
             smallest_size: number | null;
             /**
@@ -5858,7 +6176,10 @@ export interface operations {
     };
     units_api_units_get: {
         parameters: {
-            query?: never;
+            query?: {
+                /** @description Only units that are due within this span: 30d, 12h, 2w. */
+                due_within?: string | null;
+            };
             header?: never;
             path?: never;
             cookie?: never;
@@ -5872,6 +6193,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["UnitResponse"][];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
                 };
             };
         };
@@ -5910,9 +6240,9 @@ export interface operations {
     trend_api_units__serial__trend_get: {
         parameters: {
             query?: {
-                /** @description Version compared with all recordings; default: the first. */
+                /** @description Version that is compared with all recordings of the unit; default: the first. */
                 version?: number | null;
-                /** @description Limit of the bias, deg/s; default: twice the error that it states. */
+                /** @description Largest bias that is acceptable, deg/s; default: twice the error that the calibration states. */
                 limit_dps?: number | null;
             };
             header?: never;
@@ -6018,6 +6348,41 @@ export interface operations {
             };
         };
     };
+    check_api_benches__bench__check_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                bench: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["CheckRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["BenchCheckResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
     effects_api_effects_get: {
         parameters: {
             query?: never;
@@ -6041,10 +6406,12 @@ export interface operations {
     calibration_api_units__serial__calibration_get: {
         parameters: {
             query?: {
-                /** @description A version; default: the certified one (404 without). */
+                /** @description Version; default: the certified version (404 if there is none). */
                 version?: number | null;
-                /** @description json, c ... */
+                /** @description Format of the file, such as json or c; `GET /api/units/{serial}` lists the formats. */
                 format?: string;
+                /** @description Option of the format, as KEY=VALUE; may be repeated. */
+                option?: string[] | null;
             };
             header?: {
                 "if-none-match"?: string | null;
@@ -6208,75 +6575,12 @@ export interface operations {
             };
         };
     };
-    certifications_api_units__serial__certifications_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                serial: string;
-            };
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["CertificationResponse"][];
-                };
-            };
-            /** @description Validation Error */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["HTTPValidationError"];
-                };
-            };
-        };
-    };
-    assessment_api_units__serial__calibrations__version__assessment_get: {
-        parameters: {
-            query?: never;
-            header?: never;
-            path: {
-                serial: string;
-                version: number;
-            };
-            cookie?: never;
-        };
-        requestBody?: never;
-        responses: {
-            /** @description Successful Response */
-            200: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["AssessmentResponse"];
-                };
-            };
-            /** @description Validation Error */
-            422: {
-                headers: {
-                    [name: string]: unknown;
-                };
-                content: {
-                    "application/json": components["schemas"]["HTTPValidationError"];
-                };
-            };
-        };
-    };
     verification_api_units__serial__calibrations__version__verification_get: {
         parameters: {
             query?: {
                 /** @description Recording; default: the unit's newest. */
                 recording?: number | null;
-                /** @description Accept a recording of another unit. */
+                /** @description Accept a recording of another unit than the one in the address. */
                 other_unit?: boolean;
             };
             header?: never;
@@ -6313,9 +6617,9 @@ export interface operations {
             query?: {
                 /** @description Recording; default: the unit's newest. */
                 recording?: number | null;
-                /** @description Several recordings of the unit as one; instead of `recording`. */
+                /** @description Several recordings of the unit, used together; instead of `recording`. */
                 recordings?: number[] | null;
-                /** @description Accept a recording of another unit. */
+                /** @description Accept a recording of another unit than the one in the address. */
                 other_unit?: boolean;
                 /** @description Your own effects to include in the comparison: 'name: expr'. */
                 formula?: string[] | null;
@@ -6354,9 +6658,9 @@ export interface operations {
             query?: {
                 /** @description Recording; default: the unit's newest. */
                 recording?: number | null;
-                /** @description Several recordings of the unit as one; instead of `recording`. */
+                /** @description Several recordings of the unit, used together; instead of `recording`. */
                 recordings?: number[] | null;
-                /** @description Accept a recording of another unit. */
+                /** @description Accept a recording of another unit than the one in the address. */
                 other_unit?: boolean;
                 /** @description Your own effects to include in the comparison: 'name: expr'. */
                 formula?: string[] | null;
@@ -6395,7 +6699,7 @@ export interface operations {
             query?: {
                 /** @description Recording; default: the unit's newest. */
                 recording?: number | null;
-                /** @description Several recordings of the unit as one; instead of `recording`. */
+                /** @description Several recordings of the unit, used together; instead of `recording`. */
                 recordings?: number[] | null;
             };
             header?: never;
@@ -6467,9 +6771,9 @@ export interface operations {
             query?: {
                 /** @description Recording; default: the unit's newest. */
                 recording?: number | null;
-                /** @description Several recordings of the unit as one; instead of `recording`. */
+                /** @description Several recordings of the unit, used together; instead of `recording`. */
                 recordings?: number[] | null;
-                /** @description Accept a recording of another unit. */
+                /** @description Accept a recording of another unit than the one in the address. */
                 other_unit?: boolean;
             };
             header?: never;
@@ -6575,11 +6879,11 @@ export interface operations {
     uncertainty_api_units__serial__calibrations__version__uncertainty_get: {
         parameters: {
             query: {
-                /** @description True rate about each axis in turn, deg/s. */
+                /** @description True rate for which the uncertainty is computed, about one axis after the other, deg/s. */
                 rate_dps: number;
-                /** @description The gyro's thermometer, deg C. */
+                /** @description Temperature by the gyro's thermometer, deg C. */
                 temperature_c: number;
-                /** @description Also on a small grid over the calibrated range. */
+                /** @description Also compute the uncertainty on a small grid over the calibrated range. */
                 grid?: boolean;
             };
             header?: never;
@@ -6614,7 +6918,7 @@ export interface operations {
     ladder_api_units__serial__ladder_get: {
         parameters: {
             query?: {
-                /** @description Recording; default: that of the newest version. */
+                /** @description Recording whose versions are listed; default: the recording that the newest version was fitted to. */
                 recording?: number | null;
             };
             header?: never;
@@ -6632,6 +6936,69 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["LadderResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    certifications_api_units__serial__certifications_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                serial: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CertificationResponse"][];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    assessment_api_units__serial__calibrations__version__assessment_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                serial: string;
+                version: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["AssessmentResponse"];
                 };
             };
             /** @description Validation Error */
@@ -7070,7 +7437,7 @@ export interface operations {
     schedule_api_schedule_get: {
         parameters: {
             query?: {
-                /** @description Also entries that have ended. */
+                /** @description List entries that have ended too. */
                 ended?: boolean;
             };
             header?: never;
@@ -7381,7 +7748,7 @@ export interface operations {
     recording_api_recordings__recording__get: {
         parameters: {
             query?: {
-                /** @description With the means of its data sets. */
+                /** @description Include the means of the data sets in the response. */
                 points?: boolean;
             };
             header?: never;
@@ -7446,13 +7813,13 @@ export interface operations {
     trace_api_recordings__recording__trace_get: {
         parameters: {
             query: {
-                /** @description Such as gyro_x or temperature_c. */
+                /** @description Name of the channel, such as gyro_x or temperature_c. */
                 channel: string;
-                /** @description Window, in seconds of the recording; default: all. */
+                /** @description Beginning of the window, s since the recording began; default: the first reading. */
                 from_s?: number | null;
-                /** @description Its end. */
+                /** @description End of the window, s since the recording began; default: the last reading. */
                 until_s?: number | null;
-                /** @description At most this many bins. */
+                /** @description Largest number of bins. */
                 points?: number;
             };
             header?: never;
@@ -7486,7 +7853,7 @@ export interface operations {
     allan_api_recordings__recording__allan_get: {
         parameters: {
             query?: {
-                /** @description A data set; default: the longest section at rest. */
+                /** @description Number of the data set to use; default: the longest section at rest. */
                 dataset?: number | null;
             };
             header?: never;
@@ -7517,10 +7884,52 @@ export interface operations {
             };
         };
     };
+    orientation_api_recordings__recording__orientation_get: {
+        parameters: {
+            query?: {
+                /** @description x, y or z; default: the only one. */
+                axis?: string | null;
+                /** @description Calibration that corrects it; 0: none; default: the certified one, if any. */
+                version?: number | null;
+                /** @description At rest so long at first: its static bias is taken off, s. */
+                rest_s?: number;
+                /** @description Bias instability, for the uncertainty. */
+                instability_dps?: number;
+                /** @description Hold the angle and learn the offset at standstill. */
+                standstill?: boolean;
+            };
+            header?: never;
+            path: {
+                recording: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["OrientationResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
     file_api_recordings__recording__file_get: {
         parameters: {
             query?: {
-                /** @description Format of the tables in the zip. */
+                /** @description Format of the tables in the zip file. */
                 format?: "parquet" | "csv";
             };
             header?: never;
@@ -7554,7 +7963,7 @@ export interface operations {
             query: {
                 /** @description Number of the data set. */
                 dataset: number;
-                /** @description At most this many readings. */
+                /** @description Largest number of readings in the response. */
                 limit?: number;
             };
             header?: never;
@@ -7621,7 +8030,7 @@ export interface operations {
             query?: {
                 /** @description Recording; default: the unit's newest. */
                 recording?: number | null;
-                /** @description Accept a recording of another unit. */
+                /** @description Accept a recording of another unit than the one in the address. */
                 other_unit?: boolean;
             };
             header?: never;
@@ -7744,9 +8153,9 @@ export interface operations {
     audit_api_audit_get: {
         parameters: {
             query?: {
-                /** @description Only rows from this instant on; without a time zone: UTC. */
+                /** @description Only rows from this instant on, ISO 8601; an instant without a time zone is UTC. */
                 since?: string | null;
-                /** @description Rows with a number above this one. */
+                /** @description Only rows whose number is larger than this. */
                 after?: number;
                 /** @description At most this many rows. */
                 limit?: number;

@@ -96,19 +96,46 @@ def test_an_unknown_uncertainty_has_its_reason(client: TestClient) -> None:
     cells = [answer["axes"]["z"], *(cell for row in answer["grid"]["axes"]["z"] for cell in row)]
     for cell in cells:
         assert {cell[name] for name in cell if name.endswith("_dps")} == {None}
-        assert cell["unknown"]["coefficients"] == "published coefficients state none"
+        assert cell["unknown"]["coefficients"] == "published coefficients come without uncertainties"
         assert set(cell["unknown"]) == {"coefficients", "model", "repeatability"}
 
 
 def test_a_unit_names_every_format_of_the_registry(fog: TestClient, monkeypatch: pytest.MonkeyPatch) -> None:
     register(monkeypatch, FORMATS, "text", Format("Plain text", "text/plain", "txt", Calibration.to_bytes))
-    assert fog.get("/api/units/OSU-FOG-2024").json()["formats"] == [
-        {"id": "json", "title": "JSON", "suffix": "json"},
-        {"id": "c", "title": "C header", "suffix": "h"},
-        {"id": "text", "title": "Plain text", "suffix": "txt"},
-    ]
+    formats = {each["id"]: each for each in fog.get("/api/units/OSU-FOG-2024").json()["formats"]}
+    assert next(iter(formats)) == "json"
+    assert {"c", "c-q31", "python", "table-csv", "px4", "ardupilot", "kalibr", "ros2-imu"} < set(formats)
+    assert formats["c"] == {"id": "c", "title": "C header", "suffix": "h", "options": {}}
+    assert formats["text"] == {"id": "text", "title": "Plain text", "suffix": "txt", "options": {}}
+    assert list(formats["px4"]["options"]) == ["device_id", "instance", "tolerance_dps"]
     got = fog.get("/api/units/OSU-FOG-2024/calibration", params={"version": 1, "format": "text"})
     assert got.headers["content-type"].startswith("text/plain")
+
+
+def test_what_an_export_loses_is_in_the_answer(client: TestClient) -> None:
+    assert upload(client, EXAMPLES / "freeimu-warmup").status_code == 201
+    unit = "/api/units/FREEIMU-2014"
+    assert client.post(f"{unit}/calibrations", json={"model": "bias_temperature"}).status_code == 201
+    asked = {"version": 1, "format": "px4"}
+    got = client.get(f"{unit}/calibration", params={**asked, "option": ["device_id=77", "tolerance_dps=9"]})
+    assert got.status_code == 200
+    assert "TC_G0_ID\t77\t6" in got.text
+    lost = got.headers.get_list("X-Labctl-Lost")
+    assert lost[0] == "scale factor and misalignment are not in this calibration"
+    assert all(f"# LOST {line}." in got.text for line in lost)
+    plain = client.get(f"{unit}/calibration", params=asked)
+    assert plain.headers["etag"] != got.headers["etag"]
+    again = client.get(f"{unit}/calibration", params=asked, headers={"If-None-Match": plain.headers["etag"]})
+    assert again.status_code == 304
+    for options, said in (
+        (["imu=1"], "option 'imu' is not known; options of this format: device_id, instance, tolerance_dps"),
+        (["device_id"], "option 'device_id': give each option once, as KEY=VALUE"),
+    ):
+        refused = client.get(f"{unit}/calibration", params={**asked, "option": options})
+        assert refused.status_code == 400
+        assert said in refused.json()["detail"]
+    silent = client.get(f"{unit}/calibration", params={"version": 1, "format": "kalibr"})
+    assert "noise_dps_rthz of FREEIMU-2014 is not known" in silent.json()["detail"]
 
 
 def test_import_fit_certify_fetch(fog: TestClient) -> None:

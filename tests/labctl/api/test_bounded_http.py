@@ -109,7 +109,7 @@ def test_a_header_that_drips_has_no_more_time(server: BoundedServer) -> None:
 
 def test_a_body_that_stalls_is_closed(server: BoundedServer) -> None:
     with server.connect(POST + b"half") as client:
-        assert b"nothing of the request's body came for 0.6 s" in rest_of(client)
+        assert b"no part of the request's body arrived for 0.6 s" in rest_of(client)
     with server.connect(POST) as client:
         for _ in range(50):
             client.sendall(b"aa")

@@ -32,7 +32,7 @@ def by_motion(client: TestClient, recording: Recording, **fit: Any) -> tuple[dic
     plain = client.get(f"/api/recordings/{number}/motion").json()
     found = client.get(f"/api/units/{serial}/calibrations/1/motion").json()
     assert (plain["version"], found["version"], found["recording"]) == (None, 1, number)
-    assert found["source"] == f"version 1 without refitting, on recording {number}, which it was fitted to"
+    assert found["source"] == f"version 1 without refitting, on recording {number}, which the version was fitted to"
     return plain, found
 
 
@@ -154,7 +154,7 @@ def test_a_move_in_poses_has_the_angle_that_was_simulated(client: TestClient) ->
     left = client.get(by_hand).json()["left_out"]
     assert [each["effect"] for each in left] == ["g_sensitivity", "cross_g_sensitivity"]
     used = client.get(f"{by_hand}/uncertainty", params={"rate_dps": 10, "temperature_c": 25}).json()
-    assert used["axes"]["x"]["unknown"]["model"].startswith("turns between rests have no rate of their own")
+    assert used["axes"]["x"]["unknown"]["model"].startswith("the rate during turns between rests is not known")
 
 
 def test_a_recording_at_constant_rates_is_refused_in_one_sentence(client: TestClient) -> None:

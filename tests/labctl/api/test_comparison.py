@@ -118,7 +118,7 @@ def test_another_recording_is_compared_with_the_version_as_it_is(
     client.post(PATH, json={"model": "yang2018", "recording": 1})
     own, other = (compared(client, recording=number) for number in (1, 2))
     assert (own["fitted_to"], other["fitted_to"]) == (1, 1)
-    assert "which it was not fitted to" in other["source"]
+    assert "which the version was not fitted to" in other["source"]
     assert own["over_rate"][0]["error_dps"][0][0] == pytest.approx(other["over_rate"][0]["error_dps"][0][0], abs=0.01)
     refitted = client.get(f"{PATH}/1/residuals", params={"recording": 2}).json()["columns"]["residual_dps"]
     applied = other["columns"]["residual_dps"]

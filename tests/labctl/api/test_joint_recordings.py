@@ -48,7 +48,7 @@ def test_a_version_is_compared_with_every_data_set_of_several_recordings(unit: T
     path = f"{UNIT}/calibrations/1/comparison"
     both = unit.get(path, params={"recordings": [1, 2]}).json()
     assert (both["recording"], both["recordings"]) == (2, [1, 2])
-    assert both["source"] == "version 1 without refitting, on recordings 1 and 2, which it was fitted to"
+    assert both["source"] == "version 1 without refitting, on recordings 1 and 2, which the version was fitted to"
     columns = both["columns"]
     assert columns["recording"] == [1] * 45 + [2] * 45
     assert columns["dataset"] == 2 * list(range(1, 46))
@@ -66,4 +66,4 @@ def test_a_version_is_compared_with_every_data_set_of_several_recordings(unit: T
 def test_one_recording_and_other_recordings_are_refused_together(unit: TestClient) -> None:
     refused = unit.post(f"{UNIT}/calibrations", json={"recording": 1, "recordings": [1, 2], "effects": EFFECTS})
     assert refused.status_code == 400
-    assert "say one of the two" in refused.json()["detail"]
+    assert "give one of the two" in refused.json()["detail"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,7 @@ FOG = "/api/units/OSU-FOG-2024"
 
 
 @pytest.fixture
-def fog(client: TestClient) -> TestClient:
+def fog(client: TestClient, shared_answers: Path) -> TestClient:
     files = [path for path in (EXAMPLES / "osu-fog").iterdir() if path.suffix in {".toml", ".csv"}]
     sent = client.post("/api/recordings", files=[("files", (path.name, path.read_bytes())) for path in files])
     assert sent.status_code == 201

@@ -29,7 +29,7 @@ def test_nothing_is_kept_before_the_map_is_accepted(lab: Lab, log: Path) -> None
     refused = lab.run("import", str(log), status=2)
     assert "temperature_c" in refused.stdout
     assert "motion rest" in refused.stdout
-    assert "add --accept-map to import by it" in refused.stderr
+    assert "add --accept-map to import with this map" in refused.stderr
     assert not (lab.folder / "lab.sqlite").exists()
     taken = lab.run("import", str(log), "--accept-map")
     assert "recording 1 of chamber: 1 data sets, 400 readings" in taken.stdout
@@ -91,7 +91,7 @@ def test_one_problem_is_one_line(lab: Lab, tmp_path: Path) -> None:
     log = tmp_path / "flight.csv"
     log.write_text(csv_text(moved()), encoding="utf-8")
     (line,) = lab.run("import", str(log), "--accept-map", status=2).stderr.strip().splitlines()
-    assert "free motion without a reference is no calibration data; what would do is" in line
+    assert "free motion without a reference cannot calibrate a gyro; add" in line
 
 
 def test_a_template_is_printed(lab: Lab) -> None:

@@ -84,4 +84,4 @@ def test_a_rest_with_a_latitude_needs_the_position(lab: Lab) -> None:
     table = (folder / "samples.csv").read_text().replace("position", "note")
     (folder / "samples.csv").write_text(table)
     refused = lab.run("import", str(folder), status=2)
-    assert "column 'position' is missing, and latitude_deg = 48" in refused.stderr
+    assert "column 'position' is missing" in refused.stderr

@@ -184,7 +184,9 @@ def test_gravity_is_fitted_where_both_ways_up_rested(turned: Recording) -> None:
 
 @pytest.mark.parametrize("effect", ["scale_factor_odd", "scale_factor_asymmetry", "dead_band", "saturation"])
 def test_what_needs_the_rate_at_each_instant_is_refused(turned: Recording, effect: str) -> None:
-    with pytest.raises(NotEnoughData, match=f"{effect} needs the rate at each instant, and of a turn only the mean"):
+    with pytest.raises(
+        NotEnoughData, match=f"{effect} needs the rate at each instant, but only the mean rate of a turn"
+    ):
         fit(turned, None, ["bias", "scale_factor", effect])
 
 

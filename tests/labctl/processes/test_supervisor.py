@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import signal
 import socket
+import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -144,3 +146,14 @@ def test_a_process_that_ends_again_and_again_ends_the_service(tmp_path: Path, mo
     assert holder_of(location) is None
     with pytest.raises(ProcessLookupError):
         os.kill(reported[0].bench_pid, 0)
+
+
+@pytest.mark.parametrize("module", ["bench_process", "web_process"])
+def test_a_process_whose_supervisor_ends_before_it_sends_settings_ends_without_a_word(module: str) -> None:
+    ours, theirs = socket.socketpair()
+    with theirs:
+        command = [sys.executable, "-m", f"labctl.processes.{module}", str(theirs.fileno())]
+        process = subprocess.Popen(command, pass_fds=[theirs.fileno()], stderr=subprocess.PIPE, text=True)
+    ours.close()
+    _, said = process.communicate(timeout=120)
+    assert (process.returncode, said) == (1, "")

@@ -93,7 +93,7 @@ def test_what_is_no_turn_is_refused(columns: dict[str, object], message: str) ->
 def test_means_of_turns_need_their_length() -> None:
     info = INFO.model_copy(update={"kind": "points"})
     columns = {"dataset": np.array([1, 2]), "turn_deg": np.array([0.0, 360.0]), "gyro_z": np.array([0.1, 72.1])}
-    with pytest.raises(BadRecording, match="'gyro_z_std' is missing; it says how much better"):
+    with pytest.raises(BadRecording, match="'gyro_z_std' is missing; the weights of rests and turns"):
         checked(Path("turns.csv"), info, {**columns, "n": np.array([9, 9]), "duration_s": np.array([5.0, 5.0])})
     columns |= {"n": np.array([500, 500]), "gyro_z_std": np.array([0.1, 60.0])}
     with pytest.raises(BadRecording, match="'duration_s' is missing"):

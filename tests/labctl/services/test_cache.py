@@ -9,9 +9,10 @@ from pathlib import Path
 
 import pytest
 
+from labctl.recording import to_points, write_recording
 from labctl.services import cache as result_cache
 from labctl.services.cache import RecentResults, cached, cached_group
-from labctl.services.criticism import measurements
+from labctl.services.criticism import evaluation, measurements
 from labctl.services.schemas.base import ResponseModel
 from labctl.services.schemas.calibrations import LadderResponse
 from labctl.services.schemas.certification import CertificationResponse
@@ -169,3 +170,19 @@ def test_of_results_in_memory_only_those_used_last_stay() -> None:
     for question in "abacbc":
         assert ask(question) == question
     assert made == ["a", "b", "c", "b"]
+
+
+def test_a_fit_of_the_same_readings_at_another_time_is_criticised_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    write_recording(to_points(single_axis(1)), tmp_path / "in")
+    answers, hashes = [], set()
+    for place in ("first", "second"):
+        (tmp_path / place).mkdir()
+        lab = Lab(tmp_path / place)
+        lab.run("import", str(tmp_path / "in"))
+        hashes.add(lab.json("fit", "FOG-0001", "--model", "bias_scale")["hash"])
+        answers.append(lab.json("criticise", "FOG-0001"))
+        monkeypatch.setattr(evaluation, "criticise", None)
+    assert len(hashes) == 2
+    assert answers[0] == answers[1]

@@ -75,12 +75,12 @@ def test_a_version_worse_than_its_parent_or_than_the_one_in_force_is_refused(lab
     lab.run("fit", FOG, "--effects", "bias,scale_factor,scale_factor_odd")
     lab.run("improve", FOG, "--remove", "scale_factor_odd")
     said = lab.run("certify", FOG, "2", *BY, "--reason", "fits", status=2).stderr
-    assert "of version 1, which it was made from, on the same recording" in said
+    assert "version 1, from which it was made" in said
     assert "certify version 1, or improve this version" in said
     lab.run("fit", FOG, "--model", "ojeda2000")
     lab.run("certify", FOG, "3", *BY, "--reason", "fits")
     said = lab.run("certify", FOG, "2", *BY, "--reason", "fits", status=2).stderr
-    assert "is worse than the 0.0512 deg/s of version 3, which is in force, on the same recording" in said
+    assert "is larger than the 0.0512 deg/s of version 3, which is in force, on the same recording" in said
 
 
 def test_a_table_of_coefficients_has_no_verdict_and_a_reason(lab: Lab) -> None:
@@ -171,5 +171,5 @@ def test_a_version_whose_fit_was_worse_than_none_is_refused(lab: Lab, monkeypatc
         monkeypatch.setattr(store.calibrations, "get", lambda *_: spoilt_row)
         (objection,) = assess(store, FOG, 1).objections
     assert objection.what == "worse"
-    assert "residual on the data of the fit is 109.4 deg/s RMS" in objection.text
+    assert "residual of the model on the data of the fit is 109.4 deg/s RMS" in objection.text
     assert "104.9 deg/s" in objection.text

@@ -60,7 +60,7 @@ def test_certainly_wrong_data_are_refused_in_one_line_unless_accepted(
     before = lab.content()
     refused = lab.run("fit", FOG, "--model", "ojeda2000", status=2).stderr
     assert refused.count("\n") == 1
-    assert "data set 65, axis z: its rate is 60 deg/s, its output says 79.8" in refused
+    assert "data set 65, axis z: the rate is given as 60 deg/s, but the output shows 79.8" in refused
     assert "--accept-warnings" in refused
     assert lab.content() == before
     accepted = lab.json("fit", FOG, "--model", "ojeda2000", "--accept-warnings")
@@ -153,7 +153,7 @@ def test_a_fit_that_is_worse_than_none_is_certainly_wrong() -> None:
     (little,) = worse_than_raw(figures(2.0, 2.01))
     (much,) = worse_than_raw(figures(104.9, 109.4))
     assert (little.severity, much.severity) == ("certain", "certain")
-    assert "residual on the data of the fit is 109.4 deg/s RMS" in much.text
+    assert "residual of the model on the data of the fit is 109.4 deg/s RMS" in much.text
 
 
 def test_a_fit_that_is_worse_than_none_is_refused_with_its_figures_and_not_kept(
@@ -168,8 +168,8 @@ def test_a_fit_that_is_worse_than_none_is_refused_with_its_figures_and_not_kept(
     monkeypatch.setattr(fitting, "fit", worse_fit)
     before = lab.content()
     refused = lab.run("fit", FOG, "--model", "ojeda2000", status=2).stderr
-    assert "its residual on the data of the fit is 109.4 deg/s RMS" in refused
-    assert "the error without correction is 104.9 deg/s" in refused
+    assert "the residual of the model on the data of the fit is 109.4 deg/s RMS" in refused
+    assert "the error without correction is only 104.9 deg/s" in refused
     assert "--accept-warnings" in refused
     assert lab.content() == before
     accepted = lab.json("fit", FOG, "--model", "ojeda2000", "--accept-warnings")

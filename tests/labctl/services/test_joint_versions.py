@@ -56,7 +56,7 @@ def test_a_criticism_and_a_change_of_several_recordings(lab: Lab) -> None:
     assert again["recordings"] == [3]
 
 
-@pytest.mark.parametrize(("given", "said"), [("1,x", "'x' is no number"), ("1,99", "recording 99"), ("", "'' is no")])
+@pytest.mark.parametrize(("given", "said"), [("1,x", "'x' is not a rec"), ("1,99", "recording 99"), ("", "'' is no")])
 def test_recordings_that_are_none_are_refused_in_one_line(lab: Lab, given: str, said: str) -> None:
     result = lab.run("fit", "J-1", "--recording", given, "--effects", "bias", status=2)
     assert said in result.stderr

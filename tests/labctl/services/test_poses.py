@@ -91,9 +91,9 @@ def test_a_version_is_verified_by_its_own_and_by_another_units_session(lab: Lab)
 @pytest.mark.parametrize(
     ("command", "said"),
     [
-        (("criticise", HAND, "--version", "1", "--recording", "1"), "of a recording in poses no rate is known"),
-        (("improve", HAND, "--version", "1", "--recording", "1", "--add", "bias_drift"), "in poses no rate is known"),
-        (("fit", HAND, "--recording", "1", "--model", "yang2018"), "fitted by --model poses alone"),
+        (("criticise", HAND, "--version", "1", "--recording", "1"), "in a recording of poses no rate is known"),
+        (("improve", HAND, "--version", "1", "--recording", "1", "--add", "bias_drift"), "of poses no rate is known"),
+        (("fit", HAND, "--recording", "1", "--model", "yang2018"), "with --model poses only"),
     ],
 )
 def test_what_poses_cannot_carry_is_refused_in_one_line(lab: Lab, command: tuple[str, ...], said: str) -> None:
@@ -117,7 +117,7 @@ def test_free_motion_is_told_what_would_do_instead(tmp_path: Path) -> None:
     head = folder / "recording.toml"
     head.write_text(head.read_text(encoding="utf-8").replace('motion = "poses"', 'motion = "rates"'), encoding="utf-8")
     said = lab.run("import", str(folder), status=2).stderr
-    assert "free motion alone calibrates no gyro; say motion = 'rest'" in said
+    assert "free motion alone cannot calibrate a gyro; write motion = 'rest'" in said
     assert "'turns' with column turn_deg" in said
     assert "'poses' with columns accel_x_g" in said
     assert len(said.strip().splitlines()) == 1

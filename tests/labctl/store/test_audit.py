@@ -221,6 +221,7 @@ PERSON = {"by": "A", "reason": "B"}
 NOTE = {"file": "x", "bytes": 1, "sha256": "0" * 64}
 #: Every operation that changes something, in an order in which each succeeds, and the act that it leaves in the trail.
 ACTS: dict[str, tuple[str, Callable[[TestClient], Any]]] = {
+    "/api/benches/{bench}/check": ("bench check", lambda c: c.post("/api/benches/single-axis-sim/check", json={})),
     "/api/benches/{bench}/clear": (
         "bench clear", lambda c: c.post("/api/benches/single-axis-sim/clear", json={"by": "A. Person"}),
     ),

@@ -139,7 +139,10 @@ def test_the_next_start_finds_that_commits_are_missing(location: str) -> None:
         record(store)
         Path(location).unlink()
     assert not Path(location).exists()
-    with pytest.raises(StoreError, match="commits that were made are not in it"), open_store(location, write=True):
+    with (
+        pytest.raises(StoreError, match="commits that were made are not in this database"),
+        open_store(location, write=True),
+    ):
         pass
 
 

@@ -142,7 +142,7 @@ def test_a_block_of_several_that_was_changed_is_found(store: Store, monkeypatch:
         raw.execute("UPDATE data_set_means SET mean = mean + 1 WHERE number = 2 AND channel = 'gyro_z'")
         raw.execute("DELETE FROM sample_blocks WHERE number = 1 AND seq = 2")
     said = " | ".join(finding.text for finding in check(store.location).findings)
-    assert "recording 1 data set 2: gyro_z is kept as" in said
+    assert "recording 1 data set 2: the stored mean of gyro_z is" in said
     assert "recording 1 data set 1: blocks before block 3 are missing" in said
 
 

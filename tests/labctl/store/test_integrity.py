@@ -116,31 +116,35 @@ def test_a_block_that_was_cut_short_under_a_new_checksum_is_found(location: str)
 @pytest.mark.parametrize(
     ("statement", "part", "says"),
     [
-        ("DELETE FROM sample_blocks WHERE id = 1", "readings", "holds 0"),
+        ("DELETE FROM sample_blocks WHERE id = 1", "readings", "but 0 are stored"),
         ("UPDATE sample_blocks SET seq = 1 WHERE id = 1", "readings", "blocks before block 1 are missing"),
         ("UPDATE sample_blocks SET number = 900 WHERE id = 1", "readings", "data set 900, which is missing"),
-        ("UPDATE data_sets SET n = n + 1 WHERE recording_id = 1 AND number = 2", "readings", "data set 2 counts"),
+        (
+            "UPDATE data_sets SET n = n + 1 WHERE recording_id = 1 AND number = 2",
+            "readings",
+            "as having 101 valid",
+        ),
         ("DELETE FROM sample_blocks WHERE recording_id = 2", "readings", "recording 2 (points) has no table any more"),
         ("UPDATE sample_blocks SET n = n - 1 WHERE id = 1", "readings", "recording 1 data set 1 block 0"),
         ("UPDATE calibrations SET document = replace(document, '\"z\"', '\"y\"')", "calibrations", "edited or damaged"),
-        ("UPDATE calibrations SET hash = substr(hash, 2) || '0'", "calibrations", "its document was changed"),
+        ("UPDATE calibrations SET hash = substr(hash, 2) || '0'", "calibrations", "the stored calibration was changed"),
         ("UPDATE certifications SET version = 7", "file", "row 1 of certifications refers to a row of calibrations"),
         ("UPDATE audit SET actor = 'nobody' WHERE id = 3", "audit", "row 3: its content"),
         ("DELETE FROM audit WHERE id = 6", "audit", "row 6: 1 rows are missing at the end"),
         ("UPDATE alembic_version SET version_num = '0001'", "schema", "any other command migrates it"),
         ("UPDATE alembic_version SET version_num = '9999'", "schema", "use a newer labctl"),
         ("DROP TABLE sample_blocks", "readings", "cannot be read"),
-        ("UPDATE data_sets SET n = 'many' WHERE number = 2", "readings", "data set 2 counts many"),
+        ("UPDATE data_sets SET n = 'many' WHERE number = 2", "readings", "as having many valid"),
         ("UPDATE sample_blocks SET data = 'text' WHERE id = 1", "readings", "data set 1 block 0"),
         (
             "UPDATE data_set_means SET mean = mean + 1e-5 WHERE channel = 'gyro_z' AND number = 2",
             "readings",
-            "data set 2: gyro_z is kept as",
+            "data set 2: the stored mean of gyro_z is",
         ),
         (
             "UPDATE data_set_means SET n = 1 WHERE channel = 'gyro_z'",
             "readings",
-            "the mean of gyro_z counts 1 readings",
+            "the stored mean of gyro_z is of 1 readings",
         ),
         ("UPDATE audit SET detail = '{' WHERE id = 2", "audit", "row 2: its content"),
         ("UPDATE audit SET at = 'noon' WHERE id = 2", "audit", "row 2: its content"),
@@ -202,9 +206,12 @@ def test_a_deleted_log_is_found_and_nobody_writes_on(kept: Path, tmp_path: Path)
     Path(f"{location}-shm").unlink()
     (finding,) = check(location).findings
     assert finding.part == "file"
-    assert "1 commits that were made are not in it" in finding.text
+    assert "1 commits that were made are not in this database" in finding.text
     assert "crashed.sqlite-wal" in finding.text
-    with pytest.raises(StoreError, match="commits that were made are not in it"), open_store(location, write=True):
+    with (
+        pytest.raises(StoreError, match="commits that were made are not in this database"),
+        open_store(location, write=True),
+    ):
         pass
     seals.seal_path(location).unlink()
     with open_store(location, write=True) as store:
@@ -216,7 +223,10 @@ def test_a_lost_archive_is_never_silently_begun_anew(location: str, how: str) ->
     path = Path(location)
     path.unlink() if how == "removed" else path.write_bytes(b"")
     for _ in range(2):
-        with pytest.raises(StoreError, match="commits that were made are not in it"), open_store(location, write=True):
+        with (
+            pytest.raises(StoreError, match="commits that were made are not in this database"),
+            open_store(location, write=True),
+        ):
             pass
 
 

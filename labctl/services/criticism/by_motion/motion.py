@@ -74,8 +74,8 @@ def _compared(store: Store, row: RecordingRow, version: CalibrationRecord | None
 
 def _source(row: RecordingRow, version: CalibrationRecord | None) -> str:
     if version is None:
-        return f"outputs of recording {row.id} as they are"
-    own = "which it was fitted to" if row.id in version.recordings else "which it was not fitted to"
+        return f"uncorrected outputs of recording {row.id}"
+    own = "which the version was fitted to" if row.id in version.recordings else "which the version was not fitted to"
     return f"version {version.version} without refitting, on recording {row.id}, {own}"
 
 

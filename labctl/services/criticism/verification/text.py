@@ -14,7 +14,7 @@ def verification_sentence(found: VerificationResponse) -> str:
         f"RMS, {found.max_dps:.3g} deg/s at most"
     )
     if found.expected_dps is None:
-        text += "; this version states no error to compare it with"
+        text += "; the expected error of this version is not known"
     else:
         text += f"; expected of this version: {found.expected_dps:.3g} deg/s RMS"
     if found.outside_validity:

@@ -36,7 +36,7 @@ def test_a_law_of_temperature_that_is_none_of_the_catalogues_is_not_given_a_name
     assert (found.verdict.form, found.verdict.named, found.verdict.depends_on[0]) == (
         "unexplained", (), "temperature_c",
     )  # fmt: skip
-    assert "from temperatures that only rise" in " ".join(sentences(found))
+    assert "Since the temperature only rises" in " ".join(sentences(found))
 
 
 @pytest.mark.parametrize("seed", [2, 3, 9])
@@ -86,7 +86,10 @@ def test_a_model_that_leaves_less_than_the_noise_is_adequate_whatever_is_like_th
     found = held(read_recording(EXAMPLES / "osu-fog"), full=True)
     assert (found.verdict.form, found.verdict.named) == ("adequate", ())
     assert found.verdict.further
-    assert any(line.startswith("Further suspected effects, within the noise: at best") for line in sentences(found))
+    assert any(
+        line.startswith("Further suspected effects, too small to be distinguished from noise: at best")
+        for line in sentences(found)
+    )
     assert all(suspect.share_removed < 1 for suspect in found.suspects)
 
 

@@ -70,7 +70,7 @@ def test_moves_in_which_readings_were_lost_unseen_are_left_out_and_named() -> No
     assert result.poses is not None
     left = result.poses["moves"]["left_out"]
     assert len(left) == 2
-    assert all("does not agree with the other moves: gravity ends" in each["why"] for each in left)
+    assert all("does not agree with the other moves: gravity after the move is" in each["why"] for each in left)
     assert agrees(result, truth)
     alone, _ = simulate_session(5, KNOWN)
     clean, _ = matrix(fit(alone, "poses"))
@@ -147,7 +147,7 @@ def test_an_unknown_latitude_is_in_the_uncertainty_of_the_own_sensitivity() -> N
 @pytest.mark.parametrize(
     ("session", "said"),
     [
-        (Session(rests=8), r"8 rests in 8 different poses; .* take at least 12: lay the unit down"),
+        (Session(rests=8), r"8 rests in 8 different poses; .* at least 12 for bias.*: lay the unit down"),
         (Session(rests=30, about_vertical=True), r"different poses; .* lay the unit down"),
     ],
 )
@@ -160,15 +160,17 @@ def test_too_little_is_refused_with_what_to_do(session: Session, said: str) -> N
 
 def test_another_model_another_motion_means_and_two_axes_are_refused() -> None:
     recording, _ = simulate_session(1, Session(rests=3))
-    with pytest.raises(BadInput, match="fitted by --model poses alone"):
+    with pytest.raises(BadInput, match="with --model poses only"):
         fit(recording, "yang2018")
-    with pytest.raises(BadInput, match="fitted by --model poses alone"):
+    with pytest.raises(BadInput, match="with --model poses only"):
         fit(recording, "poses", ["bias_temperature"])
 
     def changed(**head: object) -> Recording:
         return replace(recording, info=recording.info.model_copy(update=head))
 
-    with pytest.raises(BadInput, match="takes a recording with motion = 'poses'; this one says motion = 'rates'"):
+    with pytest.raises(
+        BadInput, match="needs a recording with motion = 'poses', but this recording has motion = 'rates'"
+    ):
         fit(changed(motion="rates"), "poses")
     with pytest.raises(BadInput, match="every reading of the turns"):
         fit(changed(kind="points"), "poses")

@@ -148,7 +148,7 @@ FILES: dict[str, tuple[Callable[[Path], Path], str]] = {
     ),
     "free motion": (
         lambda p: text(p / "a.csv", csv_text(moved())),
-        "free motion without a reference is no calibration data",
+        "free motion without a reference cannot calibrate a gyro",
     ),
     "mixed axes": (
         lambda p: text(p / "a.csv", csv_text(in_poses()[:, :6], f"time (s),{GYROS},acc_x (m/s2),acc_y (m/s2)")),

@@ -42,7 +42,7 @@ def test_two_files_with_names_make_one_recording_without_a_map(tmp_path: Path) -
     lab = Lab(tmp_path)
     arguments = ("import", str(gyro), "--beside", str(accel), "--accept-map")
     assert "motion poses" in lab.run(*arguments).stdout
-    assert "nothing says by how much" in lab.run("import", str(gyro), "--accept-map", status=2).stderr
+    assert "no column gives the rate or the angle" in lab.run("import", str(gyro), "--accept-map", status=2).stderr
 
 
 def test_other_times_are_interpolated(tmp_path: Path) -> None:
@@ -86,7 +86,7 @@ def test_without_times_rows_belong_together_one_by_one(tmp_path: Path) -> None:
             r"no reading near time 0 of a\.csv \(row 1; 50 rows so\): its times go from 3 to 3\.49",
         ),
         (line(50, 10.0), r"no reading near time .* at most 5 steps may lie between"),
-        (line(50, 0.01)[::-1], "are not all numbers that rise"),
+        (line(50, 0.01)[::-1], "are not all increasing numbers"),
         (
             np.delete(line(50, 0.01), slice(20, 40), axis=0),
             r"no reading near time 0\.25 of a\.csv \(row 26; 10 rows so\)",

@@ -150,7 +150,7 @@ def test_one_data_set_that_disagrees_is_named_with_its_rate_and_its_outputs(
         assert (found.what, found.severity) == ("one_data_set", "certain")
         assert found.where.startswith("data set 65")
         assert found.value == pytest.approx(meant, rel=0.01)
-        assert "deg/s, its output says " in found.text
+        assert "deg/s, but the output shows " in found.text
 
 
 def test_several_wrong_data_sets_are_each_named(one_axis: Recording) -> None:

@@ -74,7 +74,7 @@ def test_another_unit_of_all_turns_is_no_other_angle(turned: Recording) -> None:
 def test_a_missing_uncertainty_is_told_with_what_is_taken_for_it(turned: Recording) -> None:
     columns = {name: values for name, values in turned.columns.items() if name != "turn_u_deg"}
     finding = only(inspect_recording(replace(turned, columns=columns)))
-    assert "column turn_u_deg: it is missing, and 1 deg is taken for every turn" in finding.text
+    assert "column turn_u_deg: the column is missing, so 1 deg is used for every turn" in finding.text
 
 
 def test_a_rest_that_moves_is_told(turned: Recording) -> None:
@@ -82,4 +82,4 @@ def test_a_rest_that_moves_is_told(turned: Recording) -> None:
     shaken = np.asarray(turned.columns["gyro_x"], dtype=np.float64).copy()
     shaken[rests] += 20.0 * np.sin(np.arange(rests.sum()) / 7.0)
     found = inspect_recording(replace(turned, columns={**turned.columns, "gyro_x": shaken}))
-    assert any("turn_deg is given as 0 and the output changes" in finding.text for finding in found)
+    assert any("turn_deg is given as 0, but the output changes" in finding.text for finding in found)

@@ -272,8 +272,8 @@ def test_a_service_says_whether_it_leaves_its_bench_unconfirmed(
     said = "was confirmed safe by labctl at" if healed else "is NOT confirmed safe: table: no answer"
     assert (service.left.unconfirmed, f"bench {BENCH.name} {said}" in service.left.text) == (not healed, True)
     looked = labctl(location, "bench", "status")
-    assert (looked.exit_code, "the safe state was tried again" in looked.stdout) == (1, True)
-    assert ("labctl confirmed it at" in looked.stdout) == healed
+    assert (looked.exit_code, "more times to set the safe state" in looked.stdout) == (1, True)
+    assert ("labctl confirmed the safe state at" in looked.stdout) == healed
 
 
 def test_a_campaign_in_the_foreground_that_leaves_its_bench_unconfirmed_ends_with_a_failure(

@@ -56,12 +56,15 @@ def test_every_guard_is_told_in_its_own_words(kind: str, change: dict[str, Any])
         (Unanswered("no answer within 600 s: turn the units"), "not answered in time"),
         (BadData("fog", "not one of about 500 readings came; check cable, power and baud rate"), "readings"),
         (NoReply("table", "/dev/ttyUSB0 gave no answer in 2.0 s; check power, cable and baud rate"), "did not answer"),
+        (NoReply("imu", "no intact Xsens MTi reading on /dev/ttyUSB0 for 2.1 s: nothing came"), "did not answer"),
+        (NoReply("imu", "cannot read air, text came (SSH-2.0), no Modbus; check host"), "did not answer"),
+        (NoReply("imu", "the counter on /dev/ttyUSB0 stands at 7 in 50 readings in a row"), "readings"),
         ("Ann declined: turn the units: no wrench", "cannot be done"),
         ("resumed 5 times without finishing a step; inspect the bench", "never finished a step"),
         ("taken up 5 times without finishing a step; look at the bench", "never finished a step"),  # of an older labctl
         ("not resumed: bench b was not confirmed safe: table to rest", "not confirmed safe"),
-        ("ended by an error of the program", "error of its own"),
-        ("ZeroDivisionError: division by zero", "error of its own"),
+        ("ended by an error of the program", "fault in labctl itself"),
+        ("ZeroDivisionError: division by zero", "fault in labctl itself"),
         ("something new", "could not be carried out"),
     ],
 )
@@ -119,7 +122,7 @@ def test_api_and_command_line_tell_a_failure_in_words(
 ) -> None:
     answer = _campaign(client)
     assert answer["state"] == "failed"
-    assert answer["advice"]["happened"] == "A person said that it cannot be done."
+    assert answer["advice"]["happened"] == "A person answered that the requested action cannot be done."
     assert client.get("/api/campaigns").json()[0]["advice"] == answer["advice"]
     print_campaign(campaign_status(store, 1))
     reported = capsys.readouterr().out

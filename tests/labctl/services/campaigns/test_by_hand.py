@@ -186,7 +186,7 @@ def test_which_recipe_needs_what_is_said_in_one_line(tmp_path: Path) -> None:
     assert "36 data sets in 20 steps" in planned.output
     refused = runner.invoke(app, ["campaign", "start", "short", "--bench", "by-hand-sim", *database])
     assert refused.exit_code == 2
-    assert "rates_dps: it needs a rate table, and the bench has none" in refused.stderr
+    assert "rates_dps: a rate table is needed, and the bench has none" in refused.stderr
     checked = runner.invoke(app, ["bench", "check", "by-hand-sim"])
     assert (checked.exit_code, "table" in checked.output, "mems" in checked.output) == (0, False, True)
     simulated = runner.invoke(app, ["simulate", "by-hand", "--out", str(tmp_path / "out")])

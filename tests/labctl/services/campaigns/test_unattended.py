@@ -133,7 +133,7 @@ def test_of_several_campaigns_on_one_bench_the_newest_goes_on_and_the_others_say
     rest(runner)
     assert store.campaigns.get(newer).state == "done"
     row = store.campaigns.get(older)
-    assert (row.state, f"campaign {newer} is resumed here first" in row.reason) == ("failed", True)
+    assert (row.state, f"campaign {newer} on the same bench is resumed first" in row.reason) == ("failed", True)
 
 
 @pytest.mark.usefixtures("real")

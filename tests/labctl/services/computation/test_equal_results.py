@@ -10,7 +10,7 @@ from instruments.clock import VirtualClock
 from labctl.processes.web_process import WORKER_MODULES
 from labctl.recording import write_recording
 from labctl.services.calibrations.certification import list_certifications
-from labctl.services.calibrations.fitting import calibration_file
+from labctl.services.calibrations.served import calibration_file
 from labctl.services.commands.registry import CERTIFY, FIT, IMPORT_RECORDING, IMPROVE
 from labctl.services.commands.requests import RecordingFolder, ToNewestOrVersion, ToUnit, ToVersion
 from labctl.services.computation import InThreads, InWorkers, Limits

@@ -88,7 +88,7 @@ def test_a_bias_that_is_outside_its_limit_is_said_to_be_outside_already(five_yea
     lab = Lab(shutil.copytree(five_years.folder, tmp_path / "lab"))
     found = lab.json("trend", "J-1", "--limit-dps", "0.03")
     assert [each["outside"] for each in found["leaves"]] == [True]
-    assert "Axis z: the bias is outside 0.03 deg/s at the newest recording already." in found["text"]
+    assert "Axis z: the bias is already outside 0.03 deg/s at the newest recording." in found["text"]
     joint = lab.json("fit", "J-1", "--recording", "1,2,3", "--effects", ",".join(EFFECTS))
     expected = lab.json("verify", "J-1", "--version", str(joint["version"]), "--recording", "1")["expected_dps"]
     limit = lab.json("trend", "J-1", "--version", str(joint["version"]))["limit_dps"]
@@ -98,7 +98,7 @@ def test_a_bias_that_is_outside_its_limit_is_said_to_be_outside_already(five_yea
 def test_two_recordings_have_a_drift_without_an_uncertainty_and_say_so(tmp_path: Path) -> None:
     found = lab_over_years(tmp_path, 2).json("trend", "J-1")
     assert all(each["u"] is None and each["low"] is None for each in found["drifts"])
-    assert any("by two recordings; an uncertainty takes 3" in line for line in found["text"])
+    assert any("from two recordings; its uncertainty needs 3 recordings" in line for line in found["text"])
     assert [leaves["earliest"] for leaves in found["leaves"]] == [None]
 
 
@@ -106,5 +106,5 @@ def test_one_recording_has_no_drift(tmp_path: Path) -> None:
     lab = lab_over_years(tmp_path, 1)
     found = lab.json("trend", "J-1")
     assert (found["drifts"], found["leaves"]) == ([], [])
-    assert found["text"] == ["1 recording in time: a drift takes two, and its uncertainty three."]
+    assert found["text"] == ["1 recording in time: a drift needs two recordings, and its uncertainty three."]
     assert "give a number above 0" in lab.run("trend", "J-1", "--limit-dps", "-1", status=2).stderr

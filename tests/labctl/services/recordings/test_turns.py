@@ -69,4 +69,4 @@ def test_a_law_of_the_rate_is_not_added_to_turns(lab: Lab, tmp_path: Path) -> No
     lab.run("import", session(2, tmp_path / "first"))
     lab.run("fit", "HAND", "--model", "turns")
     refused = lab.run("improve", "HAND", "--add", "scale_factor_odd", status=2)
-    assert "needs the rate at each instant, and of a turn only the mean is known" in refused.stderr
+    assert "needs the rate at each instant, but only the mean rate of a turn is known" in refused.stderr

@@ -99,7 +99,7 @@ export async function askBenchClear(bench, { later = false } = {}) {
       text: later
         ? "The table turns and the chamber heats and cools when the campaign begins, without asking again. Tick what you confirm for that time."
         : "The table turns and the chamber heats and cools as soon as you start. Inspect the bench, then tick what you have checked.",
-      confirm: later ? "I confirm it for that time" : "Start now",
+      confirm: later ? "I confirm these points for that time" : "Start now",
     },
   );
   if (!answers) return null;
@@ -139,7 +139,7 @@ export const resumeButton = (campaign, { whole = false, kind = "primary" } = {})
         [operatorNameField(), { name: "reason", label: "Why", required: false }],
         {
           text: whole
-            ? "First the safe state, then home, temperature and soak again; the first incomplete data set is measured again."
+            ? "labctl first sets the safe state, then homes the table, sets the temperature and soaks again; the first incomplete data set is measured again."
             : null,
           confirm: whole ? "Resume" : "Continue",
         },
@@ -216,7 +216,7 @@ function turnButtons(campaign, prompt) {
  */
 export const clearButton = (bench, then) =>
   button(
-    "I have inspected it, it is safe",
+    "I have inspected the bench, and it is safe",
     async () => {
       const answers = await askOperator(
         `Is bench ${bench} safe?`,

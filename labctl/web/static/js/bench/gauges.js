@@ -2,6 +2,7 @@
 
 import { setChildren, h, svg } from "../core/elements.js";
 import { isNumber, plainNumber } from "../core/format.js";
+import { channelName, channelUnit } from "../recordings/channels.js";
 
 /** @import { Campaign, Timeline } from "../../../types/api.js" */
 /** @import { Numeric } from "../core/format.js" */
@@ -70,7 +71,9 @@ export function gauges(timeline) {
   const gyro = gauge("Gyro", "deg C", low, high, 2);
   const rate = gauge("Table rate", "deg/s", -most, most, 3);
   const driven = timeline.kind.includes("home"); // a bench on which units are turned by hand has neither
-  const element = h("div", { class: "gauges" }, driven ? [chamber, gyro, rate] : gyro);
+  const references = h("p", { class: "gauge-note", hidden: true });
+  const dials = h("div", { class: "gauges" }, driven ? [chamber, gyro, rate] : gyro);
+  const element = h("div", {}, dials, references);
   /**
    * @param {Numeric} value
    * @param {Numeric} target
@@ -82,14 +85,19 @@ export function gauges(timeline) {
     return `set point ${plainNumber(target)} deg C, ${Math.abs(value - target) < 0.005 ? "there" : off}`;
   };
   /**
-   * @param {Pick<Campaign, "chamber_c" | "gyro_c" | "rate_dps">} status
+   * @param {Pick<Campaign, "chamber_c" | "gyro_c" | "rate_dps" | "references">} status
    * @param {Numeric} setpoint_c
    */
-  const set = ({ chamber_c, gyro_c, rate_dps }, setpoint_c) => {
+  const set = ({ chamber_c, gyro_c, rate_dps, references: beside }, setpoint_c) => {
     chamber.set(chamber_c, setpoint_c, apart(chamber_c, setpoint_c));
     gyro.set(gyro_c, setpoint_c, apart(gyro_c, setpoint_c));
     const turns = rate_dps ? `${(Math.abs(rate_dps) / 6).toPrecision(3)} turns a minute` : "at rest";
     rate.set(rate_dps, null, turns);
+    const read = Object.entries(beside).map(
+      ([column, value]) => `${channelName(column)} ${plainNumber(value, 6)} ${channelUnit(column)}`,
+    );
+    references.hidden = !read.length;
+    setChildren(references, `By reference instruments: ${read.join(", ")}`);
   };
   return Object.assign(element, { set });
 }

@@ -18,12 +18,16 @@ import { linkButton, resumeControl } from "./actions.js";
 export function noBenchCard() {
   return card(
     "This service drives no bench",
-    h("p", {}, "It serves calibrations and imports recordings. To run a bench, start it with one of these commands:"),
+    h(
+      "p",
+      {},
+      "The service serves calibrations and imports recordings. To run a bench, start the service with one of these commands:",
+    ),
     h("pre", { class: "command" }, "labctl serve --simulate\nlabctl serve --bench FILE"),
     h(
       "p",
       { class: "muted" },
-      "The first has a simulated tri-axial bench, as fast as you like with --speed; the second drives the instruments that the bench file names.",
+      "The first command runs a simulated tri-axial bench, whose speed --speed sets; the second drives the instruments that the bench file names.",
     ),
     h("div", { class: "row" }, linkButton("To the recordings", "/recordings")),
   );
@@ -62,7 +66,7 @@ export function idleBench(bench, last, next) {
         "p",
         {},
         bench.unconfirmed
-          ? "No campaign starts before the bench was inspected."
+          ? "No campaign starts until a person has inspected the bench and confirmed that it is safe."
           : presentWords(
               `${bench.units.map((unit) => unit.serial).join(", ")} ${bench.units.length > 1 ? "are" : "is"} on the bench and free.`,
             ),

@@ -29,7 +29,7 @@ export function lastDataset(timeline, signal) {
   const gyroColumns = () => Object.keys(columns).filter((name) => name.startsWith("gyro_"));
   const picture = figure(
     "Gyro output of the last data set",
-    `As recorded; of a long data set the first ${MAX_READINGS} readings.`,
+    `Readings as recorded; only the first ${MAX_READINGS} of a longer data set are drawn.`,
     () => {
       const axes = gyroColumns();
       const t = (columns.t_s ?? []).map((value) => value - columns.t_s[0]);

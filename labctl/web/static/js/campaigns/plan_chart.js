@@ -31,7 +31,7 @@ const HOURS_FROM_S = 3 * 3600;
  */
 export function planChart(name, give, { height = "24rem", pick } = {}) {
   const caption =
-    "Above: set point of the chamber, with the data sets on it. Below: their table rates. Bands: which axis of the unit points up.";
+    "Above: set point of the chamber, with a mark for each data set. Below: the table rate of each data set. Bands: which axis of the unit points up.";
   const draw = () => {
     const { timeline, now_s = null, live = false } = give();
     const unit_s = (timeline.start_s.at(-1) ?? 0) + (timeline.expected_s.at(-1) ?? 0) > HOURS_FROM_S ? 3600 : 60;

@@ -35,7 +35,11 @@ export function recipeChoice(all, choice, chosen) {
   const own = h(
     "div",
     {},
-    labelledField("Recipe as TOML", text, "Planned again as you type. Nothing moves before you start it."),
+    labelledField(
+      "Recipe as TOML",
+      text,
+      "The plan is computed again as you type. Nothing moves before you start the campaign.",
+    ),
   );
   const shippedText = h("pre", { class: "command" });
   const shipped = h("details", {}, h("summary", {}, "Recipe text"), shippedText);

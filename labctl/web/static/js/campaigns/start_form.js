@@ -116,7 +116,7 @@ export function startForm(bench, order) {
       : there.campaign
         ? notice(
             "warn",
-            `Campaign ${there.campaign} runs on ${there.name} now; it has to end first. A start at a time waits for it.`,
+            `Campaign ${there.campaign} runs on ${there.name} now and has to end first. A start that is scheduled waits for the end of that campaign.`,
           )
         : null,
     h(
@@ -137,9 +137,13 @@ export function startForm(bench, order) {
         labelledField(
           "Priority",
           priority,
-          "Of the starts that are due, the one with the highest number begins first.",
+          "When several starts are due, the one with the highest priority begins first.",
         ),
-        labelledField("May be late by, h", late, "Empty: no limit; the start is made once, however late."),
+        labelledField(
+          "May be late by, h",
+          late,
+          "A start that is later than this is skipped. Empty: no limit, a late start is made once.",
+        ),
         zones,
       ),
       h("div", { class: "row" }, button("Add to the schedule", later, { kind: "primary large" })),
@@ -153,9 +157,13 @@ export function startForm(bench, order) {
         labelledField(
           "Priority",
           priority,
-          "Of the starts that are due, the one with the highest number begins first.",
+          "When several starts are due, the one with the highest priority begins first.",
         ),
-        labelledField("May be late by, h", late, "Empty: no limit; the start is made once, however late."),
+        labelledField(
+          "May be late by, h",
+          late,
+          "A start that is later than this is skipped. Empty: no limit, a late start is made once.",
+        ),
         zones,
       ),
       h("div", { class: "row" }, button("Add to the schedule", later, { kind: "primary large" })),
@@ -169,7 +177,7 @@ export function startForm(bench, order) {
       h(
         "div",
         { class: "row", style: "align-items: end" },
-        labelledField("Seed", seed, "Same seed, same recording."),
+        labelledField("Seed", seed, "Seed of the random numbers; the same seed gives the same recording."),
         button("Simulate the recording", simulated, { kind: "primary large" }),
       ),
     ],
@@ -183,7 +191,7 @@ export function startForm(bench, order) {
   });
   const element = card(
     "Begin",
-    bench ? null : notice("", "This service drives no bench; what is planned here can be simulated."),
+    bench ? null : notice("", "This service drives no bench; a campaign that is planned here can be simulated."),
     h("div", {}, group),
     attended,
     place,

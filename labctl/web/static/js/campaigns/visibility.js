@@ -43,7 +43,7 @@ export function visibilityReport(rows) {
     h(
       "p",
       { class: "muted small" },
-      "Beside each: the smallest size that is just detectable, in the effect's unit. ppm: millionths, of the rate or of the full effect.",
+      "The number beside each effect is the smallest size that the plan can detect, in the unit of the effect. ppm: millionths of the rate, or of the full effect.",
     ),
     unseen.length
       ? table(
@@ -56,7 +56,7 @@ export function visibilityReport(rows) {
                 row.why === "channel"
                   ? `needs ${row.needs.map(idText).join(", ")}, which is not logged`
                   : [
-                      h("span", {}, "this schedule does not separate it from other effects"),
+                      h("span", {}, "this schedule does not distinguish the effect from other effects"),
                       row.experiment ? h("span", { class: "muted small secondary" }, `Try: ${row.experiment}`) : null,
                     ],
             },
@@ -64,7 +64,7 @@ export function visibilityReport(rows) {
           unseen,
           { label: "Effects this plan cannot detect" },
         )
-      : notice("good", "It can detect every effect of the catalogue."),
+      : notice("good", "This plan can detect every effect of the catalogue."),
     fitted.length
       ? h(
           "p",

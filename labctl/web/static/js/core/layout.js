@@ -76,7 +76,7 @@ export function buildLayout() {
           name: "key",
           label: "Key",
           type: "password",
-          hint: "Made by `labctl key create`; kept in this tab until it is closed.",
+          hint: "`labctl key create` makes a key. The key is kept in this tab until the tab is closed.",
         },
       ],
       { text: why, confirm: "Use it" },
@@ -89,7 +89,10 @@ export function buildLayout() {
   }
 
   window.addEventListener("labctl:key", (event) =>
-    askKey(event.detail ?? "Reading needs a viewer's key, starting or changing something an operator's."),
+    askKey(
+      event.detail ??
+        "Reading needs a key with the role viewer; starting or changing something needs a key with the role operator.",
+    ),
   );
   window.addEventListener("labctl:moved", () =>
     links.forEach((link) => {

@@ -80,11 +80,11 @@ export function effectDetail(effect, all) {
             "div",
             { class: "row" },
             linkButton("Practise with it", `/campaigns/new?hide=${effect.id}`),
-            h("span", { class: "muted small" }, "a simulated campaign with it hidden in the unit"),
+            h("span", { class: "muted small" }, "a simulated campaign in which this effect is hidden in the unit"),
           ),
         ),
         card(
-          "What it is mistaken for",
+          "Effects that look the same",
           alike.length
             ? [
                 h(
@@ -97,7 +97,7 @@ export function effectDetail(effect, all) {
                 h(
                   "p",
                   { class: "muted small" },
-                  "These have the same signature on every schedule, so they are always named together.",
+                  "These effects have the same signature on every schedule, so a criticism always names them together.",
                 ),
               ]
             : h(
@@ -181,7 +181,10 @@ function shapeCard(effect) {
       ? null
       : h("p", {}, `A polynomial up to order ${effect.max_order}; ${effect.order} by default.`);
   if (!effect.parameters.length)
-    return card("Shape of the effect", orders ?? h("p", {}, "It has no shape parameters: one size describes it."));
+    return card(
+      "Shape of the effect",
+      orders ?? h("p", {}, "This effect has no shape parameters: its size describes it completely."),
+    );
   return card(
     "Shape of the effect",
     orders,
@@ -194,6 +197,10 @@ function shapeCard(effect) {
       effect.parameters,
       { label: "Parameters" },
     ),
-    h("p", { class: "muted small" }, "Besides its size it has shape parameters; the fit searches these ranges."),
+    h(
+      "p",
+      { class: "muted small" },
+      "Besides its size, this effect has shape parameters; the fit searches these ranges.",
+    ),
   );
 }

@@ -2,11 +2,11 @@
 
 /** @type {Record<string, [name: string, about: string]>} */
 export const ORIGINS = {
-  sensor: ["Sensor", "What the sensing element and its electronics do."],
-  package: ["Package", "How the sensing axes lie in the unit's case."],
+  sensor: ["Sensor", "Errors of the sensing element and its electronics."],
+  package: ["Package", "Orientation of the sensing axes in the unit's case."],
   fixture: [
     "Fixture",
-    "How the unit sits on the table. Fitted, so that it does not distort the gyro's coefficients; not part of a calibration.",
+    "Orientation and position of the unit on the table. Fitted, so that these errors do not distort the gyro's coefficients; not part of a calibration.",
   ],
   bench: ["Bench", "Errors of table and thermometer. Reported as errors of the bench; not part of a calibration."],
   environment: [

@@ -58,7 +58,7 @@ export function effectList(all, query) {
     { class: "page" },
     pageHeader(
       "Effects",
-      `${all.length} physical causes of a gyro's error: what each does, its signature, and what distinguishes it from similar effects.`,
+      `${all.length} physical causes of a gyro's error: what each cause does, its signature, and the experiment that distinguishes it from similar effects.`,
     ),
     h(
       "div",

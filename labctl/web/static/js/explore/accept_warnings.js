@@ -19,7 +19,7 @@ export async function postFit(fit, confirm) {
   } catch (error) {
     if (!(error instanceof Problem) || !error.type?.endsWith(":data-refused")) throw error;
     const answers = await dialog("The fit is refused", [], {
-      text: "The calibration would be wrong. A version that is made anyway keeps these warnings.",
+      text: "With these data the calibration would be wrong. A version that is made nevertheless keeps these warnings.",
       body: against(error),
       confirm,
       kind: "danger",

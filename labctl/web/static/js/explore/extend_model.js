@@ -149,7 +149,7 @@ export function extendModel(state, effects) {
         "div",
         { class: "row" },
         button(`Make version ${Math.max(...state.versions) + 1}`, make, { kind: "primary" }),
-        h("span", { class: "muted small" }, "Versions are never changed; this one is kept."),
+        h("span", { class: "muted small" }, "Existing versions are never changed; the present version is kept."),
       ),
     ];
   }

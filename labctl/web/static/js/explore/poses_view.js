@@ -35,10 +35,15 @@ export function posesView(serial, calibration, recording, signal) {
       h(
         "p",
         {},
-        "Of a recording in poses no rate is known, only where gravity was before and after each turn: a version is verified by it, and no missing effect can be named.",
+        "In a recording of poses no rate is known, only the direction of gravity before and after each turn. A version can be verified with such a recording, but no missing effect can be found.",
       ),
       factList([
-        ["Error of a turn, RMS", number(found.rms_dps), "deg/s", "what gravity is off by, over how long the turn took"],
+        [
+          "Error of a turn, RMS",
+          number(found.rms_dps),
+          "deg/s",
+          "error of the direction of gravity, over the duration of the turn",
+        ],
         ["Largest", number(found.max_dps), "deg/s"],
         found.expected_dps === null ? null : ["Expected of this version", number(found.expected_dps), "deg/s"],
         ["Turns", `${found.datasets}`],

@@ -70,7 +70,7 @@ export function recordingChoice(serial, version, own, now) {
     h(
       "p",
       { class: "muted small" },
-      "What belongs to the sensor then has one value for all of them; what differs from one power-on, day or mounting to the next is estimated beside it, as repeatability.",
+      "Coefficients of the sensor then have one value for all recordings; differences from one power-on, day or mounting to the next are estimated in addition, as repeatability.",
     ),
     h("div", { class: "row", role: "group", "aria-label": "Recordings" }, rows.map(choice)),
     acts,

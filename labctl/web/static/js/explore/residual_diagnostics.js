@@ -64,11 +64,11 @@ export function residualDiagnostics(state) {
   });
   return cardWithHeader(
     "Where the model fails",
-    h("span", { class: "muted small" }, "a selection in one picture is shown in all"),
+    h("span", { class: "muted small" }, "data sets selected in one picture are marked in all pictures"),
     h(
       "p",
       { class: "muted small" },
-      `Judged: the model of version ${state.version} refitted to ${recordingsText(state)}, so that the residual is what the model cannot describe. The version without refitting is under Compare.${piecesText(state)}`,
+      `The model of version ${state.version} was refitted to ${recordingsText(state)}, so that the residual is what the model cannot describe. Compare shows the version without refitting.${piecesText(state)}`,
     ),
     picture,
     h("div", { class: "columns", style: "--column-min: 19rem" }, against),

@@ -261,7 +261,9 @@ function untestableEffects(criticism) {
   if (!criticism.not_testable.length) return null;
   /** @param {Criticism["not_testable"][number]} line */
   const why = (line) =>
-    line.why === "channel" ? `not recorded: ${line.needs.map(idText).join(", ")}` : "this schedule cannot detect it";
+    line.why === "channel"
+      ? `not recorded: ${line.needs.map(idText).join(", ")}`
+      : "this schedule cannot detect the effect";
   return h(
     "details",
     {},

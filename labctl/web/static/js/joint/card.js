@@ -83,7 +83,7 @@ function agreement(joint) {
 /** @param {Joint} joint */
 function heldOut(joint) {
   return [
-    h("h3", {}, "Each recording by a fit to the others"),
+    h("h3", {}, "Each recording predicted by a fit to the others"),
     h(
       "p",
       { class: "muted small" },
@@ -103,6 +103,6 @@ function heldOut(joint) {
     ),
     joint.heldout_rms_dps === null
       ? null
-      : h("p", {}, `All of them together: ${number(joint.heldout_rms_dps)} deg/s RMS.`),
+      : h("p", {}, `All recordings together: ${number(joint.heldout_rms_dps)} deg/s RMS.`),
   ];
 }

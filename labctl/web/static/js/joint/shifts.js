@@ -53,7 +53,7 @@ export function shiftFigures(joint) {
         h("h3", {}, term),
         figure(
           `Shifts: ${term}`,
-          `Each ${kinds[0].kind === "turn_on" ? "power-on" : kinds[0].kind === "mounting" ? "mounting" : "recording"} against the value common to all; bars are U, k = 2, with that of the common value.`,
+          `Each ${kinds[0].kind === "turn_on" ? "power-on" : kinds[0].kind === "mounting" ? "mounting" : "recording"} minus the value common to all; bars are expanded uncertainties, k = 2, which include that of the common value.`,
           draw,
           { height: "16rem" },
         ),

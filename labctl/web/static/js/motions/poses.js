@@ -63,7 +63,7 @@ export function poseFigures(found) {
       yaxis: { title: { text: "gravity off by, deg" } },
     },
   });
-  const of = found.version === null ? "the outputs as they are, with their bias" : `version ${found.version}`;
+  const of = found.version === null ? "the uncorrected outputs, bias included" : `version ${found.version}`;
   return h(
     "div",
     { class: "stack" },
@@ -81,7 +81,7 @@ export function poseFigures(found) {
       ),
       figure(
         "Residual of each move",
-        "Angle between gravity after a move where the gyro puts it and where the accelerometer shows it.",
+        "Angle between two directions of gravity after each move: the direction computed from the gyro, and the direction measured by the accelerometer.",
         residuals,
         { height: "19rem" },
       ),

@@ -49,7 +49,7 @@ export function profileFigures(found, axis) {
   const left = () => ({
     data: [
       line("as a consumer has it", rows.residual_dps, axisColour(axis)),
-      ...(followed ? [line("delay and bandwidth taken into account", rows.followed_dps, colour("text"))] : []),
+      ...(followed ? [line("true rate filtered by delay and bandwidth", rows.followed_dps, colour("text"))] : []),
     ],
     layout: layout("residual, deg/s"),
   });
@@ -58,16 +58,21 @@ export function profileFigures(found, axis) {
     "div",
     { class: "stack" },
     responseFacts(found, axis),
-    figure("Rate over time", `Axis ${axis}: the rate of the table along it, and its output.${shown}`, rates, {
-      height: "19rem",
-    }),
+    figure(
+      "Rate over time",
+      `Axis ${axis}: rate of the table along this axis, and output of the gyro.${shown}`,
+      rates,
+      {
+        height: "19rem",
+      },
+    ),
     found.version === null
       ? null
       : figure(
           "Residual over time",
           `Axis ${axis}: corrected rate less the table's.${
             followed
-              ? " A delay and a bandwidth are not exported: what is late cannot be undone reading by reading. The second line is against the rate of the table as it comes through them."
+              ? " Delay and bandwidth are not exported, since a delayed reading cannot be corrected by itself. The second line is the corrected rate less the table's rate filtered by delay and bandwidth."
               : ""
           }${shown}`,
           left,

@@ -33,14 +33,19 @@ export function restFigures(found, axis) {
     data: legs(rows, along.x, rows.residual_dps, axis, true),
     layout: { xaxis: { title: { text: along.title } }, yaxis: { title: { text: "residual, deg/s" } } },
   });
-  const both = new Set(rows.leg).size > 1 ? " Triangles up: while it warms up; down: while it cools." : "";
+  const both =
+    new Set(rows.leg).size > 1
+      ? " Triangles pointing up: while the unit warms up; pointing down: while the unit cools."
+      : "";
   return h(
     "div",
     { class: "stack" },
     figure(
       "Bias at rest",
-      `Axis ${axis}: the output of each data set, or piece of a long one, at rest; bars are U of the mean by white noise, k = 2.${both}${
-        found.version === null ? "" : " Line: the version, in order of time, with what it remembers of the temperature."
+      `Axis ${axis}: the output of each data set, or piece of a long one, at rest; bars are the expanded uncertainty of the mean due to white noise, k = 2.${both}${
+        found.version === null
+          ? ""
+          : " Line: the bias by the version, in order of time, with the lag and hysteresis that the version models."
       }${shownOf(found, "rows")}`,
       bias,
       { height: "24rem" },

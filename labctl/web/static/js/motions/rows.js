@@ -20,7 +20,7 @@ export const ofAxis = (columns, axis) =>
  * @param {string} what
  */
 export const shownOf = ({ rows, of }, what) =>
-  rows < of ? ` Drawn: ${rows.toLocaleString("en-GB")} of ${of.toLocaleString("en-GB")} ${what}, evenly picked.` : "";
+  rows < of ? ` Drawn: ${rows.toLocaleString("en-GB")} of ${of.toLocaleString("en-GB")} ${what}, evenly spaced.` : "";
 
 /**
  * Values less others, null where one is null.

@@ -43,8 +43,8 @@ export function turnFigures(found) {
     "div",
     { class: "stack" },
     figure(
-      "Turns against what was asked",
-      `The integral of ${corrected ? "the corrected rate" : "the output as it is, with its bias"} over each turn, less the angle that this output axis turned by; bars are U, k = 2, of angle, time stamps and noise.`,
+      "Measured minus true angle of each turn",
+      `The integral of ${corrected ? "the corrected rate" : "the uncorrected output, bias included"} over each turn, less the angle that this output axis turned by; bars are U, k = 2, of angle, time stamps and noise.`,
       draw,
       { height: "20rem" },
     ),

@@ -8,6 +8,7 @@ import { setTrouble } from "../core/freshness/line.js";
 import { show } from "../core/router.js";
 import { clearButton } from "../bench/actions.js";
 import { campaignInstant } from "../campaigns/campaign_time.js";
+import { checkCard } from "../bench/check_card.js";
 import { idleBench, noBenchCard } from "../bench/idle_bench.js";
 import { runningCampaign } from "../bench/running_campaign.js";
 import { canResume, isRunning } from "../campaigns/states.js";
@@ -74,6 +75,7 @@ export async function page({ signal }) {
         schedule.find((each) => each.bench === bench.name),
       ),
     );
+    element.append(checkCard(bench, !bench.unconfirmed, show));
     watchForChange(Boolean(bench.unconfirmed), signal);
   }
   return element;
@@ -109,15 +111,15 @@ function unconfirmedNotice(bench, simulated_time) {
     h(
       "p",
       {},
-      `${bench.unconfirmed}${bench.unconfirmed_at ? ` (${campaignInstant({ simulated_time }, bench.unconfirmed_at)})` : ""}. Inspect it; no campaign starts before a person has done so.`,
+      `${bench.unconfirmed}${bench.unconfirmed_at ? ` (${campaignInstant({ simulated_time }, bench.unconfirmed_at)})` : ""}. Inspect the bench and confirm it here; no campaign starts until a person has confirmed.`,
     ),
     bench.attempts
       ? h(
           "p",
           {},
           bench.confirmed_at
-            ? `labctl confirmed the safe state at ${campaignInstant({ simulated_time }, bench.confirmed_at)}, at attempt ${bench.attempts}. Inspect it nevertheless before you clear it.`
-            : `The safe state was tried again ${bench.attempts} times, last at ${campaignInstant({ simulated_time }, bench.attempted_at)}; it is tried every 30 s.`,
+            ? `labctl confirmed the safe state at ${campaignInstant({ simulated_time }, bench.confirmed_at)}, at attempt ${bench.attempts}. Inspect the bench nevertheless before you clear it.`
+            : `labctl tried ${bench.attempts} more times to set the safe state, last at ${campaignInstant({ simulated_time }, bench.attempted_at)}, and tries again every 30 s.`,
         )
       : null,
     h("div", { class: "row" }, clearButton(bench.name, show)),

@@ -107,7 +107,7 @@ export async function page({ params, query, signal }) {
     connection,
     reason,
     about,
-    cardWithHeader("Plan", h("span", { class: "muted small" }, "A press on a data set opens its readings."), picture),
+    cardWithHeader("Plan", h("span", { class: "muted small" }, "Press a data set to open its readings."), picture),
     recordingsCard(now),
     Object.assign(
       cardWithHeader(
@@ -218,6 +218,29 @@ function recordingsCard(now) {
             ),
           ),
         ),
+      ),
+    ),
+    saidOnBegin(now),
+  );
+}
+
+/**
+ * What the instruments and their USB adapters said of themselves when the campaign began.
+ * @param {Campaign} now
+ */
+function saidOnBegin(now) {
+  const said = Object.entries(now.reported ?? {});
+  if (!said.length) return null;
+  return h(
+    "ul",
+    { class: "plain small muted", "aria-label": "What the instruments said of themselves" },
+    said.map(([device, what]) =>
+      h(
+        "li",
+        {},
+        `${device}: ${Object.entries(what)
+          .map(([name, value]) => `${name.replaceAll("_", " ")} ${value}`)
+          .join(", ")}`,
       ),
     ),
   );

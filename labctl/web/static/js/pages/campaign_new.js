@@ -21,7 +21,7 @@ import { visibilityReport } from "../campaigns/visibility.js";
 
 /** What is known of turns by hand without walking through the plan. */
 const TURNS_TELL =
-  "Turns by hand tell bias, scale factor, misalignment and g-sensitivity; nothing that depends on the rate or on the temperature.";
+  "Turns by hand determine bias, scale factor, misalignment and g-sensitivity, but no effect that depends on the rate or on the temperature.";
 
 /** @param {PageContext} context */
 export async function page({ query, signal }) {
@@ -51,7 +51,10 @@ export async function page({ query, signal }) {
     asked.abort();
     asked = new AbortController();
     const given = AbortSignal.any([signal, asked.signal]);
-    setChildren(found, busyIndicator("Computing what it can detect; for a long plan that takes some seconds."));
+    setChildren(
+      found,
+      busyIndicator("Computing which effects the plan can detect; for a long plan this takes some seconds."),
+    );
     try {
       const answer = await post("/api/plans", { body: { recipe: source(), clip }, signal: given });
       setChildren(planned, planCard(answer, bench));
@@ -139,7 +142,7 @@ export async function page({ query, signal }) {
               h(
                 "p",
                 { class: "muted" },
-                "The simulated unit then has the effect, and no page shows it: a case to practise with.",
+                "The simulated unit then has this effect, and no page shows which: a case to practise with.",
               ),
               hider,
             )

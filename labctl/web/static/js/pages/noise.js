@@ -53,10 +53,10 @@ export async function page({ query, signal }) {
   return h(
     "div",
     { class: "page" },
-    pageHeader("Noise at rest", "Allan deviation of the longest section at rest of each recording, over each other."),
+    pageHeader("Noise at rest", "Allan deviations of the longest section at rest of each recording, in one picture."),
     rows.length
       ? card("Recordings", h("p", { class: "muted" }, `At most ${MOST} at once.`), list)
-      : emptyState("No recording holds readings."),
+      : emptyState("No recording has single readings, which an Allan deviation needs."),
     card("Allan deviation", place),
   );
 }
@@ -111,7 +111,7 @@ function overlay(records) {
   return [
     ...records.filter(({ found }) => !found).map(({ row, why }) => notice("", `Recording ${row.id}: ${why}`)),
     lines.length
-      ? figure("Allan deviations", "Thin lines: what the data sheet says, where it is known.", draw, {
+      ? figure("Allan deviations", "Thin lines: figures of the data sheet, if known.", draw, {
           height: "26rem",
           csv,
         })

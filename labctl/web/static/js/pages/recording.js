@@ -9,6 +9,7 @@ import { motionCard, MOTION_NAMES, MOTION_TITLES } from "../motions/card.js";
 import { allan } from "../recordings/allan.js";
 import { channelUnit } from "../recordings/channels.js";
 import { meanPlots } from "../recordings/mean_plots.js";
+import { REFERENCE_TEXTS } from "../recordings/motion_texts.js";
 import { datasetReadings } from "../recordings/readings.js";
 import { datasetTable } from "../recordings/dataset_table.js";
 import { trace } from "../recordings/trace.js";
@@ -160,6 +161,7 @@ function conditionsCard({ info, datasets, readings: n, kind }, sets) {
             info.max_rate_dps ? `unit's limit ${plainNumber(info.max_rate_dps)} deg/s` : null,
           ]
         : null,
+      rates && info.rate_reference ? ["Rates are", REFERENCE_TEXTS[info.rate_reference]] : null,
       warm && motion !== "rest"
         ? [
             "Gyro temperature",

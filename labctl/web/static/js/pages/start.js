@@ -6,6 +6,7 @@ import { button, card, pageHeader } from "../core/components.js";
 import { presentWords } from "../core/freshness/line.js";
 import { navigate } from "../core/router.js";
 import { isRunning } from "../campaigns/states.js";
+import { DUE_WITHIN, dueNotice } from "../unit/due.js";
 
 /** @import { Bench, Campaign, Unit } from "../../../types/api.js" */
 
@@ -13,16 +14,17 @@ import { isRunning } from "../campaigns/states.js";
 
 /** @param {PageContext} context */
 export async function page({ signal }) {
-  const [units, campaigns, benches] = await Promise.all([
+  const [units, due, campaigns, benches] = await Promise.all([
     get("/api/units", { signal }),
+    get("/api/units", { query: { due_within: DUE_WITHIN }, signal }),
     get("/api/campaigns", { signal }),
     get("/api/benches", { signal }),
   ]);
-  if (units.length || campaigns.length) return overview(units, campaigns, benches);
+  if (units.length || campaigns.length) return overview(units, due, campaigns, benches);
   return h(
     "div",
     { class: "page" },
-    pageHeader("Begin", "Nothing has been measured yet. Three ways to a first calibration, one click each."),
+    pageHeader("Begin", "Nothing has been measured yet. There are three ways to a first calibration, one click each."),
     h(
       "div",
       { class: "columns" },
@@ -31,7 +33,7 @@ export async function page({ signal }) {
         h(
           "p",
           {},
-          "A simulated gyro with a scale factor asymmetry that its data sheet does not mention: 121 data sets, fitted with a published model. Find out which effect is missing.",
+          "A simulated gyro with a scale factor asymmetry that its data sheet does not mention: 121 data sets, fitted with a published model. Find out which effect the model lacks.",
         ),
         button("Simulate a recording", openSimulated, { kind: "primary" }),
       ),
@@ -40,7 +42,7 @@ export async function page({ signal }) {
         h(
           "p",
           {},
-          "695 dwells of a fibre-optic gyro on a heated rate table, measured at Ohio State University. Its fit is fifteen times worse than the noise; find out why.",
+          "695 dwells of a fibre-optic gyro on a heated rate table, measured at Ohio State University. The error after the fit is fifteen times the noise; find out why.",
         ),
         button("Open the real gyro", openExample),
       ),
@@ -85,10 +87,11 @@ async function openExplore(serial, recording, model) {
 
 /**
  * @param {readonly Unit[]} units
+ * @param {readonly Unit[]} due
  * @param {readonly Campaign[]} campaigns
  * @param {readonly Bench[]} benches
  */
-function overview(units, campaigns, benches) {
+function overview(units, due, campaigns, benches) {
   const running = campaigns.find(isRunning);
   return h(
     "div",
@@ -97,6 +100,7 @@ function overview(units, campaigns, benches) {
       "labctl",
       "Compare the model with the measurements: where it fails, which effects are missing, and how the error falls when they are added.",
     ),
+    dueNotice(due, benches),
     h(
       "div",
       { class: "columns", style: "--column-min: 17rem" },

@@ -1,6 +1,6 @@
 // The page of one unit: its calibrations, certifications, error ladder, coefficients and uncertainty in use.
 
-import { download, get } from "../core/http/api.js";
+import { get } from "../core/http/api.js";
 import { h, setChildren } from "../core/elements.js";
 import { instant, number } from "../core/format.js";
 import {
@@ -18,6 +18,7 @@ import { query, updateQuery } from "../core/router.js";
 import { ladderFigure } from "../explore/error_ladder.js";
 import { askCertification, askRevocation, certificationTable } from "../unit/certification.js";
 import { coefficients, comparison } from "../unit/coefficients.js";
+import { exportFiles } from "../unit/export_files.js";
 import { inForce } from "../unit/in_force.js";
 import { trendCard } from "../trend/card.js";
 import { uncertaintyInUse } from "../unit/uncertainty.js";
@@ -82,7 +83,6 @@ export async function page({ params, signal }) {
  * @param {string} explore
  */
 function versions(unit, rows, explore) {
-  const path = { serial: unit.serial };
   /** @param {CalibrationRow} row */
   const act = (row) =>
     row.certified
@@ -132,17 +132,7 @@ function versions(unit, rows, explore) {
               "div",
               { class: "row tight", style: "gap: .2rem" },
               act(row),
-              unit.formats.map(({ id, title, suffix }) =>
-                button(
-                  title,
-                  () =>
-                    download("/api/units/{serial}/calibration", `${unit.serial}-v${row.version}.${suffix}`, {
-                      path,
-                      query: { version: row.version, format: id },
-                    }),
-                  { kind: "tiny quiet" },
-                ),
-              ),
+              h("details", {}, h("summary", {}, "Files"), exportFiles(unit, row.version)),
             ),
         },
       ],

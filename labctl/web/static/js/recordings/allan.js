@@ -130,7 +130,7 @@ function allanFigure(found) {
     h("p", { class: "muted" }, where),
     figure(
       `Recording ${found.recording} Allan deviation`,
-      "Band: 95 % interval. Dotted: the fit that N, B and K come from.",
+      "Band: 95 % interval. Dotted: the fit from which N, B and K are computed.",
       draw,
       { height: "21rem", csv },
     ),

@@ -19,6 +19,8 @@ const NAMES = {
   table_angle_deg: "table angle",
   temperature_c: "gyro temperature",
   chamber_c: "chamber temperature",
+  reference_c: "reference temperature",
+  own_temperature_c: "gyro's own temperature",
   power_s: "time since power-on",
   supply_v: "supply",
   t_s: "time",

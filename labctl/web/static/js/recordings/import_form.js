@@ -88,7 +88,7 @@ export function importForm(taken) {
         result,
         refusedNotice(
           new Error(
-            "None of these files is part of a recording. It takes recording.toml and samples, points or coefficients as .csv or .parquet.",
+            "None of these files is part of a recording. A recording needs recording.toml and one of samples, points or coefficients, as .csv or .parquet.",
           ),
         ),
       );

@@ -27,7 +27,7 @@ const DIVISIONS = [
   ["whole", "the whole file is one"],
   ["gaps", "a new one after each gap"],
   ["rests", "each rest is one"],
-  ["column", "a new value of a column begins one"],
+  ["column", "a new value of a column begins a new data set"],
 ];
 
 /**
@@ -296,7 +296,7 @@ function plot(seen, map) {
   });
   return figure(
     `Columns of ${seen.file}`,
-    "Least and largest value in each of up to 300 stretches, as the file has them.",
+    "Smallest and largest value in each of up to 300 sections of the file, in the file's units.",
     draw,
     {
       height: "18rem",

@@ -4,6 +4,12 @@
 
 /** Motions in which a position says which axis pointed up. */
 export const POSITIONED = new Set(["rates", "turns", "profile"]);
+/** What a table's rate is known from. */
+export const REFERENCE_TEXTS = {
+  computed: "computed from the step clock",
+  demanded: "the demanded rate, not measured",
+  measured: "measured by the encoder",
+};
 /**
  * What a data set's one rate is; none at rest and in poses.
  * @type {Partial<Record<RecordingRow["motion"], string>>}

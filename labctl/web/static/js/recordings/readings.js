@@ -154,8 +154,8 @@ function readingsFigure(state, found) {
   const picture = figure(
     `Recording ${state.id} data set ${state.dataset}`,
     found.readings > n
-      ? `The first ${count(n)} of ${count(found.readings)} readings. Dashed: their mean.`
-      : `All ${count(n)} readings. Dashed: their mean.`,
+      ? `The first ${count(n)} of ${count(found.readings)} readings. Dashed: mean of these readings.`
+      : `All ${count(n)} readings. Dashed: mean of these readings.`,
     draw,
     { height: "18rem", csv },
   );

@@ -58,7 +58,7 @@ export function trendCard(serial, rows, signal) {
         show();
       },
     ),
-    labelledField("Limit of the bias, deg/s", field),
+    labelledField("Largest acceptable bias, deg/s", field),
   );
   return cardWithHeader("Over the years", choose, place);
 }

@@ -57,7 +57,7 @@ export function driftFigure(trend, what) {
   });
   return figure(
     share ? "Scale factor over the years" : "Bias over the years",
-    `What version ${trend.version}, not refitted, leaves of the ${share ? "scale factor" : "bias"} on each recording; bars are U, k = 2. Line and band: drift with its 95 % interval, for as long as the unit ages as it did.${
+    `Error of the ${share ? "scale factor" : "bias"} that remains on each recording with version ${trend.version}, not refitted; bars are expanded uncertainties, k = 2. Line and band: drift with its 95 % interval, valid only if the unit continues to age as before.${
       share || trend.limit_dps === null ? "" : " Dashed: the limit."
     }`,
     draw,

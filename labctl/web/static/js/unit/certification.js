@@ -59,11 +59,18 @@ export async function askCertification(serial, version) {
       hint: needed ? words : null,
       minlength: needed ? known.least_reason_characters : null,
     },
-    { name: "due_days", label: "Due again in days", type: "number", value: "365", required: false },
+    {
+      name: "due_days",
+      label: "Due again in days",
+      hint: known.due_from ? `As the ${known.due_from} says.` : "Empty: no date.",
+      type: "number",
+      value: known.due_days === null ? "" : String(known.due_days),
+      required: false,
+    },
   ];
-  if (needed) fields.push({ name: "override", label: "Certify it despite the objections", type: "checkbox" });
+  if (needed) fields.push({ name: "override", label: "Certify this version despite the objections", type: "checkbox" });
   const answers = await dialog(`Put version ${version} in force`, fields, {
-    text: "Every request for this unit's calibration gets this version from now on. It is written to the audit trail.",
+    text: "From now on, every request for this unit's calibration gets this version. The certification is written to the audit trail.",
     body: assessed(known),
     confirm: "Certify",
     kind: needed ? "danger" : "primary",
@@ -72,7 +79,7 @@ export async function askCertification(serial, version) {
   const body = {
     by: answers.by,
     reason: answers.reason,
-    ...(answers.due_days ? { due_days: Number(answers.due_days) } : {}),
+    due_days: answers.due_days ? Number(answers.due_days) : 0,
     ...(answers.override ? { override: true } : {}),
   };
   await post("/api/units/{serial}/calibrations/{version}/certify", { path: { serial, version }, body });
@@ -91,7 +98,7 @@ export async function askRevocation(serial, version) {
       { name: "reason", label: "Why" },
     ],
     {
-      text: "The unit then has no calibration in force. It is written to the audit trail.",
+      text: "The unit then has no calibration in force. The revocation is written to the audit trail.",
       confirm: "Revoke",
       kind: "danger",
     },

@@ -1,9 +1,9 @@
 // The version in force: by whom, until when, its errors, and the files to download.
 
-import { download } from "../core/http/api.js";
 import { h } from "../core/elements.js";
 import { day, instant, number } from "../core/format.js";
-import { button, factList, modelName, notice } from "../core/components.js";
+import { factList, modelName, notice } from "../core/components.js";
+import { exportFiles } from "./export_files.js";
 import { overridden, verdictChip } from "./certification.js";
 
 /** @import { CalibrationRow, Certification, Unit } from "../../../types/api.js" */
@@ -21,11 +21,10 @@ export function inForce(unit, rows, force) {
         "p",
         {},
         h("strong", {}, "No calibration is in force. "),
-        "Robots that ask for this unit's calibration get none until a version is certified.",
+        "Programs that request this unit's calibration get none until a version is certified.",
       ),
     );
   }
-  const path = { serial: unit.serial };
   const row = rows.find((each) => each.version === unit.certified_version);
   const left = force?.due ? Math.ceil((Date.parse(force.due) - Date.now()) / 86_400_000) : null;
   return h(
@@ -53,14 +52,6 @@ export function inForce(unit, rows, force) {
     ]),
     force?.override ? overridden(force) : null,
     left !== null && left < 0 ? notice("bad", "This calibration is overdue.") : null,
-    h(
-      "div",
-      { class: "row" },
-      unit.formats.map(({ id, title, suffix }) =>
-        button(`Download ${title}`, () =>
-          download("/api/units/{serial}/calibration", `${unit.serial}.${suffix}`, { path, query: { format: id } }),
-        ),
-      ),
-    ),
+    exportFiles(unit, null),
   );
 }

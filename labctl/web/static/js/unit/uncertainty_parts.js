@@ -70,7 +70,7 @@ export function atPlace(answer) {
       ? {
           title: `Same run, expanded, k = ${k}`,
           of: (one) => figure(one.same_run_dps === null ? null : k * one.same_run_dps),
-          from: () => "coefficients and model alone, without another power-on",
+          from: () => "coefficients and model only; valid until the unit is switched off",
         }
       : null,
   ];

@@ -10,6 +10,7 @@ import { jointParts } from "../joint/card.js";
 /** @param {Version} version */
 export function versionFacts(version) {
   return [
+    version.rate_reference ? h("p", {}, `Rates of its recordings: ${version.rate_reference}.`) : null,
     heldOutByLeg(version),
     leftOut(version),
     remembered(version),

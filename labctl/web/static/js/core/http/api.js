@@ -108,15 +108,16 @@ export async function sendFile(path, file, fields) {
 }
 
 /**
- * Fetch a file with the access key and save it as `name`.
+ * Fetch a file with the access key and save it as `name`; returns what its format does not carry, in words.
  * @template {PathOf<"get">} P
  * @param {P} path
  * @param {string} name
  * @param {Options<"get", P>} options
  */
 export async function download(path, name, { path: parameters, query }) {
-  const blob = await (await request(address(path, parameters, query), { headers: headers() })).blob();
-  saveBlob(blob, name);
+  const response = await request(address(path, parameters, query), { headers: headers() });
+  saveBlob(await response.blob(), name);
+  return response.headers.get("X-Labctl-Lost") ?? "";
 }
 
 /**

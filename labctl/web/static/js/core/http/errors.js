@@ -21,7 +21,7 @@ export class Problem extends Error {
 export class Unreachable extends Error {
   constructor() {
     super(
-      "The service does not answer. What is shown is the last answer; the page updates when the service answers again.",
+      "The service does not answer. The page shows the last answer, and is updated when the service answers again.",
     );
   }
 }

@@ -1,0 +1,35 @@
+"""Questions and lines of `labctl bench new` and `labctl bench wiggle` on a terminal."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import typer
+
+from labctl.cli.output import console
+from labctl.services.benches.new_bench import parse_setting
+
+if TYPE_CHECKING:
+    from labctl.services.schemas.benches import FoundResponse
+
+
+def asking(section: str, key: str, what: str, proposal: object) -> object:
+    """Ask a person at the terminal; an empty answer keeps the proposal, or leaves the key out."""
+    answer = typer.prompt(f"{section}.{key}: {what}", default="" if proposal is None else str(proposal))
+    if not str(answer).strip():
+        return None
+    if key == "serial":
+        return str(answer).strip()
+    return parse_setting(f"{key}={answer}")[1]
+
+
+def not_asking(section: str, key: str, what: str, proposal: object) -> object:  # noqa: ARG001  the proposal is enough
+    """Keep the proposal."""
+    return proposal
+
+
+def print_search(line: FoundResponse) -> None:
+    """Print what was found at one address."""
+    mark = "[green]found[/]  " if line.driver else "[yellow]nothing[/]"
+    console.print(f"{mark}  {line.address}  ", end="")
+    console.print(f"{line.text}  [{line.driver}]" if line.driver else line.text, markup=False, soft_wrap=True)

@@ -1,0 +1,120 @@
+"""Identity of the instruments of a bench: what they and their USB adapters say, and whether that is what it was.
+
+The readings of two gyros whose ports have changed places must not go under each other's serial number. A unit that says
+its own serial number is held to the one that it had when the same `serial` was measured last, on any bench. Where the
+wire tells nothing, the USB adapter is held to the one of the last campaign on the bench.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from pydantic import TypeAdapter
+
+from instruments.bench_config import BenchFile, DeviceSettings
+from instruments.transport.adapters import adapter_of
+from labctl.errors import Conflict
+from labctl.store import CampaignRow, Store
+
+OWN, ADAPTER = "serial", "adapter"
+Reported = Mapping[str, Mapping[str, str]]
+_REPORTED = TypeAdapter(dict[str, dict[str, str]])
+
+
+def reported_of(bench: BenchFile, said: Reported) -> dict[str, dict[str, str]]:
+    """Return device -> what it says of itself, with the USB adapter of each device on a serial port."""
+    found: dict[str, dict[str, str]] = {}
+    for name, section in bench.sections.items():
+        adapter = adapter_of(section.port)
+        if known := dict(said.get(name, {})) | ({ADAPTER: adapter} if adapter else {}):
+            found[name] = known
+    return found
+
+
+def reported_in(campaign: CampaignRow) -> dict[str, dict[str, str]]:
+    """Return device -> what it said of itself when a campaign began; empty for one of before that was kept."""
+    return _REPORTED.validate_python(campaign.bench.get("reported") or {})
+
+
+def pinned(bench: BenchFile, reported: Reported) -> BenchFile:
+    """Return a bench that accepts only the instruments that were reported, where its file names no others."""
+    fixed = {name: _pinned(section, reported.get(name, {})) for name, section in bench.instruments.items()}
+    named = {
+        kind: tuple(_pinned(each, reported.get(each.name, {})) for each in sections)
+        for kind, sections in (("gyros", bench.gyros), ("references", bench.references))
+    }
+    return bench.model_copy(update={**fixed, **named})
+
+
+def refuse_changed(store: Store, bench: BenchFile, reported: Reported) -> None:
+    """Raise Conflict where an instrument is another one than in the campaign before, and no bench file says so."""
+    for gyro in bench.gyros:
+        before = store.campaigns.newest_of_unit(gyro.serial)
+        if before is None:
+            continue
+        then = _reported_then(before, _name_then(before, gyro.serial))
+        now = reported.get(gyro.name, {})
+        if (was := then.get(OWN)) and (found := now.get(OWN)):
+            if found not in {was, gyro.own_serial}:
+                raise Conflict(_other_unit(gyro.name, gyro.serial, (was, found), before))
+        elif before.bench_name == bench.name:
+            _refuse_other_adapter(gyro.name, gyro, then, now, before)
+    before = store.campaigns.newest_on_bench(bench.name)
+    gyros = {gyro.name for gyro in bench.gyros}
+    for name, section in bench.sections.items():
+        if before is None or name in gyros:
+            continue
+        _refuse_other_adapter(name, section, _reported_then(before, name), reported.get(name, {}), before)
+
+
+def _refuse_other_adapter(
+    name: str, section: DeviceSettings, then: Mapping[str, str], now: Mapping[str, str], before: CampaignRow
+) -> None:
+    was, found = then.get(ADAPTER, ""), now.get(ADAPTER, "")
+    if not was or not found or was == found or section.adapter is not None:  # a named one is checked when it is opened
+        return
+    owner = _owner(before, ADAPTER, found)
+    swapped = f", which {owner} was on: two adapters may have changed places" if owner else ""
+    raise Conflict(
+        f"{name}: port {section.port} is on USB adapter {found}{swapped}; in campaign {before.id} it was {was}. Give "
+        "the "
+        f"right port by its path in /dev/serial/by-id, or, if this is right, set adapter = '{found}' in its section of "
+        "the bench file"
+    )
+
+
+def _other_unit(name: str, serial: str, own: tuple[str, str], before: CampaignRow) -> str:
+    was, found = own
+    owner = _owner(before, OWN, found)
+    swapped = f", which {owner} had: the two are exchanged" if owner and owner != name else ""
+    return (
+        f"{name}: the unit says serial number {found}{swapped}; in campaign {before.id} unit {serial} said {was}. "
+        "Connect "
+        f"the right unit, give this one a `serial` of its own, or, if it is right, set own_serial = '{found}' in the "
+        "bench "
+        "file"
+    )
+
+
+def _owner(before: CampaignRow, what: str, value: str) -> str:
+    """Return the device that reported a value in a campaign; empty for none."""
+    then = reported_in(before)
+    return next((name for name, said in then.items() if said.get(what) == value), "")
+
+
+def _name_then(before: CampaignRow, serial: str) -> str:
+    gyros: Any = before.bench.get("gyros") or ()
+    return next((str(gyro["name"]) for gyro in gyros if gyro.get("serial") == serial), "")
+
+
+def _reported_then(before: CampaignRow, name: str) -> Mapping[str, str]:
+    return reported_in(before).get(name, {})
+
+
+def _pinned(section: DeviceSettings, reported: Mapping[str, str]) -> DeviceSettings:
+    known = {"adapter": reported.get(ADAPTER)}
+    if "own_serial" in type(section).model_fields:
+        known["own_serial"] = reported.get(OWN)
+    update = {key: value for key, value in known.items() if value and getattr(section, key) is None}
+    return section.model_copy(update=update)

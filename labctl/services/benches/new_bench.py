@@ -1,0 +1,163 @@
+"""A new bench file: what was found on the ports and hosts, completed by a person, checked, and written."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import tomli_w
+from pydantic import ValidationError
+
+from instruments.bench_config import BenchFile
+from instruments.clock import Clock, SystemClock, WallClock
+from instruments.discovery.find import Found, ask_itself, find_on_host, find_on_port
+from instruments.discovery.ports import PortInfo, port_info, serial_ports
+from instruments.drivers.resolution import resolve
+from labctl.errors import BadInput
+from labctl.services.schemas.benches import FoundResponse, NewBenchRequest, NewBenchResponse
+
+MODBUS_PORT = 502
+#: Asks a person for a value: section, key, what it is, the proposal; returns what goes into the file, None for none.
+Ask = Callable[[str, str, str, object], object]
+
+
+@dataclass
+class Section:
+    """One section of the bench file to be."""
+
+    name: str  #: table, chamber, or the gyro's name
+    kind: str
+    found: Found
+    values: dict[str, object] = field(default_factory=dict)
+
+
+def new_bench(
+    file: Path, request: NewBenchRequest, ask: Ask, seen: Callable[[FoundResponse], None], *, force: bool
+) -> NewBenchResponse:
+    """Find instruments, ask for what they do not say, and write a bench file; `seen` gets each address as it is done.
+
+    Raises BadInput where the file exists and `force` is not given, where no gyro answers, and for a value that is
+    missing or wrong.
+    """
+    if file.exists() and not force:
+        raise BadInput(f"{file} exists and stays as it is; give another name, or --force to replace it")
+    clock = SystemClock()
+    found, lines = [], []
+    for info, each in search(request.ports, request.hosts, clock):
+        found.append((info, each))
+        text = each.recognised.text if each.recognised is not None else each.why_not
+        lines.append(FoundResponse(address=each.address, kind=each.kind, driver=each.driver, text=text))
+        seen(lines[-1])
+    sections = sections_of(found)
+    complete(sections, request.settings, clock, ask)
+    made = document(request.name, request.latitude_deg, sections)
+    write(file, made, sections)
+    return NewBenchResponse.model_validate({"file": str(file), "found": lines, "bench": made})
+
+
+def search(ports: Sequence[str], hosts: Sequence[str], clock: Clock) -> Iterator[tuple[PortInfo | None, Found]]:
+    """Yield what is on each port and host; without ports named, on all of this computer. Nothing moves."""
+    for info in [port_info(path) for path in ports] or serial_ports():
+        yield info, Found(info.path, why_not=info.trouble) if info.trouble else find_on_port(info.path, clock)
+    for host in hosts:
+        name, _, number = host.partition(":")
+        if number and not number.isdigit():
+            raise BadInput(f"--host {host}: {number!r} is no TCP port; give NAME or NAME:NUMBER")
+        yield None, find_on_host(name, int(number or MODBUS_PORT), clock)
+
+
+def sections_of(found: Sequence[tuple[PortInfo | None, Found]]) -> list[Section]:
+    """Return the sections of what was recognised: one table, one chamber and the gyros. Raises BadInput."""
+    made: list[Section] = []
+    for info, each in found:
+        if each.recognised is None:
+            continue
+        if each.kind != "gyro" and (other := next((one for one in made if one.kind == each.kind), None)):
+            raise BadInput(
+                f"two {each.kind}s answer, at {other.found.address} and {each.address}: a bench has one; name the "
+                "ports "
+                "of this bench with --port and --host"
+            )
+        section = Section(_name(each, made), each.kind, each, dict(each.recognised.settings))
+        section.values = {"driver": each.driver, **_address(each, info), **section.values}
+        made.append(section)
+    if not any(section.kind == "gyro" for section in made):
+        raise BadInput(
+            "no gyro was recognised, and a bench needs one: check power and cables, name its port with --port, or copy "
+            "the "
+            "shipped example-real.toml"
+        )
+    return made
+
+
+def complete(sections: Sequence[Section], settings: Mapping[str, object], clock: Clock, ask: Ask) -> None:
+    """Fill in what instruments say of themselves, what `settings` give (SECTION.KEY) and what a person answers."""
+    names = {section.name for section in sections}
+    for key in settings:
+        if key.rpartition(".")[0] not in names | {""}:
+            raise BadInput(f"--set {key}: there is no such section; there are {', '.join(sorted(names))}")
+    for section in sections:
+        for key, value in ask_itself(section.name, section.values, clock).items():
+            section.values.setdefault(key, value)
+        given = {key.rpartition(".")[2]: value for key, value in settings.items() if key.startswith(f"{section.name}.")}
+        section.values |= given
+        assert section.found.recognised is not None
+        for key, what in section.found.recognised.to_confirm.items():
+            if key not in given and (value := ask(section.name, key, what, section.values.get(key))) is not None:
+                section.values[key] = value
+
+
+def document(name: str, latitude_deg: float | None, sections: Sequence[Section]) -> dict[str, object]:
+    """Return the bench file as a document, checked by the models of its drivers. Raises BadInput."""
+    made: dict[str, object] = {"name": name}
+    if latitude_deg is not None:
+        made["latitude_deg"] = latitude_deg
+    made |= {section.kind: section.values for section in sections if section.kind != "gyro"}
+    made["gyros"] = [{"name": section.name, **section.values} for section in sections if section.kind == "gyro"]
+    try:
+        resolve(BenchFile.model_validate(made))
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise BadInput(
+            f"the bench file would not be valid: {where}: {first['msg']}; give it with --set SECTION.KEY=VALUE"
+        ) from error
+    return made
+
+
+def write(path: Path, made: Mapping[str, object], sections: Sequence[Section]) -> None:
+    """Write a bench file; raises BadInput."""
+    said = [f"#   {s.name}: {s.found.recognised.text} at {s.found.address}" for s in sections if s.found.recognised]
+    head = [f"# Written by `labctl bench new` at {WallClock().utc():%Y-%m-%d %H:%M} UTC. What answered:", *said]
+    foot = "# `labctl bench check` asks every instrument; nothing moves. Keys: docs/reference/instruments.md."
+    try:
+        path.write_text("\n".join([*head, foot, tomli_w.dumps(dict(made))]), encoding="utf-8")
+    except OSError as error:
+        raise BadInput(f"{path} cannot be written ({error.strerror}); give another name") from error
+
+
+def parse_setting(text: str) -> tuple[str, object]:
+    """Return SECTION.KEY and value of `SECTION.KEY=VALUE`; a value that is not TOML is a text. Raises BadInput."""
+    key, equals, value = text.partition("=")
+    if not equals or not key.strip():
+        raise BadInput(f"--set {text}: give SECTION.KEY=VALUE, as table.max_rate_dps=100")
+    try:
+        return key.strip(), tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        return key.strip(), value
+
+
+def _name(found: Found, made: Sequence[Section]) -> str:
+    if found.kind != "gyro":
+        return found.kind
+    same = sum(section.found.driver == found.driver for section in made)
+    return f"{found.driver}-{same + 1}" if same else found.driver
+
+
+def _address(found: Found, info: PortInfo | None) -> dict[str, object]:
+    if info is not None:
+        return {"port": info.path, **({"adapter": info.adapter} if info.adapter else {})}
+    host, _, number = found.address.rpartition(":")
+    return {"host": host, **({} if int(number) == MODBUS_PORT else {"tcp_port": int(number)})}

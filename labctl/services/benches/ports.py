@@ -1,0 +1,13 @@
+"""The serial ports of this computer, as a response."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+
+from instruments.discovery.ports import serial_ports
+from labctl.services.schemas.benches import PortResponse
+
+
+def list_ports() -> list[PortResponse]:
+    """Return every serial port, with its adapter and why it cannot be used; nothing is sent to any."""
+    return [PortResponse(**asdict(each)) for each in serial_ports()]

@@ -1,0 +1,60 @@
+"""The reference instruments of a campaign's bench: the columns that they add to every recording."""
+
+from __future__ import annotations
+
+from instruments.bench import Bench
+from instruments.bench_config import BenchFile
+from instruments.interfaces.gyro import Channel
+from labctl.errors import BadInput
+from labctl.json_types.recordings import RawChannelJson
+
+#: Column of a recording that a fit takes as the temperature.
+TEMPERATURE = "temperature_c"
+
+
+def raw_channel(channel: Channel) -> RawChannelJson:
+    """Return a channel as it is stored."""
+    return {"name": channel.name, "unit": channel.unit, "scale": channel.scale, "offset": channel.offset}
+
+
+def reference_channels(bench: Bench, bench_file: BenchFile) -> tuple[RawChannelJson, ...]:
+    """Return the channels of every reference instrument, the chosen temperature marked.
+
+    Raises BadInput for two of one name, and for a chosen instrument that measures no temperature.
+    """
+    found: list[RawChannelJson] = []
+    for settings in bench_file.references:
+        channels = [raw_channel(channel) for channel in bench.references[settings.name].channels]
+        refuse_doubled_columns(settings.name, tuple(channels), tuple(found))
+        if settings.is_temperature:
+            warm = next((each for each in channels if each["unit"] == "deg C"), None)
+            if warm is None:
+                raise BadInput(
+                    f"{settings.name}: is_temperature is set, and it measures none; set it for a thermometer"
+                )
+            warm["stands_for"] = TEMPERATURE
+        found += channels
+    return tuple(found)
+
+
+def refuse_doubled_columns(name: str, channels: tuple[RawChannelJson, ...], others: tuple[RawChannelJson, ...]) -> None:
+    """Raise BadInput where a column would have two sources."""
+    if doubled := {each["name"] for each in channels} & {each["name"] for each in others}:
+        column = min(doubled)
+        raise BadInput(
+            f"{name}: column {column} has another source already; set columns = "
+            f'{{ {column} = "other_{column}" }} in its [[references]]'
+        )
+
+
+def reference_notes(bench: BenchFile) -> str:
+    """Return what a recording says about the instrument whose temperature it is fitted by; empty for the unit's own."""
+    for each in bench.references:
+        if each.is_temperature:
+            parts = [f"temperature_c is by {each.name}", each.model_dump().get("model", ""), each.serial]
+            if each.certificate:
+                parts.append(f"certificate {each.certificate}")
+            if each.u_c is not None:
+                parts.append(f"standard uncertainty {each.u_c:g} K")
+            return ", ".join(part for part in parts if part)
+    return ""

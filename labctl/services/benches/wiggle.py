@@ -1,0 +1,169 @@
+"""The wiggle test: a person turns one unit after the other by hand, and the readings say on which port each one is.
+
+Where the wire tells nothing, only this shows that the readings of two units do not go under each other's serial number.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from instruments.bench import Bench, open_bench
+from instruments.bench_config import BenchFile
+from instruments.clock import Clock
+from instruments.interfaces.gyro import Gyro, Readings
+from labctl.errors import BadInput
+from labctl.services.benches.check import clock_of
+from labctl.services.planning.loading import load_bench
+from labctl.services.schemas.benches import WiggleResponse, WiggleUnit
+from procedures.monitoring.turn_course import Nominal, nominal_outputs
+
+#: All units are at rest for so long before the first one is turned, and again before the next, s.
+REST_S, REST_BETWEEN_S = 3.0, 1.0
+#: All units are read this often, s.
+BLOCK_S = 0.25
+#: How long a movement is waited for, and followed once it has begun, s.
+WITHIN_S, FOLLOW_S = 60.0, 2.0
+#: A unit moves when the root mean square of its rates about those at rest exceeds both: deg/s, times its scatter.
+LEAST_DPS, TIMES_SCATTER = 5.0, 10.0
+#: Another one that moves more than this share of the fastest was turned too.
+ALSO_SHARE = 0.2
+
+Say = Callable[[str], None]
+Rates = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class AtRest:
+    """Mean (axes,) and scatter of the rates of a unit at rest, deg/s."""
+
+    mean_dps: Rates
+    scatter_dps: float
+
+    @property
+    def limit_dps(self) -> float:
+        """Root mean square from which on the unit moves."""
+        return max(LEAST_DPS, TIMES_SCATTER * self.scatter_dps)
+
+
+def wiggle(source: str, say: Say) -> WiggleResponse:
+    """Ask for one unit of a bench after the other to be turned, and return which moved; `say` gets each sentence.
+
+    Raises BadInput for a unit without a gyro channel, InstrumentError.
+    """
+    bench = load_bench(source)
+    clock = clock_of(bench)
+    return wiggle_units(bench, source, open_bench(bench, clock), clock, say)
+
+
+def wiggle_units(bench: BenchFile, source: str, opened: Bench, clock: Clock, say: Say) -> WiggleResponse:
+    """Carry out the test on an open bench, and close it; raises as `wiggle`."""
+    try:
+        test = _Test(opened.gyros, clock)
+        say(f"leave every unit at rest for {REST_S:g} s")
+        test.learn_rest()
+        moved = {}
+        for unit in bench.gyros:
+            say(f"turn unit {unit.name} ({unit.serial}) by hand, back and forth; leave the others at rest")
+            moved[unit.name] = test.moved()
+            say(_said(unit.name, moved[unit.name]))
+            test.await_rest()
+    finally:
+        opened.close()
+    units = [_unit(bench, name, found, moved) for name, found in moved.items()]
+    return WiggleResponse(bench=source, ok=all(unit.ok for unit in units), units=units)
+
+
+class _Test:
+    """The units, read in turn while their ports buffer."""
+
+    def __init__(self, gyros: Mapping[str, Gyro], clock: Clock) -> None:
+        self._gyros, self._clock = gyros, clock
+        self._outputs: dict[str, dict[str, Nominal]] = {}
+        for name, gyro in gyros.items():
+            outputs = nominal_outputs(tuple(gyro.channels), gyro.identify().output)
+            if not outputs:
+                raise BadInput(f"{name}: it has no gyro channel to compare; leave it out of the bench file")
+            self._outputs[name] = outputs
+            gyro.start()
+            gyro.read_latest()
+        self._rest: dict[str, AtRest] = {}
+
+    def learn_rest(self) -> None:
+        """Learn what each unit sends at rest; raises BadInput for one that moves meanwhile."""
+        blocks = [self._read() for _ in range(round(REST_S / BLOCK_S))]
+        for name in self._gyros:
+            rates = np.concatenate([block[name] for block in blocks])
+            if len(rates) < 2:
+                raise BadInput(f"{name}: {len(rates)} readings in {REST_S:g} s at rest; run `labctl bench check` first")
+            mean = np.mean(rates, axis=0)
+            scatter = float(np.std(rates, axis=0, ddof=1).max())
+            if scatter > LEAST_DPS:
+                raise BadInput(f"{name}: it moved while it was to be at rest ({scatter:.2g} deg/s); start again")
+            self._rest[name] = AtRest(mean, scatter)
+
+    def moved(self) -> list[str]:
+        """Return the units that moved, the fastest first; empty where none did in time."""
+        end_s = self._clock.now_s() + WITHIN_S
+        largest = dict.fromkeys(self._gyros, 0.0)
+        begun = False
+        while self._clock.now_s() < end_s:
+            for name, share in self._shares(self._read()).items():
+                largest[name] = max(largest[name], share)
+            if not begun and max(largest.values()) > 1.0:
+                begun, end_s = True, self._clock.now_s() + FOLLOW_S
+        fastest = max(largest.values())
+        found = [name for name, share in largest.items() if share > max(1.0, ALSO_SHARE * fastest)]
+        return sorted(found, key=lambda name: -largest[name])
+
+    def await_rest(self) -> None:
+        """Wait until all units are at rest again, at most as long as for a movement."""
+        end_s, still_s = self._clock.now_s() + WITHIN_S, 0.0
+        while still_s < REST_BETWEEN_S and self._clock.now_s() < end_s:
+            still_s = still_s + BLOCK_S if max(self._shares(self._read()).values()) <= 1.0 else 0.0
+
+    def _read(self) -> dict[str, Rates]:
+        """Return the rates (n, axes) of each unit since the last call, deg/s."""
+        found = {}
+        for name, gyro in self._gyros.items():
+            readings = gyro.read(max(BLOCK_S / len(self._gyros), 1.5 / gyro.sample_rate_hz))
+            found[name] = _rates(readings, self._outputs[name])
+        return found
+
+    def _shares(self, rates: Mapping[str, Rates]) -> dict[str, float]:
+        """Return how fast each unit moves as a share of the limit from which on it moves."""
+        return {
+            name: float(np.sqrt(np.mean(np.sum((each - self._rest[name].mean_dps) ** 2, axis=1))))
+            / self._rest[name].limit_dps
+            if len(each)
+            else 0.0
+            for name, each in rates.items()
+        }
+
+
+def _rates(readings: Readings, outputs: Mapping[str, Nominal]) -> Rates:
+    return np.column_stack([output.rate_dps(readings.raw[output.channel.name]) for output in outputs.values()])
+
+
+def _said(asked: str, found: list[str]) -> str:
+    return f"{asked} was asked for; {' and '.join(found) or 'nothing'} moved"
+
+
+def _unit(bench: BenchFile, name: str, found: list[str], moved: Mapping[str, list[str]]) -> WiggleUnit:
+    settings = {gyro.name: gyro for gyro in bench.gyros}
+    port = settings[name].port or settings[name].host or ""
+    if found == [name]:
+        text = f"it is on {port}"
+    elif not found:
+        text = f"nothing moved within {WITHIN_S:g} s: turn it further than a quarter turn, and check its port {port}"
+    elif len(found) > 1:
+        text = f"{' and '.join(found)} moved: turn it alone, and start again"
+    else:
+        (other,) = found
+        there = settings[other].port or settings[other].host
+        exchanged = "the two ports are exchanged" if moved.get(other) == [name] else "the ports do not fit the names"
+        text = f"{other} moved instead, so {exchanged}: set port = '{there}' for {name} in the bench file"
+    return WiggleUnit(unit=name, serial=settings[name].serial, port=port, moved=found, ok=found == [name], text=text)

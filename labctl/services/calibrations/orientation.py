@@ -1,0 +1,188 @@
+"""Static bias and orientation of a recording, or of a file of readings, corrected by a calibration or not."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+from typing import get_args
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv as pacsv
+import pyarrow.parquet as pq
+
+from labctl.calibration import Calibration, CalibrationWarning, read_calibration
+from labctl.compensator import Compensator
+from labctl.error_per_turn import static_bias
+from labctl.errors import BadInput, BadRecording, NotCertified, NotEnoughData
+from labctl.fitting.numeric.arrays import Array
+from labctl.orientation import Orientation
+from labctl.recording import OutputUnit, RecordingInfo
+from labctl.recording.data_files import read_table
+from labctl.recording.info import Axis
+from labctl.recording.recording import Columns
+from labctl.services.calibrations.served import calibration_file
+from labctl.services.recordings.loading import newest_row
+from labctl.services.schemas.recordings import OrientationResponse, StaticBiasResponse
+from labctl.store import Store
+
+#: Points of a course that is sent.
+MOST_POINTS = 2000
+TABLES = frozenset({".csv", ".parquet"})
+
+
+@dataclass(frozen=True)
+class OrientationOptions:
+    """How the angle is followed."""
+
+    axis: str | None = None  #: None: the only one
+    rest_s: float = 0.0  #: the unit is at rest for so long from the first reading on: its static bias is taken off
+    instability_dps: float = 0.0  #: of the bias, deg/s: what a mean does not remove
+    standstill: bool = True  #: hold the angle, and learn the offset, at standstill
+
+
+@dataclass(frozen=True)
+class _Source:
+    """What the angle is followed in: its name in errors, its columns, the units of its outputs."""
+
+    what: str
+    columns: Columns
+    units: dict[str, OutputUnit]
+
+
+def orientation_of_unit(
+    store: Store, serial: str, recording: int | None, version: int | None, options: OrientationOptions
+) -> OrientationResponse:
+    """Follow the angle in a unit's recording (default: the newest); see `orientation_of_recording`."""
+    return orientation_of_recording(store, newest_row(store, serial, recording).id, version, options)
+
+
+def orientation_of_recording(
+    store: Store, recording: int, version: int | None, options: OrientationOptions
+) -> OrientationResponse:
+    """Follow the angle in a recording's readings, corrected by a version: default the one in force, 0 none.
+
+    Raises NotFound, BadInput, NotEnoughData.
+    """
+    row = store.recordings.get(recording)
+    if row.kind != "samples":
+        raise BadInput(f"recording {recording} holds {row.kind}: an angle needs single readings; name one of readings")
+    info = RecordingInfo.model_validate(row.info)
+    parts = [columns for _, columns in store.recordings.iter_datasets(recording)]
+    columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]} if parts else {}
+    return _follow(
+        _Source(f"recording {recording}", columns, dict(info.output.items())),
+        _version(store, row.serial, version),
+        options,
+    )[0]
+
+
+def orientation_of_file(
+    source: Path, calibration: Path | None, target: Path | None, options: OrientationOptions
+) -> OrientationResponse:
+    """Follow the angle in a file of readings (`t_s`, `gyro_z` in deg/s or in the calibration's unit, `temperature_c`).
+
+    With `target` the rows are written there with `angle_z_deg`. Raises BadInput, BadRecording, BadCalibrationFile,
+    NotEnoughData.
+    """
+    if target is not None and (target.suffix not in TABLES or target.resolve() == source.resolve()):
+        raise BadInput(f"{target}: name a result file other than the input, ending in .csv or .parquet")
+    if source.suffix not in TABLES:
+        raise BadInput(f"{source}: give a table, .csv or .parquet; import anything else, then name the unit")
+    known = None if calibration is None else read_calibration(calibration)
+    columns = read_table(source)
+    answer, angle = _follow(_Source(str(source), columns, {}), known, options)
+    if target is not None:
+        table = pa.table({**columns, f"angle_{answer.axis}_deg": angle})
+        (pq.write_table if target.suffix == ".parquet" else pacsv.write_csv)(table, target)
+    return answer
+
+
+def _version(store: Store, serial: str, version: int | None) -> Calibration | None:
+    if version == 0:
+        return None
+    try:
+        return read_calibration(calibration_file(store, serial, version, "json").content)
+    except NotCertified:
+        return None
+
+
+def _follow(
+    source: _Source, calibration: Calibration | None, options: OrientationOptions
+) -> tuple[OrientationResponse, Array]:
+    """Return the answer, and the angle at every row, NaN before the end of the rest and where a row is left out."""
+    axis = _axis(source, options.axis)
+    t_s, (rate, warning) = _column(source, "t_s"), _rate_dps(source, axis, calibration)
+    good = np.isfinite(rate) & np.isfinite(t_s)
+    if "valid" in source.columns:
+        good &= _column(source, "valid") != 0
+    rows = np.flatnonzero(good)
+    if len(rows) == 0:
+        raise NotEnoughData(f"{source.what}: gyro_{axis} has no valid reading; check the column")
+    if len(back := np.flatnonzero(np.diff(t_s[rows]) <= 0)):
+        row = int(rows[back[0] + 1])
+        raise BadRecording(
+            f"{source.what}: column 't_s', row {row + 1}: {t_s[row]:g} s is not after the reading before it; sort the "
+            "rows by time"
+        )
+    resting = t_s[rows] - t_s[rows[0]] < options.rest_s
+    bias = static_bias(rate[rows][resting], options.instability_dps) if options.rest_s > 0 else None
+    moving = rows[~resting]
+    o = Orientation(offset_dps=bias.bias_dps if bias else 0.0)
+    angle = np.full(len(t_s), np.nan)
+    standing_s, before = 0.0, None
+    for row in moving.tolist():
+        angle[row] = o.update(float(t_s[row]), float(rate[row]), still=None if options.standstill else False)
+        standing_s += float(t_s[row]) - before if o.standing and before is not None else 0.0
+        before = float(t_s[row])
+    seconds = float(t_s[moving[-1]] - t_s[moving[0]]) if len(moving) else 0.0
+    shown = (
+        moving[np.unique(np.linspace(0, len(moving) - 1, min(len(moving), MOST_POINTS)).astype(int))]
+        if len(moving)
+        else moving
+    )
+    answer = OrientationResponse(
+        axis=axis, version=calibration.version if calibration else None, readings=len(rows),
+        left_out=len(t_s) - len(rows), seconds=seconds,
+        static_bias=None if bias is None else StaticBiasResponse(
+            bias_dps=bias.bias_dps, u_dps=bias.u_dps, readings=bias.readings, seconds=options.rest_s
+        ),
+        angle_deg=o.angle_deg, drift_deg_per_min=60 * o.angle_deg / seconds if seconds > 0 else None,
+        offset_dps=o.offset_dps, standing_s=standing_s, gap_s=o.gap_s, t_s=t_s[shown].tolist(),
+        course_deg=angle[shown].tolist(), warning=warning,
+    )  # fmt: skip
+    return answer, angle
+
+
+def _axis(source: _Source, asked: str | None) -> str:
+    there = [axis for axis in get_args(Axis) if f"gyro_{axis}" in source.columns]
+    if asked is None and len(there) == 1:
+        return there[0]
+    if asked is None or asked not in there:
+        said = ", ".join(there) or "none"
+        raise BadInput(f"{source.what}: axis {asked or 'not named'}; name one that it has a column gyro_ of ({said})")
+    return asked
+
+
+def _rate_dps(source: _Source, axis: str, calibration: Calibration | None) -> tuple[Array, str]:
+    """Return the rate about an axis at every row, deg/s, and what has to be said of the calibration."""
+    if calibration is None:
+        unit = source.units.get(axis, OutputUnit())
+        return (_column(source, f"gyro_{axis}") - unit.offset) / unit.scale, ""
+    if axis not in calibration.axes:
+        raise BadInput(f"{source.what}: the calibration has axes {', '.join(calibration.axes)}, not {axis}; name one")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", CalibrationWarning)  # the answer says it
+        compensator = Compensator(calibration)
+    output = np.column_stack([_column(source, f"gyro_{each}") for each in compensator.axes])
+    warm = _column(source, "temperature_c") if compensator.needs_temperature else None
+    known = {name: _column(source, name) for name in compensator.needs}
+    found = compensator.compensate_output(output, warm, known)
+    return found.rate_dps[:, compensator.axes.index(axis)], compensator.warning
+
+
+def _column(source: _Source, name: str) -> Array:
+    if name not in source.columns:
+        raise BadRecording(f"{source.what}: column {name!r} is missing; add it")
+    return np.asarray(source.columns[name], dtype=np.float64)

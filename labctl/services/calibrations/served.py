@@ -1,0 +1,83 @@
+"""Calibrations as files for consumers, with the certification in them and what HTTP says beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import lru_cache
+
+from labctl.calibration import with_certification
+from labctl.certification import Certification, State
+from labctl.exports import Loss
+from labctl.services.calibrations.exporting import exported
+from labctl.store import ServedCalibration, Store
+
+#: State of a version that was never certified.
+NOT_CERTIFIED = "not-certified"
+#: Calibration files with their certifications in memory; one has some 20 kB.
+MOST_FILES = 256
+
+
+@dataclass(frozen=True)
+class CalibrationFile:
+    """A calibration as a consumer gets it: bytes, their tag, and the certification that is in them, if there is one."""
+
+    content: bytes
+    media_type: str
+    etag: str
+    what: str  #: unit and version
+    certification: Certification | None
+    losses: tuple[Loss, ...] = ()  #: what the format does not carry
+
+    def headers(self, now: datetime) -> dict[str, str]:
+        """Return what HTTP says beside the bytes at an aware time: tag, state, due date, and a warning."""
+        known = self.certification
+        found = {"ETag": f'"{self.etag}"', "Cache-Control": "no-cache", "X-Labctl-State": NOT_CERTIFIED}
+        if known is None:
+            return found
+        found["X-Labctl-State"] = known.state
+        if known.due is not None and known.state != "revoked":
+            found["X-Labctl-Due"] = f"{known.due.astimezone(UTC):%Y-%m-%dT%H:%M:%SZ}"
+        if text := known.warning(self.what, now):
+            found["Warning"] = f"299 labctl {_quoted(text)}"
+        return found
+
+
+def calibration_file(
+    store: Store, serial: str, version: int | None, format_name: str, options: Sequence[str] = ()
+) -> CalibrationFile:
+    """Return a calibration in a consumer's format; without a version the certified one. Options: lines KEY=VALUE.
+
+    The file of a version that was ever certified has its `certification`, and a hash over that too. Raises NotFound,
+    NotCertified, BadInput for an unknown format or option, and for a calibration that the format cannot carry.
+    """
+    found = store.certifications.served(serial, version)
+    if found is None:
+        document, hash_ = store.calibrations.document(serial, version)  # says why there is none
+        found = ServedCalibration(document, hash_, None, in_force=False)
+    known = _certification(found)
+    number = version if found.act is None else found.act.version
+    content, tag = (found.document, found.hash) if known is None else _certified(found.document, known)
+    what = f"{serial} version {number}"
+    if format_name == "json" and not options:
+        return CalibrationFile(content, "application/json", tag, what, known)
+    file = exported(store, content, format_name, options)
+    return CalibrationFile(file.content, file.media_type, f"{tag}-{file.tag}", what, known, file.losses)
+
+
+def _certification(found: ServedCalibration) -> Certification | None:
+    if (act := found.act) is None:
+        return None
+    state: State = "in-force" if found.in_force else "revoked" if act.act == "revoke" else "superseded"
+    return Certification(state, act.by, act.reason, act.at, act.due_at, found.hash)
+
+
+#: Files of certified versions, with their hashes, as they were served last.
+_certified = lru_cache(maxsize=MOST_FILES)(with_certification)
+
+
+def _quoted(text: str) -> str:
+    """Return a quoted string of an HTTP field (RFC 9110, 5.6.4): visible ASCII, what else there is becomes `?`."""
+    plain = "".join(char if " " <= char <= "~" else "?" for char in text)
+    return '"' + plain.replace("\\", "\\\\").replace('"', '\\"') + '"'

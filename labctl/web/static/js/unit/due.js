@@ -1,0 +1,64 @@
+// Units that are due: in words, and the start of a recalibration in one press.
+
+import { post } from "../core/http/api.js";
+import { h } from "../core/elements.js";
+import { day, instant } from "../core/format.js";
+import { button, notice, toast } from "../core/components.js";
+import { navigate } from "../core/router.js";
+import { askBenchClear } from "../bench/actions.js";
+
+/** @import { Bench, Unit } from "../../../types/api.js" */
+
+/** How far ahead a unit that is due is shown; the service's own metric has the same. */
+export const DUE_WITHIN = "30d";
+
+/**
+ * Enter the campaign that the version in force is from into the schedule: it begins as soon as the bench is free.
+ * @param {Unit} unit
+ * @param {readonly Bench[]} benches
+ */
+export function recalibrateButton(unit, benches) {
+  const again = unit.recalibration;
+  const bench = again && benches.find((each) => each.name === again.bench);
+  if (!again || !bench) return null;
+  return button(
+    "Recalibrate",
+    async () => {
+      const clear = await askBenchClear(bench, { later: true });
+      if (!clear) return;
+      const made = await post("/api/campaigns", { body: { recipe: again.recipe, at: "now", ...clear } });
+      toast("good", `${again.name} begins ${instant("due_at" in made ? made.due_at : null)}, your time.`);
+      await navigate("/campaigns");
+    },
+    { kind: "tiny" },
+  );
+}
+
+/**
+ * A line for each unit that is due or overdue; null without one.
+ * @param {readonly Unit[]} due
+ * @param {readonly Bench[]} benches
+ */
+export function dueNotice(due, benches) {
+  if (!due.length) return null;
+  return notice(
+    due.some((unit) => unit.overdue) ? "bad" : "warn",
+    h(
+      "ul",
+      { class: "plain", "aria-label": "Units that are due" },
+      due.map((unit) =>
+        h(
+          "li",
+          { class: "row space-between" },
+          h(
+            "span",
+            {},
+            h("a", { href: `/units/${encodeURIComponent(unit.serial)}` }, unit.serial),
+            ` ${unit.overdue ? "was" : "is"} due on ${unit.due ? day(unit.due) : "–"}.`,
+          ),
+          recalibrateButton(unit, benches),
+        ),
+      ),
+    ),
+  );
+}
