@@ -14,6 +14,7 @@ from importlib.metadata import version as package_version
 from pathlib import Path
 from typing import cast, get_args
 
+from labctl.certification import CalibrationWarning, Certification, read_certification
 from labctl.errors import BadCalibrationFile
 from labctl.fitting import FitResult, FittedModel, coefficients_json
 from labctl.fitting.models.paper_units import in_paper_units
@@ -23,7 +24,17 @@ from labctl.json_types.calibrations import CalibrationJson, OutputUnitJson
 from labctl.recording import OutputUnit, RecordingInfo
 from labctl.recording.info import Axis
 
-__all__ = ["SCHEMA", "Calibration", "build_calibration", "canonical", "hash_of", "read_calibration"]
+__all__ = [
+    "SCHEMA",
+    "Calibration",
+    "CalibrationWarning",
+    "Certification",
+    "build_calibration",
+    "canonical",
+    "hash_of",
+    "read_calibration",
+    "with_certification",
+]
 
 SCHEMA = "labctl-calibration/1"
 #: The largest calibration file that is read; one of 6 axes' temperature tables has a fiftieth of it.
@@ -97,6 +108,18 @@ class Calibration:
         with _reading("validity"):
             return _limits(self.document["validity"]["rate_dps"])
 
+    @property
+    def certification(self) -> Certification | None:
+        """The certification at the time when the file was fetched; None: it was not certified then."""
+        with _reading("certification"):
+            given = self.document.get("certification")
+            return None if given is None else read_certification(given)
+
+    def warning(self, now: datetime) -> str:
+        """Return the warning for a user at an aware time: overdue, or revoked. Empty where there is nothing."""
+        known = self.certification
+        return "" if known is None else known.warning(f"{self.serial} version {self.version}", now)
+
     def to_bytes(self) -> bytes:
         """Return the bytes that are stored and served, always the same."""
         return canonical(self.document) + b"\n"
@@ -149,6 +172,13 @@ def build_calibration(
     return Calibration(document)
 
 
+def with_certification(content: bytes, known: Certification) -> tuple[bytes, str]:
+    """Return the bytes of a calibration file with its certification, and their hash, which covers it."""
+    document = {**json.loads(content), "certification": known.to_json()}
+    document["hash"] = hash_of(document)
+    return canonical(document) + b"\n", document["hash"]
+
+
 def _limits(pair: Sequence[float | None]) -> tuple[float, float]:
     low, high = pair
     return -math.inf if low is None else float(low), math.inf if high is None else float(high)
@@ -188,8 +218,8 @@ def read_calibration(source: Path | bytes) -> Calibration:
     written = document.get("hash")
     if found != written:
         raise BadCalibrationFile(
-            f"{name}: was edited or damaged: its hash is {found[:16]}…, it says {str(written)[:16]}…; fetch it again "
-            "with `labctl calibration`"
+            f"{name}: was edited or damaged: the hash of its content is {found[:16]}…, but the file gives "
+            f"{str(written)[:16]}…; fetch it again with `labctl calibration`"
         )
     return Calibration(cast(CalibrationJson, document))
 

@@ -10,7 +10,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from instruments.clock import Clock, SystemClock
 from labctl.calibration import Calibration, read_calibration
+from labctl.certification import warn
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.data.temperature.channel import STAND_IN_C
@@ -59,10 +61,17 @@ class Compensator:
     a course of its own. Both then need the times, `t_s`. The unit is taken to have rested at its first temperature.
     """
 
-    def __init__(self, calibration: Calibration, outside: Outside = "clamp") -> None:
+    def __init__(self, calibration: Calibration, outside: Outside = "clamp", *, clock: Clock | None = None) -> None:
+        """Issue a CalibrationWarning where the file says that it is overdue by `clock` (the computer's), or revoked.
+
+        Raises BadInput for another word in `outside`.
+        """
         if outside not in {"clamp", "refuse"}:
             raise BadInput(f"outside = {outside!r}: give 'clamp' or 'refuse'")
         self.calibration = calibration
+        #: That the calibration was overdue or revoked when it was loaded; empty where it was neither.
+        self.warning = calibration.warning((clock or SystemClock()).utc()) if calibration.certification else ""
+        warn(self.warning)
         self.axes = calibration.axes
         self._outside = outside
         self._low_c, self._high_c = calibration.temperature_c
@@ -79,7 +88,10 @@ class Compensator:
 
     @classmethod
     def from_file(cls, path: Path | str, outside: Outside = "clamp") -> Compensator:
-        """Load a calibration file; raises BadCalibrationFile when it was edited or is not whole."""
+        """Load a calibration file; raises BadCalibrationFile when it was edited or is not whole.
+
+        One that is overdue or was revoked issues a CalibrationWarning and is loaded.
+        """
         return cls(read_calibration(Path(path)), outside)
 
     @classmethod

@@ -1,4 +1,4 @@
-"""Defaults: the database, the API key and the user's name."""
+"""Defaults: the database, the API key, the user's name and the interval of calibrations."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from pathlib import Path
 
 DATABASE_VARIABLE = "LABCTL_DATABASE"
 KEY_VARIABLE = "LABCTL_KEY"
+DUE_VARIABLE = "LABCTL_DUE_DAYS"
 LOG_LEVEL_VARIABLE = "LABCTL_LOG_LEVEL"
 
 

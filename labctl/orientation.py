@@ -176,4 +176,4 @@ class Orientation:
 
 def _refuse_no_number(what: str, value: float) -> None:
     if not np.isfinite(value):
-        raise BadInput(f"{what} {value} is not a number; correct it")
+        raise BadInput(f"{what} {value} is not a finite number; give a finite number")

@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 from hypothesis import settings
 
+from tests.helpers.cortex_m import INSTALL_CORTEX_M, has_cortex_m
 from tests.helpers.leftovers import leftover_tasks, leftover_threads
 from tests.helpers.signal_defaults import default_signals
 
@@ -97,8 +98,10 @@ WAITING = ("tests/system/", "tests/web/", "tests/test_docs_")
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Begin with the tests that wait; leave out what this machine cannot do, and say so."""
     items.sort(key=lambda item: not item.nodeid.startswith(WAITING))
-    if shutil.which("cc") is not None:
-        return
-    for item in items:
-        if item.get_closest_marker("needs_cc"):
-            item.add_marker(pytest.mark.skip(reason="no C compiler (on Debian: apt-get install gcc libc6-dev)"))
+    for marker, is_there, reason in (
+        ("needs_cc", shutil.which("cc") is not None, "no C compiler (on Debian: apt-get install gcc libc6-dev)"),
+        ("needs_cortex_m", has_cortex_m(), f"no compiler and emulator for ARM ({INSTALL_CORTEX_M})"),
+    ):
+        for item in items if not is_there else ():
+            if item.get_closest_marker(marker):
+                item.add_marker(pytest.mark.skip(reason=reason))

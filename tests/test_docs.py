@@ -33,7 +33,7 @@ FOLDERS = "|".join(re.escape(folder) for folder in SOURCE_FOLDERS)
 #: A path from the root, in a code span or a code block; `*` stands for any name.
 ROOT_PATH = re.compile(rf"(?<![\w./-])(?:{FOLDERS})(?:/[\w*.-]+)+/?")
 SOURCE_FILE = re.compile(r"^[\w./*-]+\.(?:py|js|css)$")
-DOTTED = re.compile(r"\b(?:labctl|instruments|procedures|benchmarks|studies|tests)(?:\.[A-Za-z_]\w*)+")
+DOTTED = re.compile(r"(?<!\.)\b(?:labctl|instruments|procedures|benchmarks|studies|tests)(?:\.[A-Za-z_]\w*)+")
 IMPORT = re.compile(r"^from ((?:labctl|instruments|procedures)[\w.]*) import ([\w, ]+)", re.MULTILINE)
 #: A class is distinguished from an acronym or a product by at least two capitals with small letters behind them.
 CLASS = re.compile(r"^(?:[A-Z][a-z0-9]+){2,}$")
@@ -175,11 +175,17 @@ def test_make_targets_exist() -> None:
     assert not wrong, wrong
 
 
+@cache
+def whole_command() -> TyperCommand | TyperGroup:
+    """Return the command line of labctl; making it takes 0.1 s, and the pages have some hundred lines."""
+    return typer.main.get_command(app)
+
+
 def faults_of(line: str) -> Iterator[str]:
     """Yield what of a command line labctl does not know; words in capitals stand for arguments, `a|b` for a choice."""
     line = re.split(r"\s#|   |; | ends |->", line)[0]
     words = line.replace("[", " ").replace("]", " ").split()[1:]
-    at = [typer.main.get_command(app)]
+    at = [whole_command()]
     for word in words:
         groups = [command for command in at if isinstance(command, TyperGroup)]
         if word.startswith("--"):

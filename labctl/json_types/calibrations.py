@@ -52,6 +52,17 @@ class AxisEvidenceJson(TypedDict):
     repeatability_source: str
 
 
+class CertificationJson(TypedDict):
+    """The newest act on a version: in-force, superseded or revoked; the hash of the calibration without it."""
+
+    state: str
+    by: str
+    reason: str
+    at: str
+    due: str | None
+    calibration_hash: str
+
+
 class CalibrationJson(TypedDict):
     """A calibration file. A file of another program is none until its hash and its parts were checked."""
 
@@ -63,6 +74,7 @@ class CalibrationJson(TypedDict):
     unit: UnitJson
     software: SoftwareJson
     axes: list[str]
+    certification: NotRequired[CertificationJson]
     output: dict[str, OutputUnitJson]
     model: FittedModelJson
     coefficients: dict[str, Coefficients]
@@ -88,9 +100,11 @@ class ObjectionJson(TypedDict):
 
 
 class JudgementDetail(TypedDict, total=False):
-    """Beside a verdict: why there is none, its text, the version's errors, and what was overridden."""
+    """Beside a verdict: why there is none, its text, the version's errors, what was overridden, and where
+    the due date is from."""
 
     verdict_reason: str
     verdict_text: str
     error: dict[str, float | None]
     objections: list[ObjectionJson]
+    due_from: str | None

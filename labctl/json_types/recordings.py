@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NotRequired
+
 from typing_extensions import TypedDict
 
 
@@ -12,3 +14,5 @@ class RawChannelJson(TypedDict):
     unit: str
     scale: float
     offset: float
+    #: The column that this channel stands for: a reference thermometer for the unit's own.
+    stands_for: NotRequired[str]

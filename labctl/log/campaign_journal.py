@@ -22,6 +22,7 @@ from procedures.contracts.journal import (
     EnvironmentSample,
     Event,
     Journal,
+    TableAngles,
 )
 from procedures.contracts.steps import StepResult
 from procedures.monitoring.step_text import describe_step
@@ -110,6 +111,11 @@ class LoggedJournal:
         """Record one block of one unit."""
         with self._refusals("readings", dataset=dataset, **self._unit(gyro)):
             self._journal.readings(dataset, gyro, readings, chamber_c)
+
+    def table_angles(self, dataset: int, angles: TableAngles) -> None:
+        """Record what the table's encoder said."""
+        with self._refusals("table.angles", dataset=dataset):
+            self._journal.table_angles(dataset, angles)
 
     def dataset_closed(self, dataset: int, state: DataSetState, reason: str = "") -> None:
         """Record and log that no more readings follow."""

@@ -21,9 +21,10 @@ CHANGES: Mapping[str, str] = {
     "schedule.trouble": "the schedule of bench {bench} cannot be carried out: {error}",
     "schedule.well": "the schedule of bench {bench} is carried out again",
     "bench.made_safe": "bench {bench} is in its safe state",
-    "bench_process.silent": "the bench process has not answered for {silent_s} s; the bench may move: inspect it",
+    "bench_process.silent": "the bench process has not answered for {silent_s} s; the bench may move: inspect the "
+    "bench",
     "bench_process.heard": "the bench process answers again",
-    "child.silent": "the {child} process has not answered for {silent_s} s; labctl starts it again",
+    "child.silent": "the {child} process has not answered for {silent_s} s; labctl starts that process again",
     "child.ended": "the {child} process ended; labctl starts it again",
     "child.restarted": "the {child} process was started again",
 }

@@ -23,8 +23,9 @@ POSSIBLE = {"table_rate_dps": (-1e5, 1e5), "temperature_c": (-273.15, 1000.0), "
 LARGEST = 1e100
 #: The refusal of a recording of free motion.
 NO_REFERENCE = (
-    "column 'table_rate_dps' is missing, so nothing says how the unit turned: free motion alone calibrates no gyro; "
-    "say motion = 'rest' for a unit at rest, 'turns' with column turn_deg for turns by known angles, or 'poses' with "
+    "column 'table_rate_dps' is missing, so the rate of the unit is not known, and free motion alone cannot "
+    "calibrate a gyro; write motion = 'rest' for a unit at rest, 'turns' with column turn_deg for turns by known "
+    "angles, or 'poses' with "
     "columns accel_x_g, accel_y_g and accel_z_g for turns by hand between rests"
 )
 POSITIONS = frozenset(sign + axis for sign in ("", "-") for axis in "xyz")
@@ -155,8 +156,8 @@ def _one_rate(path: Path, columns: dict[str, Column]) -> None:
     if change is not None:
         raise BadRecording(
             f"{path}: column 'table_rate_dps', row {change.row + 1}: {change.after_dps:g} deg/s in data set "
-            f"{change.dataset}, which began at {change.before_dps:g} deg/s; a data set has one rate: give the readings "
-            "at another a number of their own, or mark them with valid = 0"
+            f"{change.dataset}, which began at {change.before_dps:g} deg/s; a data set has one rate: give the "
+            "readings at another rate a separate data set number, or mark them with valid = 0"
         )
 
 
@@ -182,8 +183,8 @@ def _defaults(path: Path, info: RecordingInfo, columns: dict[str, Column]) -> di
 def _refuse_unknown_up(path: Path, info: RecordingInfo, columns: dict[str, Column]) -> None:
     if "position" not in columns and len(info.axes) > 1 and info.latitude_deg is not None:
         raise BadRecording(
-            f"{path}: column 'position' is missing, and latitude_deg = {info.latitude_deg:g} is given: which body "
-            "axis points up says which output the Earth turns; add the column, or leave latitude_deg out"
+            f"{path}: column 'position' is missing, but latitude_deg = {info.latitude_deg:g} is given: to subtract "
+            "the Earth's rate labctl needs the body axis that points up; add the column, or leave latitude_deg out"
         )
 
 

@@ -34,9 +34,12 @@ COLUMNS = (
     Column("t_s", "number", "s", "time since started_at", frozenset({"samples"})),
     Column("position", "text", "", "body axis along the table axis, with its sign"),
     Column("run", "integer", "", "powered session"),
-    Column("mounting", "integer", "", "counts the re-mountings of the unit"),
+    Column("mounting", "integer", "", "number of the mounting: increases each time the unit is mounted again"),
     Column("power_s", "number", "s", "time since the unit was last switched on"),
-    Column("table_rate_dps", "number", "deg/s", "rate of the table that was really run", _BOTH, _ON_TABLE),
+    Column("table_rate_dps", "number", "deg/s", "true rate of the table", _BOTH, _ON_TABLE),
+    Column("computed_rate_dps", "number", "deg/s", "commanded rate of the table"),
+    Column("encoder_rate_dps", "number", "deg/s", "rate by the table's encoder, of the whole data set"),
+    Column("encoder_rate_u_dps", "number", "deg/s", "standard uncertainty of encoder_rate_dps"),
     Column("turn_deg", "number", "deg", "angle that the unit turned by in a data set", _BOTH, frozenset({"turns"})),
     Column("turn_u_deg", "number", "deg", "standard uncertainty of turn_deg"),
     Column("duration_s", "number", "s", "length of the data set", frozenset({"points"}), frozenset({"turns"})),
@@ -52,6 +55,9 @@ COLUMNS = (
     *(Column(f"temperature_{a}_c", "number", "deg C", f"thermometer of axis {a}") for a in "xyz"),
     Column("chamber_c", "number", "deg C", "chamber air"),
     Column("chamber_setpoint_c", "number", "deg C", "set point of the chamber"),
+    Column("reference_c", "number", "deg C", "a reference thermometer beside the gyro, traceable by itself"),
+    Column("humidity_pct", "number", "%", "relative humidity of the air"),
+    Column("own_temperature_c", "number", "deg C", "the gyro's own thermometer where a reference stands for it"),
     Column("supply_v", "number", "V", "supply voltage of the gyro"),
     *(Column(f"accel_{a}_g", "number", "g", f"specific force along body axis {a}", _BOTH, _IN_POSES) for a in "xyz"),
     *(Column(f"field_{a}_ut", "number", "microtesla", f"magnetic field along body axis {a}") for a in "xyz"),
@@ -61,9 +67,14 @@ COLUMNS = (
         Column(f"gyro_{a}_std", "number", "as [output]", f"standard deviation of the readings behind gyro_{a}")
         for a in "xyz"
     ),
-    *(Column(f"gyro_{a}_white_std", "number", "as [output]", f"the white part of gyro_{a}_std") for a in "xyz"),
+    *(Column(f"gyro_{a}_white_std", "number", "as [output]", f"white-noise part of gyro_{a}_std") for a in "xyz"),
     *(
-        Column(f"gyro_{a}_quantisation_std", "number", "as [output]", f"what the steps of gyro_{a} leave in a mean")
+        Column(
+            f"gyro_{a}_quantisation_std",
+            "number",
+            "as [output]",
+            f"standard uncertainty of the mean due to the resolution of gyro_{a}",
+        )
         for a in "xyz"
     ),
     Column("n", "integer", "", "number of readings behind a mean"),

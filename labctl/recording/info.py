@@ -13,6 +13,14 @@ Axis = Literal["x", "y", "z"]
 #: known reading by reading; `poses` a hand, between rests that gravity distinguishes.
 Motion = Literal["rates", "rest", "turns", "profile", "poses"]
 
+#: What the rate of the table is known from, as a table says it, and in words.
+RateReference = Literal["computed", "demanded", "measured"]
+REFERENCES: dict[RateReference, str] = {
+    "computed": "computed from the step clock",
+    "demanded": "the demanded rate, not measured",
+    "measured": "measured by the encoder",
+}
+
 #: Units that are rates already: what one deg/s is in them.
 RATE_UNITS = {"deg/s": 1.0, "rad/s": math.pi / 180.0, "deg/h": 3600.0}
 
@@ -63,6 +71,8 @@ class RecordingInfo(BaseModel):
     table_axis: Literal["up"] = "up"
     #: Of turns: standard uncertainty, as a share of the angle, that all of them have in common, such as a fixture's.
     turn_common_u: float | None = Field(default=None, ge=0, lt=0.5)
+    #: What `table_rate_dps` is known from: see `REFERENCES`.
+    rate_reference: RateReference | None = None
     tilt_deg: float | None = None
     tilt_azimuth_deg: float | None = None
     sample_rate_hz: float | None = Field(default=None, gt=0)

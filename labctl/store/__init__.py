@@ -24,6 +24,7 @@ from labctl.store.records import (
     MeanRow,
     NewUnit,
     RecordingRow,
+    ServedCalibration,
     StepRow,
     Unit,
 )
@@ -39,7 +40,7 @@ from labctl.store.repositories.recording_writer import Imports, ImportTicket
 from labctl.store.repositories.recordings import Recordings
 from labctl.store.repositories.resume_points import ResumePoint, ResumePoints, Resumption
 from labctl.store.repositories.scheduled_starts import NewStart, StartEventRow, StartRow, Starts
-from labctl.store.repositories.units import Units
+from labctl.store.repositories.units import Certifications, Units
 
 __all__ = [
     "Audit",
@@ -78,6 +79,7 @@ __all__ = [
     "ResumePoint",
     "ResumePoints",
     "Resumption",
+    "ServedCalibration",
     "ServiceAddress",
     "StartEventRow",
     "StartRow",
@@ -109,6 +111,7 @@ class Store:
         self.resume_points = ResumePoints(database)
         self.benches = Benches(database)
         self.calibrations = Calibrations(database)
+        self.certifications = Certifications(database)
         self.audit = Audit(database)
         self.keys = Keys(database)
         self.starts = Starts(database)

@@ -171,6 +171,16 @@ class CertificationRow:
 
 
 @dataclass(frozen=True)
+class ServedCalibration:
+    """A version's bytes and hash as they were stored, and the newest act on it; None: there was none."""
+
+    document: bytes
+    hash: str
+    act: CertificationRow | None
+    in_force: bool  #: whether that act is the newest of the unit, and puts the version in force
+
+
+@dataclass(frozen=True)
 class AuditRow:
     """One act: who did what to what, when, and what else there is to say."""
 

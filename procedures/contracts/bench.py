@@ -7,6 +7,7 @@ from typing import Protocol
 
 from instruments.interfaces.chamber import Chamber
 from instruments.interfaces.gyro import Gyro
+from instruments.interfaces.reference import Reference
 from instruments.interfaces.table import RateTable
 
 
@@ -22,12 +23,18 @@ class Bench(Protocol):
     @property
     def gyros(self) -> Mapping[str, Gyro]: ...
 
+    @property
+    def references(self) -> Mapping[str, Reference]: ...
+
 
 class MonitoredBench(Protocol):
-    """What is watched of a bench: the chamber, where it has one, and the units that take part."""
+    """What is watched of a bench: the chamber, where it has one, references, and the units that take part."""
 
     @property
     def air_chamber(self) -> Chamber | None: ...
 
     @property
     def gyros(self) -> Mapping[str, Gyro]: ...
+
+    @property
+    def references(self) -> Mapping[str, Reference]: ...

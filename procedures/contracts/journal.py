@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from datetime import datetime
 from enum import StrEnum
 from typing import Literal, Protocol
@@ -47,6 +48,19 @@ class DataSetHeader:
 
 
 @dataclass(frozen=True)
+class TableAngles:
+    """What the table's encoder said during one data set, and the mean rate that follows from it."""
+
+    t_s: tuple[float, ...]  #: campaign time
+    angle_deg: tuple[float, ...]  #: unwrapped
+    rate_dps: float  #: of the line through them
+    rate_u_dps: float  #: its standard uncertainty
+    angle_from_deg: float  #: of the line, when the gate opens
+    computed_dps: float  #: the rate that the table was taken to run at
+    is_reference: bool  #: whether the measured rate is the reference of the readings
+
+
+@dataclass(frozen=True)
 class EnvironmentSample:
     """What happened between the data sets: one row per 10 s or oftener, from power-on to the last data set."""
 
@@ -55,6 +69,7 @@ class EnvironmentSample:
     chamber_c: float | None  #: absent without a chamber
     chamber_setpoint_c: float | None
     gyro_c: dict[str, float]  #: gyro name -> its own thermometer (the mean where it has one per axis)
+    references: Mapping[str, float] = field(default_factory=dict)  #: column -> value of a reference instrument
 
 
 #: How an event of kind `safe_state` begins that says what could not be confirmed.
@@ -103,6 +118,10 @@ class Journal(Protocol):
 
     def readings(self, dataset: int, gyro: str, readings: Readings, chamber_c: float | None) -> None:
         """Record one block of one unit, times in campaign time; durable when this returns."""
+        ...
+
+    def table_angles(self, dataset: int, angles: TableAngles) -> None:
+        """Record what the table's encoder said during a data set that is open, and the rate that follows."""
         ...
 
     def dataset_closed(self, dataset: int, state: DataSetState, reason: str = "") -> None:

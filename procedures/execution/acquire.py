@@ -15,6 +15,7 @@ from procedures.execution.waiting import checkpoint, pass_time
 from procedures.monitoring.bench_snapshot import ReadingCounts
 from procedures.monitoring.campaign_time import CampaignTime
 from procedures.monitoring.event_recorder import warning
+from procedures.monitoring.table_reference import EncoderLog, rate_event
 from procedures.monitoring.table_watch import TableWatch
 
 LEAD_S = 0.5  #: streams are cleared this long before the gate opens
@@ -73,6 +74,7 @@ def _take(context: ExecutionContext, step: Acquire) -> dict[str, float]:
         context.poll()
     spin = context.bench.table.spin(step.rate_dps, _steady_s(context, step))
     watch = TableWatch(context.bench.table, context.clock, spin)
+    encoder = EncoderLog(context.bench.table, context.clock)
     gate = _gate(spin, step)
     counts = {
         name: ReadingCounts(gyro.sample_rate_hz * (gate[1] - gate[0])) for name, gyro in context.bench.gyros.items()
@@ -82,11 +84,12 @@ def _take(context: ExecutionContext, step: Acquire) -> dict[str, float]:
         _wait_for_gate(context, watch, gate[0])
         number = context.recorder.journal.dataset_opened(_header(context, step, spin, gate))
         try:
-            _read_gate(context, watch, number, gate, counts)
+            _read_gate(context, watch, encoder, number, gate, counts)
             if context.monitor.is_due(within_s=ramp_s + LEAD_S):
                 context.poll(read_latest=False)
             context.bench.table.settle(spin)  # a run that does not end as computed was not the run it was taken for
             _demand_readings(counts)
+            rates = _note_angles(context, encoder, spin, gate, number)
         except BaseException as error:
             reason = str(error) or type(error).__name__
             context.recorder.journal.dataset_closed(number, DataSetState.PARTIAL, reason)
@@ -94,7 +97,22 @@ def _take(context: ExecutionContext, step: Acquire) -> dict[str, float]:
     context.recorder.journal.dataset_closed(number, DataSetState.COMPLETE)
     context.unchecked.append(number)
     taken = {f"readings.{name}": float(count.valid + count.invalid) for name, count in counts.items()}
-    return {"rate_dps": spin.rate_dps, "gate_s": gate[1] - gate[0], **taken}
+    return {"rate_dps": spin.rate_dps, "gate_s": gate[1] - gate[0], **rates, **taken}
+
+
+def _note_angles(
+    context: ExecutionContext, encoder: EncoderLog, spin: Spin, gate: tuple[float, float], number: int
+) -> dict[str, float]:
+    """Record what the table's encoder said, and warn once where the table does not turn as commanded."""
+    found = encoder.result(spin, gate[0], context.recorder.time)
+    if found is None:
+        return {}
+    context.recorder.journal.table_angles(number, found)
+    event = rate_event(context.bench.table, found)
+    if event is not None and not context.warned_of_rate:
+        context.warned_of_rate = True
+        context.recorder.event(event)
+    return {"encoder_dps": found.rate_dps, "encoder_u_dps": found.rate_u_dps}
 
 
 def _steady_s(context: ExecutionContext, step: Acquire) -> float:
@@ -145,6 +163,7 @@ def _header(context: ExecutionContext, step: Acquire, spin: Spin, gate: tuple[fl
 def _read_gate(
     context: ExecutionContext,
     watch: TableWatch,
+    encoder: EncoderLog,
     number: int,
     gate: tuple[float, float],
     counts: dict[str, ReadingCounts],
@@ -153,6 +172,7 @@ def _read_gate(
     block_s = BLOCK_S if len(gyros) == 1 else SHARED_BLOCK_S
     while (left_s := gate[1] - context.clock.now_s()) > 0:
         watch.ask()
+        encoder.read()
         _read_round(context, number, gate, counts, min(block_s, left_s) / len(gyros))
         if context.monitor.is_due(within_s=block_s):
             context.poll(read_latest=False)
@@ -162,6 +182,7 @@ def _read_gate(
     if len(gyros) > 1:  # the unit read first in the last round still has the end of the gate in its buffer
         _read_round(context, number, gate, counts, 0.0)
         raise_violation(context.monitor.check_guards())
+    encoder.read(now=True)
 
 
 def _read_round(
@@ -175,7 +196,8 @@ def _read_round(
         kept = cut(readings, gate, context.recorder.time)
         if len(kept) or kept.lost or kept.damaged:
             counts[name].add(kept)
-            context.recorder.journal.readings(number, name, kept, context.monitor.chamber_c)
+            beside = context.monitor.references.beside(kept)
+            context.recorder.journal.readings(number, name, beside, context.monitor.chamber_c)
 
 
 def cut(readings: Readings, gate: tuple[float, float], time: CampaignTime) -> Readings:

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 from instruments.interfaces.chamber import Chamber
 from instruments.interfaces.gyro import Gyro
+from instruments.interfaces.reference import Reference
 from instruments.interfaces.table import RateTable
 from procedures.contracts.bench import Bench
 from procedures.contracts.errors import StepFailed
@@ -19,11 +20,12 @@ class ActiveBench:
     air_chamber: Chamber | None
     gyros: dict[str, Gyro]  #: by name; those that take part
     dropped: dict[str, str] = field(default_factory=dict)  #: unit name -> why it dropped out
+    references: dict[str, Reference] = field(default_factory=dict)  #: by name
 
     @classmethod
     def of(cls, bench: Bench) -> ActiveBench:
         """Return an opened bench with all of its units taking part."""
-        return cls(bench.table, bench.chamber, dict(bench.gyros))
+        return cls(bench.table, bench.chamber, dict(bench.gyros), references=dict(bench.references))
 
     @property
     def table(self) -> RateTable:

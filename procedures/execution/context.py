@@ -42,6 +42,7 @@ class ExecutionContext:
     soaked: Soak | None = None  #: the soak that still holds: its temperature has not been left since
     owed_soak: Soak | None = None  #: the soak to be done again before the next data set
     unchecked: list[int] = field(default_factory=list)  #: data sets since home was last found where it was left
+    warned_of_rate: bool = False  #: whether it was said that the table does not turn as commanded
     _prompts: int = field(default=0, repr=False)
 
     def poll(self, *, read_latest: bool = True) -> None:
@@ -77,7 +78,7 @@ class ExecutionContext:
     def notice_leaving(self, _t_s: float, chamber_c: float, _gyro_c: object) -> None:
         """Note that a soaked temperature no longer holds, once the air has left its band."""
         if self.soaked and abs(chamber_c - self.soaked.temperature_c) > self.soaked.band_c:
-            text = f"{self.soaked.temperature_c:g} deg C was left: the air is at {chamber_c:.2f} deg C"
+            text = f"the temperature {self.soaked.temperature_c:g} deg C was left: the air is at {chamber_c:.2f} deg C"
             self.recorder.event(Event("soak_owed", text))
             self.soaked = None
 

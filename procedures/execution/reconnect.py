@@ -61,6 +61,8 @@ def _reach(context: ExecutionContext, device: str) -> None:
         bench.table.home()
     elif device == bench.chamber_name:
         bench.chamber.read()
+    elif device in bench.references:
+        bench.references[device].read()
     elif device in bench.gyros:
         bench.gyros[device].stop()
         bench.gyros[device].start()

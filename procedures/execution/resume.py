@@ -75,7 +75,7 @@ def _make_safe_first(context: ExecutionContext) -> None:
             raise StepFailed("resumed, but the bench could not be made safe first: " + "; ".join(complaints))
         pass_time(context, pause_s, pausing=False)
         pause_s = min(2 * pause_s, LONGEST_PAUSE_S)
-    context.recorder.event(Event("safe_state", "the bench is in its safe state before anything else"))
+    context.recorder.event(Event("safe_state", "before anything else, the bench is set to its safe state"))
 
 
 class _ChamberDeviation:
@@ -130,5 +130,5 @@ def _soak_unless_held(
         return
     context.soaked = soak
     gap = f"without supervision for {restart.gap_s:.0f} s"
-    text = f"{gap}, the air never further than {deviation_c:.2f} deg C off: no soak is needed"
+    text = f"{gap}; the air was never more than {deviation_c:.2f} deg C from the set point: no soak is needed"
     context.recorder.event(Event("soak_holds", text, value=restart.gap_s, limit=limit_s, unit="s"))

@@ -73,7 +73,7 @@ class SoakCriterion:
             )
         for name, drift_c in self.drift_c().items():
             if drift_c is None:
-                reasons.append(f"{name} was not watched for {step.drift_window_s:g} s yet")
+                reasons.append(f"{name} has not been monitored for {step.drift_window_s:g} s yet")
             elif abs(drift_c) > step.max_drift_c:
                 reasons.append(
                     f"{name} still changes by {drift_c:+.2f} deg C in {step.drift_window_s:g} s,"

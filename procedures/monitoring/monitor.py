@@ -15,6 +15,7 @@ from procedures.monitoring.bench_snapshot import BenchSnapshot, ReadingCounts, g
 from procedures.monitoring.event_recorder import CampaignRecorder
 from procedures.monitoring.guards import Guards, GuardViolation
 from procedures.monitoring.links import LinkStates
+from procedures.monitoring.references import ReferenceWatch
 
 Listener = Callable[[float, float, Mapping[str, float]], None]  #: campaign time, air and unit temperatures
 
@@ -39,6 +40,7 @@ class BenchMonitor:
         self._guards = guards
         self._recorder = recorder
         self.links = LinkStates(recorder)
+        self.references = ReferenceWatch(bench.references, self.links)
         self._listeners: list[Listener] = []
         self._tripped: set[tuple[str, str]] = set()
         self._chamber: ChamberState | None = None
@@ -55,6 +57,7 @@ class BenchMonitor:
         if (chamber := self._bench.air_chamber) is not None:
             self._chamber = chamber.read()
             self.links.heard(chamber.name)
+        self.references.begin()
 
     def units_powered(self, run: int) -> None:
         """Note that the units were switched on (session number) or off (0)."""
@@ -138,13 +141,17 @@ class BenchMonitor:
         """Poll the chamber and, unless their streams are being read, the units; returns the limits that are passed."""
         self._next_poll_s = self._recorder.t_s() + every_s
         air_heard = self._poll_chamber()
+        self.references.poll(self._note_silence)
         if read_latest and self.run:
             self._poll_units()
         t_s = self._recorder.t_s()
         chamber_c, setpoint_c = self.air_c, self.air_setpoint_c
-        self._recorder.tracker.update(t_s, chamber_c=chamber_c, setpoint_c=setpoint_c, gyro_c=dict(self._gyro_c))
+        gyro_c, references = dict(self._gyro_c), dict(self.references.values)
+        self._recorder.tracker.update(
+            t_s, chamber_c=chamber_c, setpoint_c=setpoint_c, gyro_c=gyro_c, references=references
+        )
         if air_heard:
-            sample = EnvironmentSample(t_s, self.run, chamber_c, setpoint_c, dict(self._gyro_c))
+            sample = EnvironmentSample(t_s, self.run, chamber_c, setpoint_c, gyro_c, references)
             self._recorder.journal.environment(sample)
             if chamber_c is not None:
                 for listener in self._listeners:

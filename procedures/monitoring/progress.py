@@ -44,6 +44,7 @@ class Progress:
     chamber_c: float | None = None
     setpoint_c: float | None = None
     gyro_c: Mapping[str, float] = field(default_factory=dict)
+    references: Mapping[str, float] = field(default_factory=dict)  #: column -> value of a reference instrument
     rate_dps: float = 0.0
     prompt: Prompt | None = None  #: the question that waits for a person
     turn: TurnProgress | None = None  #: the turn by hand that is under way

@@ -38,7 +38,7 @@ _TEXTS: Mapping[type[Step], Callable[[Any], str]] = {
     PowerOff: lambda step: f"switch the units off, session {step.run}",
     Home: lambda _: "home the table",
     MeasureClock: lambda step: f"measure the step clock of the table at {step.rate_dps:g} deg/s",
-    CheckHome: lambda step: f"look for missed steps at {step.temperature_c:g} deg C",
+    CheckHome: lambda step: f"check for missed steps at {step.temperature_c:g} deg C",
     Rest: lambda step: f"rest for {step.duration_s:g} s",
     SafeState: lambda _: "safe state",
 }

@@ -116,8 +116,8 @@ def _at_limit(unit: UnitTurn) -> str:
     if unit.turned.largest_dps < LIMIT_SHARE * unit.max_rate_dps:
         return ""
     return (
-        f"the output reached {unit.turned.largest_dps:.0f} deg/s, and the unit measures up to {unit.max_rate_dps:g}; "
-        "turn it more slowly"
+        f"the output reached {unit.turned.largest_dps:.0f} deg/s, but the unit measures only up to "
+        f"{unit.max_rate_dps:g}; turn the unit more slowly"
     )
 
 
@@ -159,7 +159,10 @@ def _moved_between(unit: UnitTurn, still_dps: float) -> str:
     for axis in unit.before.outputs:
         change = unit.after.mean_dps(axis) - unit.before.mean_dps(axis)
         if abs(change) > still_dps:
-            return f"the output about {axis} changed by {change:+.1f} deg/s between the rests; the unit moved in one"
+            return (
+                f"the output about {axis} changed by {change:+.1f} deg/s between the rests before and after the "
+                "turn; the unit moved during one of them"
+            )
     return ""
 
 

@@ -95,8 +95,8 @@ def missing_instruments(recipe: Recipe, limits: BenchLimits) -> tuple[str, ...]:
     """Return which instruments a recipe needs and the bench does not have, each in words."""
     if recipe.turns is not None:
         return ()
-    table = () if limits.table is not None else ("rates_dps: it needs a rate table, and the bench has none",)
-    chamber = () if limits.chamber is not None else ("temperatures_c: it needs a chamber, and the bench has none",)
+    table = () if limits.table is not None else ("rates_dps: a rate table is needed, and the bench has none",)
+    chamber = () if limits.chamber is not None else ("temperatures_c: a chamber is needed, and the bench has none",)
     return (*table, *chamber)
 
 

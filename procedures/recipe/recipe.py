@@ -59,6 +59,7 @@ class Recipe(Table):
     #: "up_down": every second temperature on the way up, the others on the way down
     temperature_order: Literal["as_listed", "up", "down", "up_down"] = "as_listed"
     rate_order: Literal["as_listed", "ascending", "random"] = "as_listed"  #: "random": drawn anew at every level
+    recalibrate_after_days: Whole | None = Field(default=None, ge=1, le=36_500)  #: how long a certification is valid
     repeats: Whole = Field(default=1, ge=1)  #: how often the rates are gone through at each level
     warm_up_s: Number = Field(default=0.0, ge=0)  #: after every switching-on
     seed: Whole = Field(default=1, ge=0)  #: of the random order
@@ -88,7 +89,9 @@ class Recipe(Table):
         listed = info.field_name in {"temperatures_c", "rates_dps"}
         if info.data.get("turns") is not None:
             if value != (() if listed else cls.model_fields[info.field_name or ""].default):
-                raise ValueError("it is for a table and a chamber; a recipe with [turns] drives neither: remove it")
+                raise ValueError(
+                    "this key is for a table and a chamber, and a recipe with [turns] drives neither: remove the key"
+                )
         elif listed and "turns" in info.data and not value:
             raise PydanticCustomError("too_short", "Tuple should have at least 1 item after validation, not 0")
         return value

@@ -33,6 +33,7 @@ class Rig:
         for gyro in self.gyros.values():
             gyro.bench = self
         self.imu = self.gyros[gyros[0]]
+        self.references: dict[str, Any] = {}
         self.journal = RecordingJournal(self.trace)
         self.control = Control()
         self.unit_handler = SimpleNamespace(

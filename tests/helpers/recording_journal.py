@@ -17,6 +17,7 @@ class RecordingJournal:
         self.steps: list[tuple[str, int, Any]] = []
         self.headers: list[Any] = []
         self.closed: list[tuple[int, str, str]] = []
+        self.angles: list[tuple[int, Any]] = []
         self.blocks: list[tuple[int, str, Readings, float]] = []
         self.samples: list[Any] = []
         self.events: list[Any] = []
@@ -58,6 +59,10 @@ class RecordingJournal:
     def readings(self, dataset: int, gyro: str, readings: Readings, chamber_c: float) -> None:
         self.blocks.append((dataset, gyro, readings, chamber_c))
         self._reported("readings", dataset)
+
+    def table_angles(self, dataset: int, angles: Any) -> None:
+        self.angles.append((dataset, angles))
+        self._reported("table_angles", dataset)
 
     def dataset_closed(self, dataset: int, state: Any, reason: str = "") -> None:
         self.closed.append((dataset, str(state), reason))

@@ -18,6 +18,9 @@ from labctl.services.planning.loading import load_bench
 from labctl.store import Store
 from labctl.store.connection.database import Database
 
+#: What an answer says beside its content.
+SAID = ("content-type", "etag", "x-labctl-state", "x-labctl-due", "warning")
+
 
 def open_client(database: Path, bench: str = "single-axis-sim") -> TestClient:
     """Return a client of a service over `database`; entering it starts the service, leaving it closes it."""
@@ -41,7 +44,7 @@ def transport_to(client: TestClient) -> httpx.MockTransport:
     def answer(request: httpx.Request) -> httpx.Response:
         request.read()
         given = client.request(request.method, str(request.url), content=request.content, headers=dict(request.headers))
-        headers = {name: given.headers[name] for name in ("content-type", "etag") if name in given.headers}
+        headers = {name: given.headers[name] for name in SAID if name in given.headers}
         return httpx.Response(given.status_code, content=given.content, headers=headers)
 
     return httpx.MockTransport(answer)

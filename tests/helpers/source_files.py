@@ -50,7 +50,7 @@ class SourceFile:
         """The dotted name under which it is imported."""
         return ".".join(self.parts).removesuffix(".py").removesuffix(".__init__")
 
-    @property
+    @cached_property
     def functions(self) -> list[ast.FunctionDef | ast.AsyncFunctionDef]:
         """Every function and method, nested ones too."""
         return [node for node in ast.walk(self.tree) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)]

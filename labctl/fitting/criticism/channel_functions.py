@@ -29,7 +29,7 @@ NO_CHANNELS = frozenset(
     {
         "dataset", "run", "mounting", "n", "valid", "duration_s", "since_begin_s", "previous_rate_dps", "status",
         "table_angle_deg", "chamber_setpoint_c", "temperature_x_c", "temperature_y_c", "temperature_z_c",
-        "turn_deg", "turn_u_deg",
+        "turn_deg", "turn_u_deg", "computed_rate_dps", "encoder_rate_dps", "encoder_rate_u_dps",
         RECORDING, WITHIN_S, OWN_DATASET,
     }
 )  # fmt: skip

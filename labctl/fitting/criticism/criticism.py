@@ -161,8 +161,8 @@ def _too_little(data: ReducedRecording, model: ErrorModel) -> str | None:
     rows = int(data.present.sum())
     if len(data) < needed and rows < 4 * needed:
         return (
-            f"{len(data)} data sets, and the model has {needed - LEAST_SPARE} coefficients per axis: "
-            f"measure at least {needed - len(data)} more data sets, at other rates and temperatures"
+            f"{len(data)} data sets are too few for a model of {needed - LEAST_SPARE} coefficients per axis: measure "
+            f"at least {needed - len(data)} more data sets, at other rates and temperatures"
         )
     return None
 

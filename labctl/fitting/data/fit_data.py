@@ -133,8 +133,8 @@ def refuse_poses(info: RecordingInfo) -> None:
     """Raise BadInput for a recording in poses: none of its data sets has a known rate."""
     if info.motion == "poses":
         raise BadInput(
-            f"{info.serial}: of a recording in poses no rate is known, only where gravity was before and after each "
-            "turn: `fit --model poses` and `verify` take it, no other model and no criticism"
+            f"{info.serial}: in a recording of poses no rate is known, only the direction of gravity before and "
+            "after each turn; use `fit --model poses` and `verify`: other models and criticism need a rate"
         )
 
 

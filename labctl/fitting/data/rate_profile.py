@@ -12,8 +12,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import next_fast_len
-from scipy.interpolate import CubicSpline
 
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Columns, dataset_starts
@@ -130,6 +128,9 @@ def rate_profile(columns: Columns, *, windows: bool) -> RateProfile:
 
 def _filtered(t_s: Array, rate_dps: Array, factor: Factor, memory_s: float) -> Array:
     """Return what a factor on the spectrum makes of rates (n,); before and after them they soon stay what they are."""
+    from scipy.fft import next_fast_len
+    from scipy.interpolate import CubicSpline
+
     n = len(rate_dps)
     if n < 2:
         return np.asarray(rate_dps * float(np.real(factor(np.zeros(1))[0])))

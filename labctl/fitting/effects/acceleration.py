@@ -78,13 +78,16 @@ class CentripetalAcceleration(_Acceleration):
 
     id = "centripetal_acceleration"
     term = "Centripetal acceleration with g-sensitivity (eccentric mounting)"
-    sentence = "The unit sits off the table's axis, and feels the pull of turning as rate."
+    sentence = (
+        "The unit is mounted off the table's axis, so the centripetal acceleration of the turning gives an error in "
+        "the rate."
+    )
     origin: ClassVar[Origin] = "fixture"
     shows_at_rest = False
     ranges: ClassVar = {"fog": (0.0, 1e-3), "mems": (0.0, 0.1), "piezo": (0.0, 0.2)}
     aliases = ("scale_factor_even",)
     parameters = (Parameter("by_position", "1", 0, 1),)
-    experiment = "another radius, or the unit turned by 180 deg on the table"
+    experiment = "the same rates at another radius, or with the unit turned by 180 deg on the table"
     draws = ("table_rate_dps", "map")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:

@@ -14,12 +14,12 @@ class Misalignment(Effect):
 
     id = "misalignment"
     term = "Input axis misalignment"
-    sentence = "The gyro's input axis is tilted, so it feels a part of the turning about the other axes."
+    sentence = "The gyro's input axis is tilted, so the output contains a part of the rate about the other axes."
     origin: ClassVar[Origin] = "package"
     rows: ClassVar[Rows] = "cross"
     ranges: ClassVar = {"fog": (0.0017, 0.017), "mems": (0.0017, 0.02), "piezo": (0.0017, 0.017)}
     aliases = ("non_orthogonality",)
-    experiment = "remove and refit the unit at least three times: what changes is the fixture's"
+    experiment = "remove and refit the unit at least three times: the part that changes is due to the fixture"
     draws = ("table_rate_dps", "map")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
@@ -35,7 +35,10 @@ class NonOrthogonality(Misalignment):
 
     id = "non_orthogonality"
     term = "Non-orthogonality of the input axes"
-    sentence = "The input axes are not square to each other; nine numbers cannot tell this from misalignment."
+    sentence = (
+        "The input axes are not perpendicular to each other; the nine numbers of the matrix cannot distinguish this "
+        "from misalignment."
+    )
     aliases = ("misalignment",)
     experiment = "an external alignment cube"
     draws = ("table_rate_dps", "map")

@@ -41,7 +41,7 @@ class BiasTemperature(Effect):
     default_order = 2
     max_order = 5
     ranges: ClassVar = {"fog": (0.0, 0.01), "mems": (0.005, 0.08), "piezo": (0.05, 0.63)}
-    experiment = "take the temperatures in the opposite order and repeat one at the end"
+    experiment = "measure the temperatures in the opposite order and repeat one of them at the end"
     draws = ("temperature_c", "map")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:

@@ -49,7 +49,7 @@ class RunShift(_Shift):
 
     id = "run_shift"
     term = "Turn-on to turn-on bias repeatability"
-    sentence = "After every power-on the bias is slightly different."
+    sentence = "The bias is slightly different after each power-on."
     origin: ClassVar[Origin] = "environment"
     needs = ("run",)
     counted = "run"
@@ -63,7 +63,7 @@ class MountingShift(_Shift):
 
     id = "mounting_shift"
     term = "Mounting repeatability"
-    sentence = "After every re-mounting the output at rest is slightly different."
+    sentence = "The output at rest is slightly different after each re-mounting."
     origin: ClassVar[Origin] = "fixture"
     needs = ("mounting",)
     counted = "mounting"
@@ -103,13 +103,13 @@ class StartTransient(Effect):
     id = "start_transient"
     in_use = False
     term = "Start transient (bandwidth, latency, spin-up)"
-    sentence = "At a new rate the output settles over seconds."
+    sentence = "After each change of the rate, the output takes some seconds to settle."
     origin: ClassVar[Origin] = "sensor"
     rows: ClassVar[Rows] = "all"
     needs = ("t_s",)
     parameters = (Parameter("tau_s", "s", 0.5, 20.0, logarithmic=True),)
     ranges: ClassVar = {"fog": (0.0, 0.05), "mems": (0.0, 0.05), "piezo": (0.0, 0.2)}
-    experiment = "a longer wait before each data set; compare the first seconds of all of them"
+    experiment = "a longer wait before each data set; compare the first seconds of all data sets"
     draws = ("time_in_set", "previous_rate")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:

@@ -63,7 +63,7 @@ class DeadBand(Effect):
 
     id = "dead_band"
     term = "Dead band (threshold, lock-in)"
-    sentence = "Below a small rate there is no output, and a little above it too little."
+    sentence = "Below a small threshold rate the output is zero, and a little above the threshold it is too small."
     origin: ClassVar[Origin] = "sensor"
     parameters = (Parameter("band_dps", "deg/s", 0.005, 150.0, logarithmic=True),)
     ranges: ClassVar = {"fog": (0.0, 1.0), "mems": (0.0, 1.0), "piezo": (0.0, 1.0)}
@@ -85,7 +85,7 @@ class Quantization(Effect):
 
     id = "quantization"
     term = "Quantization"
-    sentence = "The output comes in coarse steps, so its error is a sawtooth over the output."
+    sentence = "The output changes in coarse steps, so the error is a sawtooth function of the output."
     origin: ClassVar[Origin] = "sensor"
     parameters = (Parameter("step_dps", "deg/s", 0.003, 1.0, logarithmic=True),)
     ranges: ClassVar = {"fog": (0.0, 1.0), "mems": (0.0, 1.0), "piezo": (0.0, 1.0)}

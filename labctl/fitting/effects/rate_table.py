@@ -21,7 +21,7 @@ class EarthRate(Effect):
     rows: ClassVar[Rows] = "own"
     shows_at_rest = True
     ranges: ClassVar = {"fog": (0.0, 0.0042), "mems": (0.0, 0.0042), "piezo": (0.0, 0.0042)}
-    experiment = "axis up and axis down; and state the bench's latitude, which fixes it"
+    experiment = "axis up and axis down; give the bench's latitude, from which the Earth's rate is computed"
     draws = ("map",)
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
@@ -49,12 +49,12 @@ class EarthRateTilt(_OncePerTurn):
 
     id = "earth_rate_tilt"
     term = "Earth rate on a tilted or horizontal axis"
-    sentence = "The level part of the Earth's rate goes round once per turn; its phase points north."
+    sentence = "The horizontal part of the Earth's rate gives an error of one cycle per turn; its phase points north."
     origin: ClassVar[Origin] = "environment"
     ranges: ClassVar = {"fog": (0.0, 0.0042), "mems": (0.0, 0.0042), "piezo": (0.0, 0.0042)}
     aliases = ("magnetic_sensitivity", "table_tilt")
     mark = "earth"
-    experiment = "turn the table's base by 90 deg: what comes from north stays with north"
+    experiment = "turn the table's base by 90 deg: the phase of an error due to the Earth's rate stays fixed to north"
     draws = ("angle",)
 
 
@@ -63,7 +63,7 @@ class MagneticSensitivity(_OncePerTurn):
 
     id = "magnetic_sensitivity"
     term = "Magnetic sensitivity"
-    sentence = "The local magnetic field changes the bias once per turn."
+    sentence = "The local magnetic field makes the bias vary with the table angle, one cycle per turn."
     origin: ClassVar[Origin] = "environment"
     ranges: ClassVar = {"fog": (0.0, 0.005), "mems": (0.0, 0.005), "piezo": (0.0, 0.05)}
     aliases = ("earth_rate_tilt", "table_tilt")
@@ -77,7 +77,9 @@ class TableTilt(_OncePerTurn):
 
     id = "table_tilt"
     term = "Table tilt and wobble with g-sensitivity"
-    sentence = "The table is out of level or its bearing wobbles, so gravity goes round once and twice per turn."
+    sentence = (
+        "The table is out of level or its bearing wobbles, so gravity along the axes varies once and twice per turn."
+    )
     origin: ClassVar[Origin] = "bench"
     harmonics = (1, 2)
     ranges: ClassVar = {"fog": (0.0, 0.005), "mems": (0.0, 0.01), "piezo": (0.0, 0.05)}
@@ -112,7 +114,10 @@ class TableRateRipple(Effect):
     needs = ("table_angle_deg",)
     parameters = (Parameter("per_turn", "1", 1, 200),)
     ranges: ClassVar = {"fog": (0.0, 0.01), "mems": (0.0, 0.01), "piezo": (0.0, 0.01)}
-    experiment = "data sets over whole turns that start and stop at the same angle; does the line follow angle or time?"
+    experiment = (
+        "data sets over whole turns that start and stop at the same angle; check whether the wave repeats with the "
+        "angle or with time"
+    )
     draws = ("angle", "frequency")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
@@ -128,7 +133,7 @@ class MissedSteps(Effect):
 
     id = "missed_steps"
     term = "Missed steps (stall)"
-    sentence = "Above a certain rate the motor loses steps, so the table is slower than commanded."
+    sentence = "Above a certain rate the motor loses steps, so the table turns more slowly than commanded."
     origin: ClassVar[Origin] = "bench"
     parameters = (Parameter("stall_dps", "deg/s", 20.0, 400.0),)
     ranges: ClassVar = {"fog": (-1.0, 0.0), "mems": (-1.0, 0.0), "piezo": (-1.0, 0.0)}

@@ -67,7 +67,10 @@ class TimeDelay(_Responding):
     name = DELAY
     parameters = (Parameter("delay_s", "s", 2e-4, 0.1, logarithmic=True),)
     ranges: ClassVar = {"fog": (0.0, 0.01), "mems": (0.0, 0.03), "piezo": (0.0, 0.03)}
-    experiment = "a sine sweep up to the bandwidth: a delay keeps the size of the output, a low bandwidth does not"
+    experiment = (
+        "a sine sweep up to the bandwidth: a delay leaves the amplitude of the output unchanged, a low bandwidth "
+        "reduces it"
+    )
     draws = ("time",)
 
 
@@ -80,7 +83,10 @@ class Bandwidth(_Responding):
     name = TIME_CONSTANT
     parameters = (Parameter("time_constant_s", "s", 2e-4, 0.1, logarithmic=True),)
     ranges: ClassVar = {"fog": (0.0, 0.005), "mems": (0.0, 0.02), "piezo": (0.0, 0.05)}
-    experiment = "a sine sweep up to the bandwidth: a delay keeps the size of the output, a low bandwidth does not"
+    experiment = (
+        "a sine sweep up to the bandwidth: a delay leaves the amplitude of the output unchanged, a low bandwidth "
+        "reduces it"
+    )
     draws = ("time",)
 
 

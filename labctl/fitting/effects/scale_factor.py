@@ -29,7 +29,7 @@ class ScaleFactor(Effect):
 
     id = "scale_factor"
     term = "Scale factor error"
-    sentence = "The output grows a little more or less than the rate does."
+    sentence = "The output is larger or smaller than the rate by a constant factor."
     origin: ClassVar[Origin] = "sensor"
     ranges: ClassVar = {"fog": (0.0, 0.005), "mems": (0.0, 0.01), "piezo": (0.0, 0.0035)}
     aliases = ("table_rate_ratio",)
@@ -107,7 +107,7 @@ class ScaleFactorEven(_Power):
 
     id = "scale_factor_even"
     term = "Scale factor nonlinearity, even order"
-    sentence = "The error curves the same way for both directions of turning, like the square of the rate."
+    sentence = "The error grows like the square of the rate, with the same sign for both directions of turning."
     first = 2
     min_order = 2
     default_order = 2
@@ -143,7 +143,7 @@ class SineResponse(Effect):
 
     id = "sine_response"
     term = "Sine response (open-loop interferometer)"
-    sentence = "The output follows the sine of the optical phase, so it falls behind at high rates."
+    sentence = "The output is proportional to the sine of the optical phase, so it is too small at high rates."
     origin: ClassVar[Origin] = "sensor"
     parameters = (Parameter("k", "rad/(rad/s)", 0.05, 1.0, logarithmic=True),)
     ranges: ClassVar = {"fog": (0.0, 2.25), "mems": (0.0, 0.0), "piezo": (0.0, 0.0)}
@@ -179,7 +179,7 @@ class Saturation(Effect):
 
     id = "saturation"
     term = "Saturation (input rate limit)"
-    sentence = "Beyond a certain rate the output no longer follows."
+    sentence = "Above a certain rate the output no longer increases with the rate."
     origin: ClassVar[Origin] = "sensor"
     parameters = (Parameter("knee_dps", "deg/s", 20.0, 400.0),)
     ranges: ClassVar = {"fog": (-1.0, 0.0), "mems": (-1.0, 0.0), "piezo": (-1.0, 0.0)}
@@ -214,7 +214,9 @@ class RateTemperatureSurface(Effect):
     origin: ClassVar[Origin] = "sensor"
     default_order = 3
     max_order = 5
-    experiment = "nothing to separate: it holds bias, scale factor and nonlinearity with their temperature terms"
+    experiment = (
+        "nothing to separate: this surface includes bias, scale factor and nonlinearity with their temperature terms"
+    )
     draws = ("map", "table_rate_dps", "temperature_c")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:

@@ -19,7 +19,7 @@ class TemperatureRate(Effect):
     id = "temperature_rate"
     in_use = False
     term = "Temperature rate sensitivity (Shupe effect)"
-    sentence = "The bias shifts while the temperature changes, in proportion to how fast."
+    sentence = "The bias shifts while the temperature changes, in proportion to the rate of change of the temperature."
     by_temperature = True
     origin: ClassVar[Origin] = "sensor"
     rows: ClassVar[Rows] = "all"
@@ -60,7 +60,7 @@ class ThermalLag(Effect):
     needs = ("t_s",)
     parameters = (Parameter("tau_s", "s", 60.0, 3600.0, logarithmic=True),)
     ranges: ClassVar = {"fog": (0.0, 0.02), "mems": (0.0, 0.1), "piezo": (0.0, 0.6)}
-    experiment = "two ramp speeds: an error by lag grows with the speed, one by hysteresis does not"
+    experiment = "two ramp speeds: an error due to lag grows with the speed, an error due to hysteresis does not"
     draws = ("legs", "time")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
@@ -80,7 +80,7 @@ class ThermalHysteresis(Effect):
     id = "thermal_hysteresis"
     remembers = True
     term = "Thermal hysteresis"
-    sentence = "The bias depends on whether the temperature was reached from below or from above."
+    sentence = "At the same temperature, the bias differs between heating and cooling."
     by_temperature = True
     origin: ClassVar[Origin] = "sensor"
     rows: ClassVar[Rows] = "all"
@@ -150,7 +150,10 @@ class SelfHeating(Effect):
 
     id = "self_heating"
     term = "Self-heating"
-    sentence = "The unit's own power warms the sensing part above its thermometer, more and more after power-on."
+    sentence = (
+        "The unit's own power warms the sensing element above the temperature of the thermometer, increasingly after "
+        "power-on."
+    )
     origin: ClassVar[Origin] = "sensor"
     rows: ClassVar[Rows] = "all"
     shows_at_rest = True
@@ -179,7 +182,8 @@ class ThermometerError(Effect):
     id = "thermometer_error"
     term = "Thermometer error"
     sentence = (
-        "The thermometer reads wrong: the temperature terms of the calibration absorb this, but in use it is an error."
+        "The thermometer reads wrong: the temperature terms of the calibration compensate for this, but with another "
+        "thermometer the rate is wrong."
     )
     by_temperature = True
     origin: ClassVar[Origin] = "bench"

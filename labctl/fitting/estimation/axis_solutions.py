@@ -149,8 +149,8 @@ def _with_white_noise(design: AxisDesign, y: Array, scatter: Scatter) -> Scatter
     rank = rank_of(columns)
     if len(y) <= rank:
         raise NotEnoughData(
-            f"{len(y)} data sets leave nothing beside {rank} coefficients and shifts of recordings; measure more, or "
-            "leave effects out"
+            f"{len(y)} data sets are too few to estimate an error beside {rank} coefficients and shifts of "
+            "recordings; measure more, or leave effects out"
         )
     taken, *_ = np.linalg.lstsq(columns, y, rcond=1e-12)
     left = y - columns @ taken

@@ -25,8 +25,8 @@ def of_poses(recording: Recording, model: str | None, effects: list[str]) -> Fit
     serial = recording.info.serial
     if model != POSES or effects:
         raise BadInput(
-            f"{serial}: a recording in poses is fitted by --model {POSES} alone, without effects added: no rate of its "
-            "turns is known, only where gravity was before and after"
+            f"{serial}: fit a recording of poses with --model {POSES} only, without added effects: the rate of the "
+            "turns is not known, only the direction of gravity before and after"
         )
     found = fit_poses(recording)
     error = ErrorFigures(found.raw_rms_dps, found.rms_dps, found.heldout_rms_dps, found.noise_floor_dps, FLOOR_SOURCE)
@@ -55,8 +55,9 @@ def _noise_json(solution: Solution) -> AxisNoiseJson:
 def _environment(recording: Recording) -> FitEnvironment:
     latitude = recording.info.latitude_deg
     if latitude is None:
-        return {"earth_rate": "not subtracted: the latitude is not known; it is in the uncertainty of g_own"}
+        return {"earth_rate": "not subtracted, since the latitude is not known; included in the uncertainty of g_own"}
     return {
-        "earth_rate": "its vertical part subtracted from the rests; its horizontal part counts as noise",
+        "earth_rate": "the vertical part of the Earth's rate is subtracted from the rests; the horizontal part "
+        "counts as noise",
         "latitude_deg": latitude,
     }

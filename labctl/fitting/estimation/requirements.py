@@ -36,8 +36,9 @@ def _require_mean_rates(data: FitData, model: ErrorModel) -> None:
         for term in model.terms:
             if not is_linear_in_rate(kind_of(term), term, data.channels, axis, model.reference):
                 raise NotEnoughData(
-                    f"{data.info.serial}: {term.effect} needs the rate at each instant, and of a turn only the mean is "
-                    "known; leave it out, or measure at known rates (motion = 'rates') or with a recorded rate "
+                    f"{data.info.serial}: {term.effect} needs the rate at each instant, but only the mean rate of a "
+                    "turn is known; leave the effect out, or measure at known rates (motion = 'rates') or with a "
+                    "recorded rate "
                     "(motion = 'profile')"
                 )
 

@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.optimize import minimize
 
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.effects import Effect, Parameter, Span, Term, kind_of
@@ -75,6 +74,8 @@ def _found(data: FitData, model: ErrorModel, effects: Sequence[str]) -> list[Ter
         for (name, parameter), value in zip(free, logarithms.tolist(), strict=True):
             made[name] = replace(made[name], parameters={**made[name].parameters, parameter.name: float(np.exp(value))})
         return made
+
+    from scipy.optimize import minimize
 
     begin = np.log([terms[name].parameters[p.name] for name, p in free])
     bounds = [(float(np.log(p.low)), float(np.log(p.high))) for _, p in free]

@@ -122,7 +122,7 @@ POSES = "poses"
 
 def _poses(data: FitData) -> tuple[ErrorModel, Rows]:
     raise BadInput(
-        f"{data.info.serial}: model {POSES} takes a recording with motion = 'poses'; this one says motion = "
+        f"{data.info.serial}: model {POSES} needs a recording with motion = 'poses', but this recording has motion = "
         f"{data.info.motion!r}; choose another model"
     )
 
@@ -147,23 +147,23 @@ PRESETS: dict[str, tuple[Preset, str]] = {
     ),
     "bias_scale": (
         Preset("bias_scale", _bias_scale),
-        "A plain start: bias and scale factor, each a parabola in temperature.",
+        "A simple model to start with: bias and scale factor, each a parabola in temperature.",
     ),
     "bias_temperature": (
         Preset("bias_temperature", _bias_temperature),
-        "At rest: the bias as a parabola in temperature; lag, hysteresis and warm-up can be added.",
+        "For a recording at rest: the bias as a parabola in temperature; lag, hysteresis and warm-up can be added.",
     ),
     "bias": (
         Preset("bias", _bias),
-        "At rest: one bias for each axis; it needs no table and no thermometer.",
+        "For a recording at rest: one bias for each axis; no table and no thermometer needed.",
     ),
     "turns": (
         Preset("turns", _turns),
-        "For turns by a known angle: bias, scale factor, misalignment; g-sensitivity where it rested both ways up.",
+        "For turns by a known angle: bias, scale factor, misalignment; g-sensitivity if the unit rested both ways up.",
     ),
     POSES: (
         Preset(POSES, _poses),
-        "By hand, without a table (Tedaldi et al. 2014): rests in many poses; gravity tells where each turn ended.",
+        "By hand, without a table (Tedaldi et al. 2014): rests in many poses; gravity shows where each turn ended.",
     ),
 }
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 from scipy.special import stdtrit
 
 from labctl.fitting.numeric.arrays import Array
@@ -73,6 +72,8 @@ def trend_line(time: Array, values: Array, u: Array) -> TrendLine | None:
     if freedom < 1:
         value, slope, _, _ = _weighted(time, values, np.ones(len(time)))  # through both points, whatever their weights
         return TrendLine(value, slope, np.full((2, 2), np.nan), None, 0)
+
+    from scipy.optimize import brentq
 
     def excess(variance: float) -> float:
         return _weighted(time, values, u**2 + variance)[3] - freedom

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
-from scipy.optimize import brentq
 
 from labctl.fitting.numeric.arrays import Array
 
@@ -18,6 +17,8 @@ def between_variance(jacobian: NDArray[np.float64], residual: Array, covariance:
     freedom = len(residual) - jacobian.shape[1]
     if freedom < 1:
         return 0.0
+
+    from scipy.optimize import brentq
 
     def excess(variance: float) -> float:
         return chi2_of(jacobian, residual, covariance + variance * np.eye(len(residual))) - freedom

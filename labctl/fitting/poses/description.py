@@ -109,7 +109,8 @@ def _left_out(every: Moves, moves: Moves, gyro: Gyroscope) -> list[MoveLeftOutJs
         off = np.degrees(np.linalg.norm(gyro.held_out.error[place]))
         u = np.degrees(np.sqrt(np.trace(gyro.held_out.covariance[place]) / 2))
         reasons[int(moves.before[place])] = (
-            f"{WRONG}: gravity ends {off:.2g} deg from where they put it, u = {u:.2g} deg"
+            f"{WRONG}: gravity after the move is {off:.2g} deg from the direction that the gyro's rates give, u = "
+            f"{u:.2g} deg"
         )
     return [
         {"from_s": float(every.t_s[k, 0]), "until_s": float(every.t_s[k, 1]), "why": reasons[int(before)]}

@@ -28,7 +28,7 @@ def require_moves(serial: str, moves: Moves) -> None:
         return
     why = "; ".join(sorted({reason for reason in moves.why_not if reason}))
     raise NotEnoughData(
-        f"{serial}: {usable} turns between rests can be used, nine coefficients of the gyro take at least {LEAST_MOVES}"
+        f"{serial}: {usable} turns between rests can be used; nine coefficients of the gyro need at least {LEAST_MOVES}"
         f"{f' ({len(moves) - usable} cannot: {why[:200]})' if why else ''}: turn the unit by 90 deg or more from "
         "rest to rest, about each axis, both ways"
     )
@@ -59,12 +59,12 @@ def require_determined(serial: str, moves: Moves, equations: Equations, noise: N
     known = (
         f"in all moves together the unit turned about {AXES[column]} by {turned[column]:.0f} deg"
         if turned[column] < LEAST_TURN_DEG
-        else f"gravity saw too little of the turns about {AXES[column]}"
+        else f"gravity changed too little in the turns about {AXES[column]}"
     )
     raise NotEnoughData(
         f"{serial}: turn about the {AXES[column]} axis too, by 90 deg or more with {AXES[column]} level: {known}, "
-        f"which leaves {what} with u = {u[row, column]:.2g} (limit {LARGEST_U:g}); a turn about the vertical shows "
-        "nothing"
+        f"which leaves {what} with u = {u[row, column]:.2g} (limit {LARGEST_U:g}); a turn about the vertical does "
+        "not change gravity and gives no information"
     )
 
 

@@ -48,8 +48,8 @@ def readings_of(recording: Recording) -> PoseReadings:
     info, serial = recording.info, recording.info.serial
     if info.motion != "poses":
         raise BadInput(
-            f"{serial}: model poses takes a recording with motion = 'poses'; this one says motion = {info.motion!r}; "
-            "choose another model"
+            f"{serial}: model poses needs a recording with motion = 'poses', but this recording has motion = "
+            f"{info.motion!r}; choose another model"
         )
     if info.kind != "samples":
         raise BadInput(
@@ -65,7 +65,7 @@ def readings_of(recording: Recording) -> PoseReadings:
     valid = np.asarray(columns["valid"]) != 0 if "valid" in columns else np.ones(len(recording), dtype=bool)
     if np.count_nonzero(valid) < LEAST_READINGS:
         raise NotEnoughData(
-            f"{serial}: the recording has {np.count_nonzero(valid)} valid readings; rests and turns take at least "
+            f"{serial}: the recording has {np.count_nonzero(valid)} valid readings; rests and turns need at least "
             f"{LEAST_READINGS}; record more"
         )
     warm = temperature_of(columns)

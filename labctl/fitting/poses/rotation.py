@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.poses.triad import cross_matrix
@@ -62,6 +61,8 @@ def _steps(true: NDArray[np.float64], step_s: NDArray[np.float64]) -> tuple[NDAr
 
 
 def _matrices(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    from scipy.spatial.transform import Rotation
+
     return Rotation.from_rotvec(vectors.reshape(-1, 3)).as_matrix().reshape(*vectors.shape[:2], 3, 3)
 
 
@@ -100,6 +101,8 @@ def _coarse(true: NDArray[np.float64], step_s: NDArray[np.float64], every: int) 
 
 
 def _angle_between(first: NDArray[np.float64], second: NDArray[np.float64]) -> Array:
+    from scipy.spatial.transform import Rotation
+
     return np.asarray(Rotation.from_matrix(first.transpose(0, 2, 1) @ second).magnitude())
 
 

@@ -65,7 +65,7 @@ class LocalModelError:
         """Return why the error there is unknown, in words; None where it is known."""
         away = self._away(rate_dps, temperature_c)
         if len(away) == 0:
-            return "no data set could be left out of the fit: the model needs them all"
+            return "no data set could be left out of the fit: the model needs all data sets"
         if away.min() > FARTHEST:
             return "no data set was measured near there"
         if _effective_number(np.exp(-0.5 * away**2)) < LEAST_NEAR:

@@ -20,11 +20,13 @@ COVERAGE = 2.0
 #: Largest rate, deg/s, and temperature, deg C, that are taken for a gyro's.
 LARGEST = 1e5
 #: Why a part is unknown.
-PUBLISHED = "published coefficients state none"
-NO_DATA_SETS = "published coefficients have no data sets that could show it"
+PUBLISHED = "published coefficients come without uncertainties"
+NO_DATA_SETS = "published coefficients have no data sets from which it could be estimated"
 NOT_KEPT = "the version was made by an older labctl, which did not store it: fit it again"
-BY_HAND = "turns between rests have no rate of their own that could show it; measure the unit on a table as well"
-NO_POWER_ON = "one power-on was recorded, and neither a data sheet nor a static record states the repeatability"
+BY_HAND = (
+    "the rate during turns between rests is not known, so it cannot be estimated; measure the unit on a table as well"
+)
+NO_POWER_ON = "only one power-on was recorded, and neither a data sheet nor a static record gives the repeatability"
 #: Step of the numerical derivative of the error along the rate, deg/s.
 STEP_DPS = 0.01
 

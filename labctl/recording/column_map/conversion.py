@@ -41,7 +41,9 @@ def converted(target: str, mapped: MappedColumn, column: RawColumn, problems: Pr
     name = unit_name(mapped, column)
     if is_lsb(name):
         if mapped.scale is None:
-            problems.add(_unknown_unit(target, column, quantity, "LSB of a converter, and no scale is given"))
+            problems.add(
+                _unknown_unit(target, column, quantity, "the unit is LSB of a converter, but no scale is given")
+            )
             return None
         return mapped.at_zero + mapped.sign * (values - mapped.offset) / mapped.scale
     unit = find_unit(quantity, name) if name else None

@@ -38,8 +38,8 @@ def free_motion(columns: Columns, found: Movement, t_s: Array) -> str:
     seen = f"; its accelerometer shows {n} poses at rest, {LEAST_POSES} are needed" if n else ""
     spread = f"its output spreads over {found.spread_dps:.3g} deg/s"
     return (
-        f"the unit moves in {100 * found.share:.0f} % of the time ({spread}) and nothing says by how much{seen}: free "
-        "motion without a reference is no calibration data; what would do is a column with the table's rate "
+        f"the unit moves in {100 * found.share:.0f} % of the time ({spread}) and no column gives the rate or the "
+        f"angle{seen}: free motion without a reference cannot calibrate a gyro; add a column with the table's rate "
         "(table_rate_dps), the angle of each turn (turn_deg), an accelerometer with rests in at least "
         f"{LEAST_POSES} poses (accel_x_g, accel_y_g, accel_z_g), or a log at rest"
     )

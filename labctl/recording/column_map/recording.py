@@ -182,7 +182,9 @@ def _info(
     noted = [str(column_map.info.get("notes") or table.facts.get("notes") or "")]
     if started is None:
         started = _modified(table)
-        noted.append("started_at is the time at which the file was last written; the file states no start time")
+        noted.append(
+            "the file contains no start time; the time at which the file was last written is used as started_at"
+        )
     head = {
         **{key: value for key, value in table.facts.items() if key not in _TAKEN},
         **column_map.info,

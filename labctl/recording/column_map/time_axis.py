@@ -104,7 +104,8 @@ def _refuse_backwards(column: RawColumn, raw: Array, t_s: Array, problems: Probl
         advice = (
             f"a counter of {bits} bits that began again? write wrap_bits = {bits} in [columns.t_s]"
             if bits is not None
-            else "rows stand in the order of measurement, each later than the one before; sort them, or leave these out"
+            else "rows must be in the order of measurement, each later than the row before; sort the rows, or leave "
+            "these rows out"
         )
         problems.add(
             f"column {column.name!r} (time), {rows_text(wrong)}: {raw[row]:.12g} does not follow "

@@ -80,7 +80,8 @@ def _refuse_apart(table: RawTable, at: Array, other: RawTable, theirs: Array) ->
     steps = np.diff(theirs)
     if not (np.isfinite(at).all() and np.isfinite(theirs).all() and len(steps) and (steps > 0).all()):
         raise _refused(
-            other, f"its times, or those of {table.path.name}, are not all numbers that rise; correct or sort them"
+            other,
+            f"its times, or the times of {table.path.name}, are not all increasing numbers; correct or sort the rows",
         )
     most = MOST_STEPS * float(np.median(steps))
     nearest = theirs[np.searchsorted((theirs[:-1] + theirs[1:]) / 2, at)]

@@ -40,7 +40,8 @@ def check_turns(path: Path, info: RecordingInfo, columns: Columns) -> None:
             row = int(np.argmax(values != first))
             raise BadRecording(
                 f"{path}: column {name!r}, row {row + 1}: {values[row]:g} deg in data set {number[row]}, which began "
-                f"with {first[row]:g} deg; a data set is one turn: give the readings of each turn a number of their own"
+                f"with {first[row]:g} deg; a data set is one turn: give the readings of each turn a separate data "
+                "set number"
             )
     valid = _valid(columns)
     counts = np.add.reduceat(valid.astype(np.int64), starts)
@@ -49,7 +50,7 @@ def check_turns(path: Path, info: RecordingInfo, columns: Columns) -> None:
         row = int(starts[np.argmax(short)])
         raise BadRecording(
             f"{path}: column 'turn_deg', row {row + 1}: data set {number[row]} has {int(counts[short][0])} valid "
-            f"readings; the integral over a turn takes at least {LEAST}: leave the data set out, or turn again"
+            f"readings; the integral over a turn needs at least {LEAST}: leave the data set out, or turn again"
         )
 
 
@@ -58,7 +59,7 @@ def _check_means(path: Path, info: RecordingInfo, columns: Columns) -> None:
     for name in ("n", *(f"gyro_{axis}_std" for axis in info.axes)):
         if name not in columns:
             raise BadRecording(
-                f"{path}: column {name!r} is missing; it says how much better a rest is known than a turn: add the "
+                f"{path}: column {name!r} is missing; the weights of rests and turns are computed from it: add the "
                 "column, or give the readings (kind = 'samples')"
             )
     duration_s = np.asarray(columns["duration_s"], dtype=np.float64)

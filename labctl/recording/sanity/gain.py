@@ -95,8 +95,8 @@ def _crossed(crossed: Mapping[str, str], found: Mapping[str, Mapping[str, Respon
         gain = found[position][other].gain
         yield Finding(
             "axes", "certain", where,
-            f"while axis {axis} is along the table, output {axis} has gain {found[position][axis].gain:.3g} and "
-            f"output {other} has {gain:.3g}",
+            f"while axis {axis} is along the table's axis, output {axis} has gain {found[position][axis].gain:.3g} "
+            f"and output {other} has gain {gain:.3g}",
             gain, "1", f"output {axis} to follow", do,
         )  # fmt: skip
 
@@ -148,7 +148,7 @@ def _size(summary: Summary, axis: str, signed: list[tuple[str, float, Response]]
         yield Finding("no_response", "certain", where, said, gain, "1", EXPECTED, do)
         return
     output = _output_unit(summary, axis)
-    right = f"[output.{axis}] scale = {output.scale * gain:.6g} makes it 1"
+    right = f"with [output.{axis}] scale = {output.scale * gain:.6g} the gain is 1"
     cause = next((f.cause for f in FACTORS if abs(size / f.gain - 1) < NEAR_FACTOR), None)
     if cause is not None:
         said = f"gain {gain:.4g} is near {cause}"
@@ -157,7 +157,7 @@ def _size(summary: Summary, axis: str, signed: list[tuple[str, float, Response]]
         )
         return
     odd = POSSIBLE[0] <= size <= POSSIBLE[1]
-    said = f"gain {gain:.4g}" + ("" if odd else ": the output is not in the unit that recording.toml says")
+    said = f"gain {gain:.4g}" + ("" if odd else ": the output is not in the unit that recording.toml gives")
     do = f"give unit and scale of the output (raw counts, mV?); {right}"
     yield Finding("scale", "likely" if odd else "certain", where, said, gain, "1", EXPECTED, do)
 
@@ -178,6 +178,7 @@ def _unsigned(summary: Summary, position: str, one: Response) -> Finding | None:
     opposite = int(min(np.sum(signs > 0), np.sum(signs < 0)))
     return Finding(
         "sign", "certain", f"column table_rate_dps, position {position}",
-        f"all rates have one sign, and output {one.output} has the other in {opposite} of {int(fast.sum())} data sets",
+        f"all rates have the same sign, but output {one.output} has the opposite sign in {opposite} of "
+        f"{int(fast.sum())} data sets",
         float(opposite), "data sets", "signed rates", "give the table's rates with their sign",
     )  # fmt: skip

@@ -8,6 +8,7 @@ from labctl.recording.recording import Columns, Recording
 from labctl.recording.sanity.finding import Finding
 from labctl.recording.sanity.gain import check_responses
 from labctl.recording.sanity.outlying import check_outlying
+from labctl.recording.sanity.reference import check_reference
 from labctl.recording.sanity.response import responses
 from labctl.recording.sanity.summary import Summary, summarise
 from labctl.recording.sanity.timing import check_time
@@ -43,5 +44,6 @@ def findings_of(summary: Summary, environment: Columns | None = None) -> list[Fi
         *check_spread(summary),
         *check_codes(summary),
         *check_time(summary, environment),
+        *check_reference(summary),
     ]
     return sorted(found, key=lambda finding: finding.severity != "certain")

@@ -66,8 +66,11 @@ def _of_response(sets: Summary, one: Response) -> Iterator[Finding]:
 def _finding(sets: Summary, one: Response, row: int, meant: float, *, certain: bool) -> Finding:
     rate, number = float(sets["table_rate_dps"][row]), int(sets["dataset"][row])
     flipped = abs(meant + rate) < 0.1 * abs(rate)
-    said = f"its rate is {rate:.6g} deg/s, its output says {meant:.4g} deg/s, and all others agree with each other"
-    cause = "the sign of its rate or its output" if flipped else "its rate or its number"
+    said = (
+        f"the rate is given as {rate:.6g} deg/s, but the output shows {meant:.4g} deg/s, while all other data sets "
+        "agree with each other"
+    )
+    cause = "the sign of the rate or of the output" if flipped else "the rate or the number of the data set"
     return Finding(
         "one_data_set", "certain" if certain else "likely", f"data set {number}, axis {one.output}", said,
         meant, "deg/s", f"{rate:.6g} deg/s", f"correct {cause}, or leave the data set out",
@@ -77,8 +80,9 @@ def _finding(sets: Summary, one: Response, row: int, meant: float, *, certain: b
 def _rest(sets: Summary, one: Response, more: int) -> Finding:
     return Finding(
         "one_data_set", "likely", f"axis {one.output}, position {one.position}",
-        f"{more} more of {len(sets)} data sets disagree with the others", float(more), "data sets", "none",
-        "correct the largest first and check again",
+        f"besides the data sets listed above, {more} of {len(sets)} data sets disagree with the others",
+        float(more), "data sets", "none",
+        "correct the data sets listed above first, then check again",
     )  # fmt: skip
 
 

@@ -104,6 +104,7 @@ def _one_set(
         **_temperatures(_NONE if warm is None else warm[here]),
         **_times(t_s),
         "turning_dps": _turning(rows, here, t_s),
+        "turning_u_dps": float(rows["encoder_rate_u_dps"][here.start]) if "encoder_rate_u_dps" in rows else np.nan,
     }
     if info.motion == "turns":
         as_turned = np.asarray(rows["rate_as_turned_dps"], dtype=np.float64)[here]
@@ -178,6 +179,12 @@ def _turning(rows: Columns, here: slice, t_s: NDArray[np.float64]) -> float:
     return float((angle[-1] - angle[0]) / (t_s[-1] - t_s[0]))
 
 
+def _encoder(rows: Columns, m: int) -> dict[str, NDArray[np.generic]]:
+    """Return the rate by the table's encoder of m means, deg/s, and its standard uncertainty; NaN where not known."""
+    names = {"turning_dps": "encoder_rate_dps", "turning_u_dps": "encoder_rate_u_dps"}
+    return {name: np.asarray(rows.get(column, np.full(m, np.nan)), dtype=np.float64) for name, column in names.items()}
+
+
 def _output(values: NDArray[np.float64], warm: NDArray[np.float64] | None, *, at_rest: bool) -> dict[str, float]:
     codes = codes_of(values)
     noise = min(noise_of_reading(values), codes.std)
@@ -204,7 +211,7 @@ def _of_means(recording: Recording) -> Summary:
         "n": np.asarray(rows["n"]) if "n" in rows else np.ones(m, dtype=np.int64),
         "table_rate_dps": rate, "rate_low_dps": rate, "rate_high_dps": rate,
         "temperature_c": warm, "temperature_low_c": warm, "temperature_high_c": warm,
-        "t_begin_s": t_s, "t_end_s": t_s, "turning_dps": unknown,
+        "t_begin_s": t_s, "t_end_s": t_s, **_encoder(rows, m),
         **dict.fromkeys(("step_s", "gap_s", "lost_s"), unknown),
     }  # fmt: skip
     if info.motion == "turns":

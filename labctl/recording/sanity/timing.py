@@ -41,11 +41,11 @@ def _unit(summary: Summary, environment: Columns | None) -> Iterator[Finding]:
     usual = float(np.nanmedian(step)) if np.isfinite(step).any() else np.nan
     for evidence, ratio in (
         (
-            f"a reading every {usual:.4g}, and sample_rate_hz = {summary.info.sample_rate_hz or 0:g}",
+            f"successive time stamps differ by {usual:.4g}, but sample_rate_hz = {summary.info.sample_rate_hz or 0:g}",
             _by_rate(summary, usual),
         ),
-        ("the table angle turns at another rate than the table", _by_angle(summary)),
-        ("the environment's times end elsewhere", _by_environment(summary, environment)),
+        ("the rate of change of the table angle differs from the table's rate", _by_angle(summary)),
+        ("the times of the environment end at another value", _by_environment(summary, environment)),
     ):
         unit = next((name for name, per_s in UNITS.items() if abs(np.log(max(ratio, 1e-12) / per_s)) < NEAR_UNIT), None)
         if unit is not None:
@@ -91,7 +91,10 @@ def _by_environment(summary: Summary, environment: Columns | None) -> float:
 def _origin(summary: Summary, first_s: float) -> Iterator[Finding]:
     if abs(first_s) <= LATE_S:
         return
-    said = f"the first reading is at {first_s:.6g} s: the time stamps count from elsewhere, such as 1970"
+    said = (
+        f"the first reading is at {first_s:.6g} s: the time stamps count from another instant, such as 1970, not "
+        "from started_at"
+    )
     do = f"subtract the instant of started_at ({summary.info.started_at:%Y-%m-%d %H:%M} UTC) from column t_s"
     yield Finding("time_origin", "likely", "column t_s", said, first_s, "s", "seconds since started_at", do)
 

@@ -110,8 +110,9 @@ def check_turned(summary: Summary, off: list[OffTurn]) -> Iterator[Finding]:
     if is_turned(summary).any() and not bool(np.all(summary["turn_u_known"])):
         yield Finding(
             "turn_uncertainty", "likely", "column turn_u_deg",
-            f"it is missing, and {USUAL_U_DEG:g} deg is taken for every turn", USUAL_U_DEG, "deg",
-            "the standard uncertainty of each turn", "give the column; the scale factor is as certain as it says",
+            f"the column is missing, so {USUAL_U_DEG:g} deg is used for every turn", USUAL_U_DEG, "deg",
+            "the standard uncertainty of each turn", "add the column: the uncertainty of the scale factor depends on "
+                "it",
         )  # fmt: skip
 
 

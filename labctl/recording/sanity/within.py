@@ -44,7 +44,7 @@ def check_at_rest(summary: Summary) -> Iterator[Finding]:
             yield Finding(
                 "moves_at_rest", "certain" if most > max(MOVED_SHARE * fast, 1.0) else "likely",
                 f"axis {axis}, {numbers_in_words(summary['dataset'][moving])}",
-                f"{resting} and the output changes by {most:.3g} deg/s (root mean square)",
+                f"{resting}, but the output changes by {most:.3g} deg/s (root mean square)",
                 most, "deg/s", f"at most {max(MOVES_DPS, MOVES_SHARE * fast):.2g} deg/s",
                 "correct the rate, or leave out the readings in which the unit was moved",
             )  # fmt: skip
@@ -74,7 +74,7 @@ def check_changes(summary: Summary) -> Iterator[Finding]:
             f"the output changes by {change[worst]:.4g} deg/s at reading {int(row[worst]) + 1} of data set "
             f"{summary['dataset'][worst]}, whose rate is given as {rate[worst]:.6g} deg/s",
             float(change[worst]), "deg/s", "one rate per data set",
-            "give the readings at each rate a data set of their own",
+            "put the readings at each rate into a separate data set",
         )  # fmt: skip
 
 
@@ -97,7 +97,8 @@ def check_spread(summary: Summary) -> Iterator[Finding]:
             worst = int(np.argmax(np.where(far, spread, 0.0)))
             yield Finding(
                 "spread", "likely", f"axis {axis}, {numbers_in_words(summary['dataset'][far])}",
-                f"the readings spread by {spread[worst]:.3g} deg/s, those at like rates by {usual[worst]:.2g} deg/s",
+                f"the readings spread by {spread[worst]:.3g} deg/s, those of data sets at similar rates by "
+                f"{usual[worst]:.2g} deg/s",
                 float(spread[worst]), "deg/s", f"about {usual[worst]:.2g} deg/s",
                 "the unit was moved, or the rate changed: leave these data sets out or measure them again",
             )  # fmt: skip
@@ -124,8 +125,8 @@ def check_codes(summary: Summary) -> Iterator[Finding]:
         noise = float(np.median(summary.of_axis("std", axis)[shown]))
         yield Finding(
             "quantised", "likely", f"axis {axis}, {numbers_in_words(summary['dataset'][shown])}",
-            f"the output comes in steps of {step:.4g} deg/s, its readings there spread by {noise:.2g} deg/s, and their "
-            f"mean is known to u = {float(u.max()):.2g} deg/s only",
+            f"the output changes in steps of {step:.4g} deg/s, the readings of these data sets spread by {noise:.2g} "
+            f"deg/s, and their mean has an uncertainty of u = {float(u.max()):.2g} deg/s",
             step, "deg/s", "a step below twice the noise", "log the output with more digits or a finer converter",
         )  # fmt: skip
 

@@ -64,7 +64,7 @@ def missing(connection: sa.Connection | None, location: str) -> str | None:
     if found >= counted:
         return None
     return (
-        f"{counted - found} commits that were made are not in it: its write-ahead log ({Path(location).name}-wal) was "
-        "deleted, or it was interrupted, or an older copy was put in its place; restore the newest backup, or, to "
-        f"continue without these commits, remove {seal_path(location)}"
+        f"{counted - found} commits that were made are not in this database: its write-ahead log "
+        f"({Path(location).name}-wal) was deleted, a write was interrupted, or an older copy was put in its place; "
+        f"restore the newest backup, or, to continue without these commits, remove {seal_path(location)}"
     )

@@ -135,7 +135,9 @@ class _Check:
             found = valid.get((recording, number), 0)
             if kinds.get(recording) == "samples" and state != "open" and found is not None and found != n:
                 self.find(
-                    "readings", f"recording {recording} data set {number} counts {n} valid readings, holds {found}"
+                    "readings",
+                    f"recording {recording} data set {number} is recorded as having {n} valid readings, "
+                    f"but {found} are stored",
                 )
         for recording, kind in kinds.items():
             if kind != "samples" and (recording, WHOLE_TABLE) not in valid:
@@ -189,7 +191,7 @@ class _Check:
             self.find("readings", f"{place}: cannot be unpacked ({error})")
             return None
         if any(len(values) != block.n for values in columns.values()):
-            self.find("readings", f"{place}: its columns do not have the {block.n} readings that its header states")
+            self.find("readings", f"{place}: its columns do not have the {block.n} readings that its header gives")
             return None
         return columns
 
@@ -206,7 +208,7 @@ class _Check:
                 continue
             if (calibration.serial, calibration.version, calibration.hash) != (serial, version, own):
                 said = f"{calibration.serial} version {calibration.version}"
-                self.find("calibrations", f"{serial} version {version}: its document was changed ({said})")
+                self.find("calibrations", f"{serial} version {version}: the stored calibration was changed ({said})")
         return True
 
     def _check_audit(self, connection: sa.Connection) -> bool:

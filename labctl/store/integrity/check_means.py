@@ -50,7 +50,7 @@ class MeansCheck:
             self._kept = KeptMeans(self._connection, recording)
         where = f"recording {recording} data set {number}"
         if any(part.keys() != parts[0].keys() for part in parts):
-            return [f"{where}: its blocks have different columns"]
+            return [f"{where}: the blocks of this data set have different columns"]
         return [f"{where}: {text}" for text in self._kept.complaints(number, join_blocks(parts))]
 
 
@@ -80,20 +80,21 @@ class KeptMeans:
             else set()
         )
         if absent := sorted(sent - raw.keys()):
-            return [f"its readings lack {', '.join(absent)}"]
+            return [f"the readings have no column {', '.join(absent)}"]
         columns = scaled(dict(raw), self._channels, cast(DataSetHead, self._heads[number])) if self._channels else raw
         valid = np.asarray(columns["valid"]) != 0 if "valid" in columns else slice(None)
         found = []
         for channel, mean, std, n in kept:
             if channel not in columns:
-                found.append(f"{channel} has a mean, and no readings")
+                found.append(f"the readings have no column {channel}, but its mean is stored")
                 continue
             now = statistics(np.asarray(columns[channel])[valid].astype(np.float64), spectrum=False)
             if now.n != n:
-                found.append(f"the mean of {channel} counts {n} readings, there are {now.n}")
+                found.append(f"the stored mean of {channel} is of {n} readings, but {now.n} readings are stored")
             elif not (_same(mean, now.mean) and _same(std, now.std)):
                 found.append(
-                    f"{channel} is kept as {mean:.9g} +- {std}, its readings come to {now.mean:.9g} +- {now.std}"
+                    f"the stored mean of {channel} is {mean:.9g} +- {std}, but the readings give {now.mean:.9g} +- "
+                    f"{now.std}"
                 )
         return found
 

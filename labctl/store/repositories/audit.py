@@ -104,10 +104,12 @@ def first_broken(connection: sa.Connection, anchor: Head | None = None) -> Broke
         if own != _hash_of_row(before, *content):
             return Broken(int(number), "its content was changed")
         if before != previous:
-            return Broken(int(number), f"it does not follow row {last}: a row is missing before it, or rows were moved")
+            return Broken(
+                int(number), f"this row does not follow row {last}: a row between them is missing, or rows were moved"
+            )
         previous, last, length = own, int(number), length + 1
         if anchor is not None and length == anchor.length and own != anchor.hash:
-            return Broken(last, "it is not the row that the anchor names: the trail was rewritten")
+            return Broken(last, "this row is not the row that the anchor names: the trail was rewritten")
     if anchor is not None and length < anchor.length:
         return Broken(last + 1, f"{anchor.length - length} rows that the anchor counts are missing at the end")
     return _end_broken(connection, Head(length, previous), last)
@@ -120,7 +122,9 @@ def _end_broken(connection: sa.Connection, found: Head, last: int) -> Broken | N
     if found.length < head.length:
         return Broken(last + 1, f"{head.length - found.length} rows are missing at the end")
     if found != head:
-        return Broken(last, "it is not the last row that the head of the trail names: rows were added without labctl")
+        return Broken(
+            last, "this row is not the last row that the head of the trail names: rows were added without labctl"
+        )
     return None
 
 

@@ -22,10 +22,10 @@ from labctl.store.connection.transactions import outlasting
 from labctl.store.dataset_statistics import means_rows
 from labctl.store.repositories import benches
 from labctl.store.repositories.audit import append
-from labctl.store.repositories.sample_blocks import DataSetHead, blocks_of, scaled, write_block
+from labctl.store.repositories.sample_blocks import DataSetHead, angle_values, blocks_of, scaled, write_block
 from labctl.store.schema import tables
 from procedures.contracts.campaign_state import ENDED, CampaignState
-from procedures.contracts.journal import NOT_SAFE, DataSetHeader, DataSetState, EnvironmentSample, Event
+from procedures.contracts.journal import NOT_SAFE, DataSetHeader, DataSetState, EnvironmentSample, Event, TableAngles
 from procedures.contracts.steps import StepResult
 from procedures.execution.signals import defer_signals
 
@@ -169,6 +169,15 @@ class StoreJournal:
             parts.append(columns)
 
     @outlasting
+    def table_angles(self, dataset: int, angles: TableAngles) -> None:
+        """Record what the table's encoder said; the rate by it is the reference where the bench file says so."""
+        values = angle_values(angles)
+        d = tables.data_sets
+        mine = (d.c.recording_id.in_(self._recordings.values()), d.c.number == dataset)
+        with self._writing(synced=False) as connection:
+            connection.execute(sa.update(d).where(*mine).values(**values))
+
+    @outlasting
     def dataset_closed(self, dataset: int, state: DataSetState, reason: str = "") -> None:
         """Record that no more readings follow: figures are derived and blocks packed into one, in one transaction.
 
@@ -226,22 +235,30 @@ class StoreJournal:
 
     @outlasting
     def environment(self, sample: EnvironmentSample) -> None:
-        """Record the environment, once for each unit whose thermometer was read."""
+        """Record the environment, once for each unit whose thermometer, or that which stands for it, was read."""
+        warm = {gyro: self._temperature_c(gyro, sample) for gyro in self._recordings}
         rows = [
             {
                 "recording_id": recording,
                 "t_s": sample.t_s,
                 "run": sample.run,
-                "temperature_c": sample.gyro_c[gyro],
+                "temperature_c": warm[gyro],
                 "chamber_c": sample.chamber_c,
                 "chamber_setpoint_c": sample.chamber_setpoint_c,
             }
             for gyro, recording in self._recordings.items()
-            if gyro in sample.gyro_c
+            if warm[gyro] is not None
         ]
         if rows:
             with self._writing(synced=False) as connection:
                 connection.execute(_ADD_ENVIRONMENT, rows)
+
+    def _temperature_c(self, gyro: str, sample: EnvironmentSample) -> float | None:
+        """Return the temperature of a unit: by a reference thermometer where that stands for its own."""
+        for channel in self._channels[gyro]:
+            if channel.get("stands_for") == "temperature_c" and sample.run:
+                return sample.references.get(channel["name"])
+        return sample.gyro_c.get(gyro)
 
     @outlasting
     def event(self, event: Event, t_s: float, at: datetime) -> None:

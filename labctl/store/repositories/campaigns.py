@@ -120,6 +120,18 @@ class Campaigns:
             raise NotFound("there is no campaign in this database yet; `labctl campaign start RECIPE` makes one")
         return found[0]
 
+    def newest_of_unit(self, serial: str) -> CampaignRow | None:
+        """Return the campaign in which a unit was measured last; None for none."""
+        r = tables.recordings.c
+        of_unit = sa.select(sa.func.max(r.campaign_id)).where(r.serial == serial).scalar_subquery()
+        return next(iter(self._rows(tables.campaigns.c.id == of_unit)), None)
+
+    def newest_on_bench(self, bench: str) -> CampaignRow | None:
+        """Return the campaign made last on a bench; None for none."""
+        c = tables.campaigns.c
+        on_bench = sa.select(sa.func.max(c.id)).where(c.bench_name == bench).scalar_subquery()
+        return next(iter(self._rows(c.id == on_bench)), None)
+
     def all(self) -> list[CampaignRow]:
         """Return every campaign, newest first."""
         return self._rows(sa.true())

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from datetime import datetime
-from typing import cast
+from itertools import groupby
+from operator import itemgetter
+from typing import Any, cast
 
 import numpy as np
 import sqlalchemy as sa
@@ -21,8 +23,19 @@ from labctl.store.import_parts import WHOLE_TABLE, import_parts
 from labctl.store.records import DataSetRow, MeanRow, RecordingRow
 from labctl.store.repositories.points import points_columns
 from labctl.store.repositories.recording_writer import Imports
-from labctl.store.repositories.sample_blocks import DataSetHead, blocks_of, channels_of, join_blocks, readings_in_units
+from labctl.store.repositories.sample_blocks import (
+    DataSetHead,
+    blocks_of,
+    blocks_of_sets,
+    channels_of,
+    in_units,
+    join_blocks,
+    readings_in_units,
+)
 from labctl.store.schema import tables
+
+#: Readings of short data sets that are fetched together, which takes fewer statements and little memory.
+READ_AT_ONCE = 20_000
 
 
 class Recordings:
@@ -156,10 +169,12 @@ class Recordings:
             )
             rows = [dict(head) for head in heads.mappings()]
             channels = channels_of(connection, recording)
-        for head in rows:
+        for together in _by_readings(rows):
             with self._database.reading() as connection:
-                columns = readings_in_units(connection, cast(DataSetHead, dict(head)), channels)
-            yield int(head["number"]), columns
+                blocks = blocks_of_sets(connection, recording, [int(head["number"]) for head in together])
+            for head in together:
+                number = int(head["number"])
+                yield number, in_units(blocks.pop(number, []), cast(DataSetHead, head), channels)
 
     def data_sets(self, recording: int) -> list[DataSetRow]:
         """Return every data set of a recording, also those that were not completed, in order."""
@@ -190,6 +205,13 @@ class Recordings:
             if head is None:
                 raise NotFound(f"recording {recording} has no data set {number}; check its number")
             return readings_in_units(connection, cast(DataSetHead, dict(head)), channels_of(connection, recording))
+
+
+def _by_readings(heads: Sequence[dict[str, Any]]) -> Iterator[list[dict[str, Any]]]:
+    """Yield data sets in groups of about `READ_AT_ONCE` readings, in their order."""
+    begins = np.cumsum([head["n"] or 0 for head in heads], dtype=np.int64) // READ_AT_ONCE
+    for _, group in groupby(zip(begins.tolist(), heads, strict=True), key=itemgetter(0)):
+        yield [head for _, head in group]
 
 
 def _whole(recording: int) -> sa.ColumnElement[bool]:

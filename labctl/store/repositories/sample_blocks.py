@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import sqlalchemy as sa
 from numpy.typing import NDArray
@@ -11,15 +13,16 @@ from labctl.json_types.recordings import RawChannelJson
 from labctl.store import sample_codec
 from labctl.store.import_parts import block_row
 from labctl.store.schema import tables
+from procedures.contracts.journal import TableAngles
 
 
-def _blocks_query() -> sa.Select[int, int, int, bytes]:
+def _blocks_query() -> sa.Select[int, int, int, int, bytes]:
     b = tables.sample_blocks.c
-    ours = (b.recording_id == sa.bindparam("recording"), b.number == sa.bindparam("number"))
-    return sa.select(b.n, b.codec, b.crc32, b.data).where(*ours).order_by(b.seq)
+    ours = (b.recording_id == sa.bindparam("recording"), b.number.in_(sa.bindparam("numbers", expanding=True)))
+    return sa.select(b.number, b.n, b.codec, b.crc32, b.data).where(*ours).order_by(b.number, b.seq)
 
 
-#: Made once: each data set of a recording asks them.
+#: Made once: all data sets of a recording are asked by it, some at a time.
 _BLOCKS = _blocks_query()
 _ADD_BLOCK = sa.insert(tables.sample_blocks)
 
@@ -27,6 +30,17 @@ _ADD_BLOCK = sa.insert(tables.sample_blocks)
 def write_block(connection: sa.Connection, recording: int, number: int, seq: int, block: sample_codec.Block) -> None:
     """Write one block of the readings of a data set; `seq` counts the blocks of a data set from 0."""
     connection.execute(_ADD_BLOCK, block_row(recording, number, seq, block))
+
+
+class EncoderAngles(TypedDict):
+    """What the table's encoder said during a data set: times of the recording, and the line through the angles."""
+
+    t_s: list[float]
+    angle_deg: list[float]
+    rate_dps: float
+    rate_u_dps: float
+    angle_from_deg: float  #: when the gate opened
+    computed_dps: float  #: the rate that the table was taken to run at
 
 
 class DataSetHead(TypedDict):
@@ -43,12 +57,24 @@ class DataSetHead(TypedDict):
     power_on_s: float | None
     turn_deg: float | None
     turn_u_deg: float | None
+    encoder: EncoderAngles | None
 
 
 def blocks_of(connection: sa.Connection, recording: int, number: int) -> list[dict[str, NDArray[np.generic]]]:
     """Return the unpacked blocks of a data set, in order."""
-    found = connection.execute(_BLOCKS, {"recording": recording, "number": number})
-    return [sample_codec.unpack(sample_codec.Block(*row)) for row in found]
+    return blocks_of_sets(connection, recording, [number]).get(number, [])
+
+
+def blocks_of_sets(
+    connection: sa.Connection, recording: int, numbers: Sequence[int]
+) -> dict[int, list[dict[str, NDArray[np.generic]]]]:
+    """Return number -> unpacked blocks, in order, of some data sets."""
+    found: dict[int, list[dict[str, NDArray[np.generic]]]] = {}
+    for number, n, codec, crc32, data in connection.execute(
+        _BLOCKS, {"recording": recording, "numbers": list(numbers)}
+    ):
+        found.setdefault(number, []).append(sample_codec.unpack(sample_codec.Block(n, codec, crc32, data)))
+    return found
 
 
 def join_blocks(parts: list[dict[str, NDArray[np.generic]]]) -> dict[str, NDArray[np.generic]]:
@@ -68,8 +94,14 @@ def readings_in_units(
     connection: sa.Connection, head: DataSetHead, channels: list[RawChannelJson]
 ) -> dict[str, NDArray[np.generic]]:
     """Return the readings of one data set: as they came in from elsewhere, or in their units from what was sent."""
-    raw = join_blocks(blocks_of(connection, head["recording_id"], head["number"]))
-    return scaled(raw, channels, head) if channels else raw
+    return in_units(blocks_of(connection, head["recording_id"], head["number"]), head, channels)
+
+
+def in_units(
+    blocks: list[dict[str, NDArray[np.generic]]], head: DataSetHead, channels: list[RawChannelJson]
+) -> dict[str, NDArray[np.generic]]:
+    """Return the readings of one data set from its unpacked blocks."""
+    return scaled(join_blocks(blocks), channels, head) if channels else join_blocks(blocks)
 
 
 def scaled(
@@ -86,7 +118,12 @@ def scaled(
         "mounting": np.full(n, head["mounting"], dtype=np.int64),
         "table_rate_dps": np.full(n, head["table_rate_dps"]),
     }
-    if head["table_angle_deg"] is not None:
+    if (encoder := head["encoder"]) is not None:
+        columns["table_angle_deg"] = encoder["angle_from_deg"] + encoder["rate_dps"] * (t_s - head["gate_from_s"])
+        columns["computed_rate_dps"] = np.full(n, encoder["computed_dps"])
+        columns["encoder_rate_dps"] = np.full(n, encoder["rate_dps"])
+        columns["encoder_rate_u_dps"] = np.full(n, encoder["rate_u_dps"])
+    elif head["table_angle_deg"] is not None:
         columns["table_angle_deg"] = head["table_angle_deg"] + head["table_rate_dps"] * (t_s - head["gate_from_s"])
     if head["turn_deg"] is not None:
         columns |= _turned(head["turn_deg"], head["turn_u_deg"] or 0.0, t_s[raw["valid"] != 0], n)
@@ -99,8 +136,28 @@ def scaled(
         columns["temperature_c"] = np.mean(per_axis, axis=0)
     if "chamber_mc" in raw:
         columns["chamber_c"] = _floats(raw["chamber_mc"]) / 1e3
+    _put_references(columns, channels)
     columns["valid"] = raw["valid"]
     return columns
+
+
+def _put_references(columns: dict[str, NDArray[np.generic]], channels: list[RawChannelJson]) -> None:
+    """Put a reference instrument's column in the place of the unit's own, which is kept as own_..."""
+    for channel in channels:
+        if (column := channel.get("stands_for")) is not None:
+            if column in columns:
+                columns[f"own_{column}"] = columns[column]
+            columns[column] = columns[channel["name"]]
+
+
+def angle_values(angles: TableAngles) -> dict[str, object]:
+    """Return what a data set's row has of the table's encoder; the rate is the reference where that is said."""
+    encoder: EncoderAngles = {
+        "t_s": list(angles.t_s), "angle_deg": list(angles.angle_deg), "rate_dps": angles.rate_dps,
+        "rate_u_dps": angles.rate_u_dps, "angle_from_deg": angles.angle_from_deg, "computed_dps": angles.computed_dps,
+    }  # fmt: skip
+    values: dict[str, object] = {"encoder": encoder, "table_angle_deg": angles.angle_from_deg}
+    return values | ({"table_rate_dps": angles.rate_dps} if angles.is_reference else {})
 
 
 def _turned(turn_deg: float, turn_u_deg: float, valid_s: NDArray[np.float64], n: int) -> dict[str, NDArray[np.generic]]:

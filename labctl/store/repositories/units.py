@@ -1,14 +1,15 @@
-"""Units: gyros by serial number."""
+"""Units: gyros by serial number, and which calibration of each is in force, until when."""
 
 from __future__ import annotations
 
 from datetime import datetime
+from typing import Any
 
 import sqlalchemy as sa
 
 from labctl.errors import NotFound
 from labctl.store.connection.database import Database
-from labctl.store.records import Unit
+from labctl.store.records import CertificationRow, ServedCalibration, Unit
 from labctl.store.schema import tables
 
 
@@ -68,3 +69,68 @@ class Units:
         with self._database.reading() as connection:
             rows = connection.execute(sa.select(tables.units).where(SEEN).order_by(tables.units.c.serial))
             return [Unit(*row) for row in rows]
+
+
+_C, _X = tables.calibrations.c, tables.certifications.c
+_ACT = (_X.version.label("act_version"), _X.act, _X.by, _X.reason, _X.at, _X.due_at)
+_LAST = sa.select(sa.func.max(_X.id)).where(_X.serial == sa.bindparam("serial")).correlate(None).scalar_subquery()
+
+
+def _served_in_force() -> sa.Select[*tuple[Any, ...]]:
+    of = sa.and_(_X.serial == _C.serial, _X.version == _C.version)
+    return (
+        sa.select(_C.document, _C.hash, _X.id.label("act_id"), _X.id.label("last_id"), *_ACT)
+        .select_from(tables.calibrations)
+        .join(tables.certifications, of)
+        .where(_X.id == _LAST, _X.act == "certify")
+    )
+
+
+def _served_version() -> sa.Select[*tuple[Any, ...]]:
+    inner = tables.certifications.alias()
+    newest = (
+        sa.select(sa.func.max(inner.c.id))
+        .where(inner.c.serial == sa.bindparam("serial"), inner.c.version == sa.bindparam("version"))
+        .scalar_subquery()
+    )
+    return (
+        sa.select(_C.document, _C.hash, _X.id.label("act_id"), _LAST.label("last_id"), *_ACT)
+        .select_from(tables.calibrations)
+        .outerjoin(tables.certifications, _X.id == newest)
+        .where(_C.serial == sa.bindparam("serial"), _C.version == sa.bindparam("version"))
+    )
+
+
+#: Made once: what every GET of a calibration asks.
+_IN_FORCE, _VERSION = _served_in_force(), _served_version()
+
+
+class Certifications:
+    """Which versions are in force, and until when."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def served(self, serial: str, version: int | None) -> ServedCalibration | None:
+        """Return a version, or the one in force, with the newest act on it; None where there is none: one query."""
+        with self._database.reading() as connection:
+            if version is None:
+                row = connection.execute(_IN_FORCE, {"serial": serial}).first()
+            else:
+                row = connection.execute(_VERSION, {"serial": serial, "version": version}).first()
+        if row is None:
+            return None
+        act = None if row.act_id is None else _act(serial, row)
+        in_force = act is not None and act.act == "certify" and row.act_id == row.last_id
+        return ServedCalibration(bytes(row.document), str(row.hash), act, in_force)
+
+    def in_force(self) -> dict[str, CertificationRow]:
+        """Return the act that put the version in force there, by serial number of every unit that has one."""
+        last = sa.select(sa.func.max(_X.id)).group_by(_X.serial)
+        query = sa.select(_X.serial, *_ACT).where(_X.id.in_(last), _X.act == "certify")
+        with self._database.reading() as connection:
+            return {row.serial: _act(row.serial, row) for row in connection.execute(query)}
+
+
+def _act(serial: str, row: sa.Row[*tuple[Any, ...]]) -> CertificationRow:
+    return CertificationRow(serial, row.act_version, row.act, row.by, row.reason, row.at, row.due_at)

@@ -46,6 +46,8 @@ data_sets = sa.Table(
     sa.Column("damaged", sa.Integer, nullable=False, default=0),
     sa.Column("turn_deg", sa.Float),  #: of a turn by hand, 0 of a rest beside it; absent for a rate of a table
     sa.Column("turn_u_deg", sa.Float),
+    #: angles by the table's encoder and the rate that follows, as EncoderAngles; absent for a table without one
+    sa.Column("encoder", sa.JSON(none_as_null=True)),
     sa.Column("planned", sa.Integer),  #: its number in the plan: one that is redone has the same again
 )
 

@@ -132,7 +132,8 @@ class TurnReadings:
                 self._courses[part][name].add(readings)
                 if len(readings) or readings.lost or readings.damaged:
                     in_time = replace(readings, t_s=recorder.time.of(readings.t_s))
-                    recorder.journal.readings(self._numbers[part], name, in_time, self._context.monitor.air_c)
+                    beside = self._context.monitor.references.beside(in_time)
+                    recorder.journal.readings(self._numbers[part], name, beside, self._context.monitor.air_c)
 
     def _open(self, part: Part, from_s: float | None) -> None:
         context, step = self._context, self._step

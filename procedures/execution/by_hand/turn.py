@@ -36,8 +36,8 @@ def turn(context: ExecutionContext, step: Turn) -> dict[str, float]:
     finally:
         context.recorder.tracker.update(turn=None)
     raise StepFailed(
-        f"the turn by {step.turn_deg:g} deg, {step.position} up, was refused {rules.attempts} times, at last: "
-        f"{refused}; inspect unit and readings, then resume the campaign"
+        f"the turn by {step.turn_deg:g} deg, {step.position} up, was refused {rules.attempts} times, the last time "
+        f"because: {refused}; inspect unit and readings, then resume the campaign"
     )
 
 

@@ -55,7 +55,7 @@ def test_a_unit_that_still_follows_keeps_the_soak_open() -> None:
 def test_the_window_has_to_be_full_before_a_drift_is_believed() -> None:
     quick = Soak(temperature_c=20, hold_s=60, band_c=0.5, max_drift_c=0.1, drift_window_s=300, timeout_s=5000)
     assert not reported([20.0] * 30, [20.0] * 30, quick).settled()
-    assert "not watched for 300 s yet" in reported([20.0] * 30, [20.0] * 30, quick).why_not()
+    assert "not been monitored for 300 s yet" in reported([20.0] * 30, [20.0] * 30, quick).why_not()
     assert reported([20.0] * 31, [20.0] * 31, quick).settled()
 
 

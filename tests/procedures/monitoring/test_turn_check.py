@@ -77,7 +77,7 @@ def test_what_came_out_is_said(turned: dict[str, float], asked: float, position:
 
 
 def test_a_turn_that_is_too_fast_for_the_unit_is_refused() -> None:
-    assert "the unit measures up to 400; turn it more slowly" in judged({"x": 2600.0}, 2600).refused
+    assert "the unit measures only up to 400; turn the unit more slowly" in judged({"x": 2600.0}, 2600).refused
 
 
 def test_lost_readings_are_counted_of_all_that_should_have_come() -> None:
@@ -92,7 +92,10 @@ def test_a_nudge_and_a_slow_turn_in_a_rest_are_found() -> None:
         "the unit moved during the rest after the turn"
     )
     creeping = judged({"x": 360.0}, after=still(y=1.5)).refused
-    assert creeping == "the output about y changed by +1.5 deg/s between the rests; the unit moved in one"
+    assert creeping == (
+        "the output about y changed by +1.5 deg/s between the rests before and after the turn; "
+        "the unit moved during one of them"
+    )
     assert judged({"x": 360.0}, after=still(y=0.5)).refused == ""
 
 

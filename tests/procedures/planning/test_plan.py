@@ -352,11 +352,11 @@ def test_what_needs_a_table_or_a_chamber_says_which_is_missing(limits: BenchLimi
     with pytest.raises(PlanRefused) as refused:
         make_plan(recipe(), replace(limits, table=None, chamber=None))
     assert refused.value.offenders == (
-        "rates_dps: it needs a rate table, and the bench has none",
-        "temperatures_c: it needs a chamber, and the bench has none",
+        "rates_dps: a rate table is needed, and the bench has none",
+        "temperatures_c: a chamber is needed, and the bench has none",
     )
     assert "choose a recipe with [turns], such as by-hand, which needs neither" in str(refused.value)
-    with pytest.raises(PlanRefused, match="needs a chamber"):
+    with pytest.raises(PlanRefused, match="a chamber is needed"):
         make_plan(recipe(), replace(limits, chamber=None), clip=True)
 
 

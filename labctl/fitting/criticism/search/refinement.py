@@ -69,7 +69,7 @@ def _along(comparison: Comparison, candidate: Candidate, kind: Effect, term: Ter
     low, high = np.log(grid[max(at - 1, 0)]), np.log(grid[min(at + 1, len(grid) - 1)])
     if not high > low:
         return term
-    from scipy.optimize import minimize_scalar  # noqa: PLC0415  0.1 s that an adequate model does not need
+    from scipy.optimize import minimize_scalar
 
     gain = _gain_function(comparison, candidate, kind)
 

@@ -145,17 +145,21 @@ def _lag(temperature_c: Array, tau_s: float) -> Array:
 
 
 def _play(temperature_c: Array, width_k: float) -> Array:
-    """Return temperature minus a follower with play, over half of the play, (k,): -1 to 1."""
+    """Return temperature minus a follower with play, over half of the play, (k,): -1 to 1.
+
+    Each temperature clips the follower to within half of the play. Clips one after the other are one clip again, so
+    those up to each temperature are found by doubling their number, in as many passes as k has binary digits.
+    """
     half = width_k / 2
-    behind = []
-    follower = float(temperature_c[0])
-    for now in temperature_c.tolist():
-        if follower < now - half:
-            follower = now - half
-        elif follower > now + half:
-            follower = now + half
-        behind.append(now - follower)
-    return np.array(behind) / half
+    low, high = temperature_c - half, temperature_c + half
+    low[0] = high[0] = temperature_c[0]
+    reach = 1
+    while reach < len(low) and np.any(low < high):
+        low[reach:], high[reach:] = (
+            np.minimum(np.maximum(before[:-reach], low[reach:]), high[reach:]) for before in (low, high)
+        )
+        reach *= 2
+    return np.asarray((temperature_c - low) / half)
 
 
 def history_of(recording: Recording) -> TemperatureHistory:

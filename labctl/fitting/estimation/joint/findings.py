@@ -109,8 +109,8 @@ def _of_shifts(repeatability: Mapping[str, list[RepeatabilityJson]]) -> Iterator
             size = f"{line['value']:.2g}{unit} (95 %: {line['low']:.2g} to {line['high']:.2g})"
             yield (
                 f"Axis {axis}: shifts of up to {max(values) - min(values):.2g}{unit} between the recordings "
-                f"({_probability(line['p_value'])}) are {line['term']}: standard deviation {size}. They are neither a "
-                "drift nor part of the calibration."
+                f"({_probability(line['p_value'])}) are {line['term']}: standard deviation {size}. These shifts are "
+                "neither a drift nor part of the calibration."
             )
 
 
@@ -133,7 +133,7 @@ def _of_agreement(agreement: list[EffectAgreement], not_compared: str, recording
         more = " beside the shift between them" if beside else ""
         yield (
             f"Recordings {numbers} disagree on {each['effect']}{more}: chi2 {chi2:.3g} for {freedom} degrees of "
-            f"freedom, {_probability(p_value)}; one value for all is an average of different ones."
+            f"freedom, {_probability(p_value)}; a single value for all recordings is an average of different values."
         )
     if agreement and not apart:
         yield f"Recordings {numbers} agree on every effect of the model beside the shifts between them."

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from labctl.errors import NotEnoughData
 from labctl.fitting.numeric.arrays import Array
@@ -102,6 +101,8 @@ def _fitted(
     accel_g: NDArray[np.float64], gravity: float, sigma: Array, *, robust: bool, start: Array | None = None
 ) -> Array:
     """Return the nine parameters by least squares; robust: a rest that was none pulls with a bounded force."""
+    from scipy.optimize import least_squares
+
     begin = np.zeros(PARAMETERS) if start is None else start
     scale = 1.0
     if robust:
@@ -135,8 +136,9 @@ def _require_poses(serial: str, rests: Rests) -> None:
     poses = different_poses(rests.accel_g)
     if poses < LEAST_POSES:
         raise NotEnoughData(
-            f"{serial}: {len(rests)} rests in {poses} different poses; bias, scale factor and misalignment of the "
-            f"accelerometer, by which the gyro is calibrated, take at least {LEAST_POSES}: lay the unit down for 2 s "
+            f"{serial}: {len(rests)} rests in {poses} different poses; the accelerometer, by which the gyro is "
+            f"calibrated, needs at least {LEAST_POSES} for bias, scale factor and misalignment: lay the unit down "
+            "for 2 s "
             "or more on each face, each edge and some corners; free motion without rests is no reference"
         )
 

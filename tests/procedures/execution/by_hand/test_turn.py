@@ -94,7 +94,7 @@ def test_no_reading_is_missing_between_the_rests_and_the_turn() -> None:
         ("axis", "deg came out about y, not about x"),
         ("direction", "deg came out in the other direction, clockwise"),
         ("nudge", "the unit moved during the rest after the turn"),
-        ("fast", "the unit measures up to 400; turn it more slowly"),
+        ("fast", "the unit measures only up to 400; turn the unit more slowly"),
         ("nothing", "no turn about x came out, only 0 deg of 360"),
     ],
 )
@@ -118,7 +118,9 @@ def test_a_hand_that_never_does_it_ends_the_campaign_and_says_why() -> None:
     there = HandBench(("short",) * 9, attempts=3)
     outcome = there.run()
     assert outcome.state == "failed"
-    assert outcome.reason.startswith("the turn by 360 deg, x up, was refused 3 times, at last: only 300 deg came out")
+    assert outcome.reason.startswith(
+        "the turn by 360 deg, x up, was refused 3 times, the last time because: only 300 deg came out"
+    )
 
 
 def test_the_angle_so_far_is_shown_while_the_hand_turns() -> None:

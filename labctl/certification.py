@@ -1,0 +1,92 @@
+"""The certification in a calibration file: whether it is in force, by whom, and until when it is valid.
+
+It is part of the file's hash. The calibration itself is the same whether it is certified or not; its own hash is
+`calibration_hash`.
+"""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Literal, cast, get_args
+
+State = Literal["in-force", "superseded", "revoked"]
+
+
+class CalibrationWarning(UserWarning):
+    """A calibration that is loaded is overdue, or was revoked."""
+
+
+@dataclass(frozen=True)
+class Certification:
+    """The newest act of certifying or revoking a version; `due` is aware UTC, None where no date was given."""
+
+    state: State
+    by: str
+    reason: str
+    at: datetime
+    due: datetime | None
+    calibration_hash: str
+
+    def is_overdue(self, now: datetime) -> bool:
+        """Whether the date until which it is valid has passed at an aware time."""
+        return self.state != "revoked" and self.due is not None and now >= self.due
+
+    def warning(self, what: str, now: datetime) -> str:
+        """Return the warning for a user of calibration `what` at an aware time; empty where there is none."""
+        if self.state == "revoked":
+            return (
+                f"calibration of {what} was revoked at {_said(self.at)} by {self.by} ({self.reason}); fetch the one in "
+                "force"
+            )
+        if self.due is not None and now >= self.due:
+            days = (now - self.due).total_seconds() / 86_400
+            return (
+                f"calibration of {what} was due on {_said(self.due)}, {days:.1f} days ago; calibrate the unit again, "
+                "then fetch the new version"
+            )
+        return ""
+
+    def to_json(self) -> dict[str, str | None]:
+        """Return it as the value of `certification` in a calibration file."""
+        return {
+            "state": self.state, "by": self.by, "reason": self.reason, "at": self.at.isoformat(),
+            "due": self.due.isoformat() if self.due else None, "calibration_hash": self.calibration_hash,
+        }  # fmt: skip
+
+
+def read_certification(given: Mapping[str, object]) -> Certification:
+    """Read the value of `certification`. Raises LookupError, TypeError or ValueError for one that is not whole."""
+    state, due = given["state"], given["due"]
+    if state not in get_args(State):
+        raise ValueError(f"state {str(state)[:80]!r} instead of one of {', '.join(get_args(State))}")
+    return Certification(
+        cast(State, state), str(given["by"]), str(given["reason"]), _instant(given["at"]),
+        None if due is None else _instant(due), str(given["calibration_hash"]),
+    )  # fmt: skip
+
+
+def warn(text: str) -> None:
+    """Issue a CalibrationWarning at the line of the program that called labctl; nothing for an empty text."""
+    if not text:
+        return
+    depth, frame = 1, sys._getframe(1)  # noqa: SLF001  Python 3.12 can skip a package's own frames
+    while frame.f_back is not None and str(frame.f_globals.get("__name__", "")).partition(".")[0] == "labctl":
+        depth, frame = depth + 1, frame.f_back
+    warnings.warn(text, CalibrationWarning, stacklevel=depth + 1)
+
+
+def _instant(text: object) -> datetime:
+    if not isinstance(text, str):
+        raise TypeError(f"{text!r} instead of a time")
+    found = datetime.fromisoformat(text)
+    if found.tzinfo is None:
+        raise ValueError(f"{text!r} has no time zone")
+    return found.astimezone(UTC)
+
+
+def _said(at: datetime) -> str:
+    return f"{at.astimezone(UTC):%Y-%m-%d %H:%M} UTC"
