@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 import threading
 import tty
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -116,17 +119,35 @@ def test_a_modbus_line_is_opened_with_the_same_settings(far: Terminal, monkeypat
     client.close()
 
 
-def test_a_port_in_use_is_named_with_the_process_that_has_it(far: Terminal, monkeypatch: pytest.MonkeyPatch) -> None:
-    held = opened(far, Line())
-    monkeypatch.setattr("os.getpid", lambda: 0)  # this very process is the other one
-    (user,) = users_of(far.path)
-    assert user.startswith("process ")
+@pytest.fixture
+def other_user(far: Terminal) -> Iterator[int]:
+    """Another process that holds the port as a serial program does: opened, and locked for itself."""
+    holding = (
+        "import sys, serial; port = serial.Serial(sys.argv[1], exclusive=True); print('open', flush=True); input()"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", holding, far.path], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as process:
+        assert process.stdout is not None
+        assert process.stdout.readline() == b"open\n"
+        yield process.pid
+        process.kill()
+
+
+def test_a_port_in_use_is_named_with_the_process_that_has_it(far: Terminal, other_user: int) -> None:
+    # this process, the maker of the terminal, is not among the users
+    assert users_of(far.path) == [f"process {other_user} ({Path(sys.executable).name[:15]})"]
     for opener in (
         lambda: opened(far, Line()),
         lambda: Ports(SystemClock()).modbus_rtu(far.path, device="table", baudrate=9600, timeout_s=1.0),
     ):
         with pytest.raises(
-            LinkError, match=r"table: port .* cannot be opened .*; check which other process .*process \d"
+            LinkError,
+            match=rf"table: port .* cannot be opened .*; check which other process .*process {other_user} ",
         ):
             opener()
-    held.close()
+
+
+def test_the_maker_of_a_terminal_is_not_its_user(far: Terminal, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("os.getpid", lambda: 0)  # seen as by another process, this one is the device at the far end
+    assert users_of(far.path) == []
