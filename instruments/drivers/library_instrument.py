@@ -41,7 +41,11 @@ class LibraryInstrument:
         with contextlib.suppress(ValueError):
             if isinstance(found, int | float | str):
                 return float(found)
-        raise MalformedReply(self.device, f"{attribute} is {found!r}, not a number; name the attribute that holds it")
+        raise MalformedReply(
+            self.device,
+            f"attribute {attribute} holds {found!r}, not a number; "
+            "name the attribute that holds the measured value in the bench file",
+        )
 
     def set(self, attribute: str, value: float) -> None:
         """Set an attribute, or call a method with the value. Raises InstrumentError."""

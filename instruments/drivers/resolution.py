@@ -80,7 +80,8 @@ def _driver(name: str, kind: type[Driver]) -> Driver:
     if not isinstance(found, kind):
         drives, _ = KINDS[type(found)]
         known: Sequence[str] = names_of(kind)
-        raise PluginError(f"driver {name!r} is of a {drives}, not of a {what} (there are {', '.join(known) or 'none'})")
+        choice = f"choose {', '.join(known)}" if known else f"no driver of a {what} is installed"
+        raise PluginError(f"driver {name!r} is for a {drives}, not for a {what}; {choice}")
     return found
 
 

@@ -69,7 +69,7 @@ def with_driver(device: str, name: str, **settings: Any) -> BenchFile:
 
 def test_a_driver_of_another_kind_of_instrument_is_refused() -> None:
     with pytest.raises(
-        ValidationError, match=r"driver 'stim300' is of a gyro, not of a chamber \(there are binder, espec, "
+        ValidationError, match=r"driver 'stim300' is for a gyro, not for a chamber; choose binder, espec, "
     ):
         checked_settings(with_driver("chamber", "stim300"))
 

@@ -25,8 +25,8 @@ def of_poses(recording: Recording, model: str | None, effects: list[str]) -> Fit
     serial = recording.info.serial
     if model != POSES or effects:
         raise BadInput(
-            f"{serial}: fit a recording of poses with --model {POSES} only, without added effects: the rate of the "
-            "turns is not known, only the direction of gravity before and after"
+            f"{serial}: a recording of poses shows the direction of gravity before and after each turn, not the rate "
+            f"during the turn; fit it with --model {POSES} and without added effects"
         )
     found = fit_poses(recording)
     error = ErrorFigures(found.raw_rms_dps, found.rms_dps, found.heldout_rms_dps, found.noise_floor_dps, FLOOR_SOURCE)

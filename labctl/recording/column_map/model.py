@@ -192,4 +192,4 @@ def _check_unit(target: str, column: MappedColumn) -> None:
             raise ValueError(f"{target}: unit = {LSB!r} needs scale: words per {quantity} (131: one of the MPU-6050)")
         return
     if quantity in QUANTITIES and find_unit(quantity, column.unit) is None:
-        raise ValueError(f"{target}: unit {column.unit[:40]!r} is none of {names_of(quantity)}")
+        raise ValueError(f"{target}: {column.unit[:40]!r} is not a known unit of measurement; use {names_of(quantity)}")

@@ -107,7 +107,7 @@ class BenchDescription(ResponseModel):
         description="What the last safe state of the bench could not confirm; empty when all is well."
     )
     check: BenchCheckResponse | None = Field(
-        default=None, description="What was found when it was last checked since the service was started."
+        default=None, description="Result of the latest check since the service started; null: not checked yet."
     )
     heard_s: float = Field(
         default=0.0,

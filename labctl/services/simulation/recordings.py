@@ -93,5 +93,5 @@ def make_recording(request: SimulateRequest, serial: str | None = None) -> Made:
 def _gyro(bench: BenchFile, name: str | None) -> GyroSettings:
     found = [gyro for gyro in bench.gyros if name in {None, gyro.name}]
     if not found:
-        raise BadInput(f"bench {bench.name} has no gyro {name!r} (there are {', '.join(g.name for g in bench.gyros)})")
+        raise BadInput(f"bench {bench.name} has no gyro {name!r}; choose {', '.join(g.name for g in bench.gyros)}")
     return found[0]

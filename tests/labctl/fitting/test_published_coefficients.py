@@ -138,7 +138,7 @@ def test_another_model_than_the_tables_is_refused(tmp_path: Path) -> None:
 def test_two_rows_for_one_axis_of_a_polynomial_are_refused(tmp_path: Path) -> None:
     columns = ["reference_c", "temperature_low_c", "temperature_high_c", "c_r0_t0", "c_r0_t1", "c_r0_t2"]
     folder = table(tmp_path / "t", 'axes = ["z"]\n', columns, [[35, 25, 45, 1, 0, 0], [35, 25, 45, 2, 0, 0]])
-    with pytest.raises(NotEnoughData, match="one row for each axis; there are 2"):
+    with pytest.raises(NotEnoughData, match="one row for each axis, found 2"):
         fit(read_recording(folder), "ojeda2000")
 
 

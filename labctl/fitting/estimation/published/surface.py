@@ -58,8 +58,8 @@ def _row_of(recording: Recording, axis: str) -> int:
     rows = np.flatnonzero(np.asarray(columns["axis"]) == axis) if "axis" in columns else np.arange(len(recording))
     if len(rows) != 1:
         raise NotEnoughData(
-            f"{recording.info.serial}, axis {axis}: a polynomial has one row for each axis; there are {len(rows)}, "
-            "correct column axis"
+            f"{recording.info.serial}, axis {axis}: a polynomial needs exactly one row for each axis, found "
+            f"{len(rows)}; correct the column `axis` of the file"
         )
     return int(rows[0])
 

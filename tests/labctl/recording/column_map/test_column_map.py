@@ -263,7 +263,10 @@ def test_a_knock_is_no_movement_and_a_slow_drift_neither(tmp_path: Path) -> None
         ("gyro = 1", "gyro: Extra inputs are not permitted"),
         ("columns = 3", "columns: Input should be a valid dictionary"),
         ('[columns]\ngyro_z = {unit = "deg/s"}', "columns.gyro_z.from: Field required"),
-        ('[columns]\ngyro_z = {from = "w", unit = "furlong"}', "gyro_z: unit 'furlong' is none of deg/s, rad/s, mdps"),
+        (
+            '[columns]\ngyro_z = {from = "w", unit = "furlong"}',
+            "gyro_z: 'furlong' is not a known unit of measurement; use deg/s, rad/s, mdps",
+        ),
         ('[columns]\ngyro_z = {from = "w", unit = "LSB"}', "gyro_z: unit = 'LSB' needs scale"),
         ('[columns]\ngyro_z = {from = "w", unit = "deg/s", scale = 3}', "scale goes with unit = 'LSB'"),
         ('[columns]\ngyro_z = {from = "w", unit = "LSB", scale = 0}', "scale is 0"),
@@ -277,7 +280,7 @@ def test_a_knock_is_no_movement_and_a_slow_drift_neither(tmp_path: Path) -> None
         ('[datasets]\nby = "rows"', r'by = "rows" needs a \[parts.NAME\] for each data set'),
         ('[datasets]\nby = "whole"\n[parts.a]\nturn_deg = 1', r"\[parts.NAME\] needs \[datasets\]"),
         ('[parts.a]\nposition = "up"', "parts.a.position: Input should be 'x', '-x'"),
-        ('[units]\ngyro = {unit = "K"}', "unit 'K' is none of"),
+        ('[units]\ngyro = {unit = "K"}', "'K' is not a known unit of measurement; use"),
         ("[[[", "not TOML"),
     ],
 )

@@ -52,7 +52,7 @@ export function historyPlot(history) {
     };
   };
   const element = figure(
-    "Bench since this page was opened",
+    "Temperatures and rate since this page was opened",
     "From the event stream, since this tab was opened.",
     draw,
     {

@@ -156,7 +156,7 @@ export function mountingDrawing(position) {
 /** @param {Prompt} prompt */
 function heading({ kind, position, turn_deg: angle }) {
   if (kind === "mount") return `Turn the unit: ${position} up`;
-  if (kind === "turn") return `Turn by ${angle} deg about ${position}, ${position} up`;
+  if (kind === "turn") return `Keep ${position} up, and turn the unit by ${angle} deg about ${position}`;
   return "The campaign has a question";
 }
 

@@ -116,7 +116,7 @@ export function logPreview(file, taken) {
     return h(
       "div",
       { class: "row" },
-      labelledField("Option of the importer", input, "KEY=VALUE, such as instance=1 for another gyro of a ULog."),
+      labelledField("Option of the importer", input, "KEY=VALUE, for example instance=1 for the second gyro of a ULog file."),
       button("Look again", () => {
         options = input.value.trim() ? [input.value.trim()] : [];
         return look(null);
