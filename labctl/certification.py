@@ -62,7 +62,7 @@ def read_certification(given: Mapping[str, object]) -> Certification:
     """Read the value of `certification`. Raises LookupError, TypeError or ValueError for one that is not whole."""
     state, due = given["state"], given["due"]
     if state not in get_args(State):
-        raise ValueError(f"state {str(state)[:80]!r} instead of one of {', '.join(get_args(State))}")
+        raise ValueError(f"the state is {str(state)[:80]!r}, but must be one of {', '.join(get_args(State))}")
     return Certification(
         cast(State, state), str(given["by"]), str(given["reason"]), _instant(given["at"]),
         None if due is None else _instant(due), str(given["calibration_hash"]),

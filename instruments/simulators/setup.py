@@ -37,7 +37,9 @@ class InstrumentSetup:
         found = {each.name: each for each in self.bench.references}
         if not found:
             raise LinkError(
-                "reference", f"bench {self.bench.name} has no [[references]]; add one, or correct the address"
+                "reference",
+                f"bench {self.bench.name} has no reference instrument; add a [[references]] section "
+                "to the bench file, or correct the port's address",
             )
         return found.get(self.gyro_name, next(iter(found.values())))
 

@@ -12,7 +12,7 @@ from labctl.cli.import_dialogue import Acceptance, named, print_template, read_g
 from labctl.cli.options import Database, Json
 from labctl.cli.output import console, print_json, print_warnings
 
-export_app = typer.Typer(no_args_is_help=True, help="Write recordings of the database to files.")
+export_app = typer.Typer(no_args_is_help=True, help="Export recordings from the database to files.")
 
 
 PathToImport = Annotated[

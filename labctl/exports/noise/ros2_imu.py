@@ -26,8 +26,8 @@ def write(calibration: Calibration, options: Mapping[str, str]) -> Written:
     missing = [axis for axis in AXES if axis not in calibration.axes]
     if missing:
         raise BadInput(
-            f"format {NAME}: {calibration.serial} is calibrated along {', '.join(calibration.axes)} alone; the message "
-            f"has a covariance of x, y and z; measure {', '.join(missing)} too"
+            f"format {NAME} needs covariances of x, y and z, but {calibration.serial} is calibrated only along "
+            f"{', '.join(calibration.axes)}; calibrate {', '.join(missing)} too"
         )
     noise = noise_of(calibration, options, NAME)
     order = [calibration.axes.index(axis) for axis in AXES]

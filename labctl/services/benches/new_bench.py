@@ -76,9 +76,8 @@ def sections_of(found: Sequence[tuple[PortInfo | None, Found]]) -> list[Section]
             continue
         if each.kind != "gyro" and (other := next((one for one in made if one.kind == each.kind), None)):
             raise BadInput(
-                f"two {each.kind}s answer, at {other.found.address} and {each.address}: a bench has one; name the "
-                "ports "
-                "of this bench with --port and --host"
+                f"two {each.kind}s answer, at {other.found.address} and {each.address}, but a bench has only one; "
+                "name the ports of this bench with --port and --host"
             )
         section = Section(_name(each, made), each.kind, each, dict(each.recognised.settings))
         section.values = {"driver": each.driver, **_address(each, info), **section.values}

@@ -46,7 +46,7 @@ class ServiceControl:
         """Continue a paused campaign, or resume an interrupted one on this service's bench."""
         runner, body = self._bench_runner(), asked.body
         if asked.campaign is None:
-            raise Conflict("a service needs the number of the campaign to resume; give its number")
+            raise Conflict("state the number of the campaign to resume; `labctl campaign list` shows the numbers")
         paused = runner.runs(asked.campaign)  # a resume after an interruption is recorded together with its rows
         answer = runner.resume(asked.campaign, body)
         if paused:

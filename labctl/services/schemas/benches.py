@@ -41,7 +41,7 @@ class BenchStatus(ResponseModel):
         description="When a later attempt confirmed the safe state; a person must still inspect and clear the bench.",
     )
     left: list[str] = Field(
-        default_factory=list, description="Campaigns whose process is gone and that have not been ended."
+        default_factory=list, description="Interrupted campaigns: their process ended before they did."
     )
 
 

@@ -97,7 +97,9 @@ class ErrorFigures(ResponseModel):
     noise_floor_dps: float | None = Field(description="Error of data-set means due to noise and drift alone, deg/s.")
     noise_floor_source: str = Field(default="none", description="How the noise floor was estimated.")
     heldout_by_leg: list[LegError] = Field(
-        default_factory=list, description="Error of heating by a fit to cooling, and the reverse; empty: one leg."
+        default_factory=list,
+        description="Error in the heating leg of a model fitted to the cooling leg, and the reverse; empty: "
+        "only one leg was measured.",
     )
 
 

@@ -67,6 +67,7 @@ def server_engine(url: str, *, lock_timeout_s: float, idle_timeout_s: float) -> 
         pass
     except ModuleNotFoundError as error:
         raise BadInput(
-            f"--database {shown(url)}: {error.name} is not installed here: `pip install 'labctl[postgresql]'`; {known}"
+            f"--database {shown(url)} needs {error.name}, which is not installed; run "
+            f"`pip install 'labctl[postgresql]'`; {known}"
         ) from error
     raise BadInput(f"--database {shown(url)}: unknown kind of database; {known}")

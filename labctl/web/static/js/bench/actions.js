@@ -162,7 +162,7 @@ export const answerButtons = (campaign, prompt) => [
   ...(prompt.kind === "turn" ? turnButtons(campaign, prompt) : [doneButton(campaign, prompt)]),
   button("Cannot be done", async () => {
     const answers = await askOperator("It cannot be done?", [operatorNameField(), { name: "reason", label: "Why" }], {
-      text: "The campaign ends, in the safe state.",
+      text: "This ends the campaign: the table stops, and the chamber returns to its safe temperature.",
       confirm: "It cannot be done",
       kind: "danger",
     });

@@ -52,7 +52,7 @@ export function liveOutput(campaign) {
   const units = () => [...new Set([...courses.values()].map((course) => course.gyro))];
   const picture = figure(
     "Gyro output now",
-    "Mean of the latest readings of each unit, since this tab was opened.",
+    "Each point is the mean of a unit's latest readings; the first was read when this tab was opened.",
     () => {
       const drawn = [...courses.values()];
       const several = units().length > 1;
