@@ -33,13 +33,13 @@ def is_simulated_address(address: str) -> bool:
 class Strict(BaseModel):
     """A settings table; an unknown key is an error that names it."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True)
 
 
 class DeviceSettings(BaseModel):
     """One instrument of a bench file: its driver and address. A driver's own model adds the keys of the driver."""
 
-    model_config = ConfigDict(extra="allow", frozen=True)
+    model_config = ConfigDict(defer_build=True, extra="allow", frozen=True)
 
     driver: str
     port: str | None = None  #: serial devices

@@ -16,13 +16,13 @@ from labctl.recording.recording import Recording
 class NoOptions(BaseModel):
     """Options of an importer that has none."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True)
 
 
 class TableOptions(BaseModel):
     """Options of an importer that gives a table; its column map knows the rest."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True)
 
     serial: str | None = Field(default=None, max_length=64)  #: instead of the map's or the file's
 

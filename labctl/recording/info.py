@@ -31,7 +31,7 @@ class OutputUnit(BaseModel):
     For deg/s, rad/s and deg/h both have defaults; for V, mV, count and arb the nominal scale must be given.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True)
 
     unit: Literal["deg/s", "rad/s", "deg/h", "V", "mV", "count", "arb"] = "deg/s"
     offset: float = 0.0
@@ -57,7 +57,7 @@ class OutputUnit(BaseModel):
 class RecordingInfo(BaseModel):
     """The head of a recording (recording.toml, format version 1)."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True)
 
     format: Literal["labctl-recording/1"] = "labctl-recording/1"
     serial: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._+# -]{0,63}$")

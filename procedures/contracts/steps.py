@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field
 class StepBase(BaseModel):
     """What all steps share."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True)
 
     expected_s: float = 0.0
 
@@ -149,7 +149,7 @@ Step = Annotated[
 class StepResult(BaseModel):
     """How a step ended, with the figures that say so (a soak: time held, band, drift of the gyro's temperature)."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True)
 
     outcome: Literal["done", "failed", "interrupted", "skipped"]
     reason: str = ""

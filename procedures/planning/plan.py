@@ -37,7 +37,7 @@ _BENCH_FIGURES = {"expected_s"}  #: what depends on the bench's speed, not on wh
 class Plan(BaseModel):
     """Everything a campaign will do, in order. The steps never change once the campaign has begun."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True)
 
     format: Literal["labctl-plan/1"] = "labctl-plan/1"
     recipe: Recipe  #: as run: without what was clipped

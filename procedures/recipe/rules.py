@@ -29,7 +29,7 @@ GuardKind = Literal[
 class Table(BaseModel):
     """A table of a recipe; an unknown key is an error with a name."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+    model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True, allow_inf_nan=False)
 
 
 class SoakRules(Table):

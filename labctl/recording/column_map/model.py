@@ -35,7 +35,7 @@ Bits = Annotated[int, Field(ge=8, le=64)]
 
 
 class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, populate_by_name=True)
+    model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True, populate_by_name=True)
 
 
 class FileKeys(_Strict):

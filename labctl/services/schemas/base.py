@@ -11,7 +11,7 @@ class ResponseModel(BaseModel):
     """A response of the services: the same JSON on the command line and over HTTP. Keys may be added, none renamed."""
 
     # undeclared keys: of a service that is newer, or of a version that an older labctl kept
-    model_config = ConfigDict(extra="ignore", frozen=True, ser_json_inf_nan="null")
+    model_config = ConfigDict(defer_build=True, extra="ignore", frozen=True, ser_json_inf_nan="null")
 
     @classmethod
     def __get_pydantic_json_schema__(cls, core_schema: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchemaValue:
