@@ -17,6 +17,7 @@ from typing import Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, SerializeAsAny, model_validator
 
+from instruments.laboratory import Laboratory
 from instruments.toml_documents import read_toml
 
 #: A serial number becomes part of file names, addresses and C comments.
@@ -151,6 +152,7 @@ class BenchFile(Strict):
     chamber: SerializeAsAny[ChamberSettings] | None = None  #: absent: the units are at room temperature
     gyros: tuple[SerializeAsAny[GyroSettings], ...] = Field(min_length=1)
     references: tuple[SerializeAsAny[ReferenceSettings], ...] = ()
+    laboratory: Laboratory | None = None  #: as certificates name it
     simulation: SimulationSettings | None = None
     #: "table", "chamber" or gyro name -> its driver's release, filled in when the drivers are found; what a file says
     #: here is not used.
