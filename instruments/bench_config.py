@@ -17,7 +17,11 @@ from typing import Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, SerializeAsAny, model_validator
 
+<<<<<<< HEAD
 from instruments.laboratory import Laboratory
+=======
+from instruments.standards import Standard
+>>>>>>> budget24
 from instruments.toml_documents import read_toml
 
 #: A serial number becomes part of file names, addresses and C comments.
@@ -152,7 +156,11 @@ class BenchFile(Strict):
     chamber: SerializeAsAny[ChamberSettings] | None = None  #: absent: the units are at room temperature
     gyros: tuple[SerializeAsAny[GyroSettings], ...] = Field(min_length=1)
     references: tuple[SerializeAsAny[ReferenceSettings], ...] = ()
+<<<<<<< HEAD
     laboratory: Laboratory | None = None  #: as certificates name it
+=======
+    standards: tuple[Standard, ...] = ()  #: reference standards, at most one of each quantity and name
+>>>>>>> budget24
     simulation: SimulationSettings | None = None
     #: "table", "chamber" or gyro name -> its driver's release, filled in when the drivers are found; what a file says
     #: here is not used.
@@ -180,6 +188,16 @@ class BenchFile(Strict):
             names.append(reference.name)
         if len(chosen := [each.name for each in self.references if each.is_temperature]) > 1:
             raise ValueError(f"is_temperature is set for {' and '.join(chosen)}; the fit takes one temperature")
+        return self
+
+    @model_validator(mode="after")
+    def _standards_are_distinct(self) -> BenchFile:
+        """Reject one quantity stated twice under one name: its uncertainty would count twice."""
+        stated = [(each.quantity, each.name) for each in self.standards]
+        if twice := next((one for one in stated if stated.count(one) > 1), None):
+            raise ValueError(
+                f"two [[standards]] have the quantity {twice[0]!r} and the name {twice[1]!r}; remove one, or name both"
+            )
         return self
 
     @property
