@@ -1,0 +1,124 @@
+"""What was measured, as a certificate states it: dates, environment, results with U, errors before and after."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from datetime import date, timedelta
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.calibration import Calibration
+from labctl.certificates.document import AxisError, CoefficientResult, Condition, ResultPoint, StateOfItem
+from labctl.fitting.data.fit_data import fit_data_of
+from labctl.fitting.uncertainty.rate import COVERAGE
+from labctl.json_types.models import Coefficients
+from labctl.recording import Recording, RecordingInfo
+from labctl.services.calibrations.surface import errors_on_grid
+from labctl.services.calibrations.uncertainty import uncertainty_grid
+from labctl.services.criticism.measurements import Measurements
+from labctl.services.criticism.verification.of_version import applied_errors
+from labctl.store import CalibrationRecord, RecordingRow, Store
+
+Array = NDArray[np.float64]
+#: Columns of a recording that are conditions, as a certificate names them, and their units.
+CONDITIONS: Mapping[str, tuple[str, str]] = {
+    "chamber_c": ("Temperature of the chamber air", "°C"),
+    "reference_c": ("Temperature by the reference thermometer", "°C"),
+    "temperature_c": ("Temperature of the item", "°C"),
+    "own_temperature_c": ("Temperature by the item's own thermometer", "°C"),
+    "humidity_pct": ("Relative humidity of the air", "%"),
+    "supply_v": ("Supply voltage of the item", "V"),
+}
+
+
+def performed(store: Store, row: RecordingRow) -> tuple[date, date | None]:
+    """Return the first and the last day of a campaign, or of an imported recording as far as it tells. UTC."""
+    if row.campaign is not None:
+        campaign = store.campaigns.get(row.campaign)
+        begun = campaign.started_at or campaign.created_at
+        return begun.date(), None if campaign.ended_at is None else campaign.ended_at.date()
+    begun = RecordingInfo.model_validate(row.info).started_at
+    ends = [each.t_until_s for each in store.recordings.data_sets(row.id) if each.t_until_s is not None]
+    return begun.date(), (begun + timedelta(seconds=max(ends))).date() if ends else None
+
+
+def environment(points: Recording) -> tuple[Condition, ...]:
+    """Return the least and the largest mean of each condition that was logged."""
+    found = []
+    for column, (name, unit) in CONDITIONS.items():
+        values = np.asarray(points.columns.get(column, []), dtype=np.float64)
+        if (values := values[np.isfinite(values)]).size:
+            found.append(Condition(name=name, unit=unit, low=float(values.min()), high=float(values.max())))
+    return tuple(found)
+
+
+def results(
+    store: Store, row: CalibrationRecord, calibration: Calibration
+) -> tuple[tuple[ResultPoint, ...], dict[str, str]]:
+    """Return error and U over the calibrated range, and why U is not known where it is not.
+
+    Raises BadInput, NotEnoughData, NotConverged.
+    """
+    grid = uncertainty_grid(calibration)
+    errors = errors_on_grid(store, row, grid.rate_dps, grid.temperature_c)
+    has_temperature = np.isfinite(calibration.temperature_c).all()
+    found, unknown = [], {}
+    for axis in calibration.axes:
+        for i, temperature in enumerate(grid.temperature_c):
+            for j, rate in enumerate(grid.rate_dps):
+                u = grid.axes[axis][i][j]
+                unknown |= u.unknown
+                found.append(
+                    ResultPoint(
+                        axis=axis, temperature_c=temperature if has_temperature else None, rate_dps=rate,
+                        error_dps=errors[axis][i][j], expanded_dps=u.expanded_dps or 0.0,
+                    )
+                )  # fmt: skip
+    return tuple(found), unknown
+
+
+def coefficients(calibration: Calibration) -> tuple[CoefficientResult, ...]:
+    """Return each coefficient with its expanded uncertainty; of a temperature table at each of its nodes."""
+    tables: Mapping[str, Coefficients] = calibration.document["coefficients"]
+    found: list[CoefficientResult] = []
+    for axis, table in tables.items():
+        nodes = table.get("temperature_c")
+        at = nodes if isinstance(nodes, list) else [None]
+        for name, entry in table.items():
+            if isinstance(entry, list):
+                continue
+            values, u = entry["value"], entry["u"]
+            listed = values if isinstance(values, list) else [values]
+            u_listed = u if isinstance(u, list) else [u]
+            found += [
+                CoefficientResult(
+                    axis=axis, name=name, temperature_c=where, value=value, unit=entry["unit"],
+                    expanded=None if one is None else COVERAGE * one,
+                )
+                for where, value, one in zip(at, listed, u_listed, strict=True)
+            ]  # fmt: skip
+    return tuple(found)
+
+
+def uncorrected(measured: Measurements, axes: tuple[str, ...]) -> StateOfItem:
+    """Return the errors of the output by its nominal scale, nothing subtracted."""
+    data = fit_data_of(measured.points)
+    errors = {axis: np.asarray(data.outputs[axis] - data.true_rate_dps(axis), dtype=np.float64) for axis in axes}
+    return _state("the output by its nominal scale, without correction", errors)
+
+
+def corrected(measured: Measurements, calibration: Calibration, basis: str) -> StateOfItem:
+    """Return the errors of the rate corrected by a version; nothing is fitted. Raises BadInput, NotEnoughData."""
+    return _state(basis, applied_errors(calibration, measured.points)[0])
+
+
+def _state(basis: str, errors: Mapping[str, Array]) -> StateOfItem:
+    return StateOfItem(
+        basis=basis,
+        datasets=max(len(values) for values in errors.values()),
+        axes=tuple(
+            AxisError(axis=axis, rms_dps=float(np.sqrt(np.mean(values**2))), max_dps=float(np.max(np.abs(values))))
+            for axis, values in errors.items()
+        ),
+    )
