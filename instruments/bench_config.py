@@ -17,11 +17,8 @@ from typing import Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, SerializeAsAny, model_validator
 
-<<<<<<< HEAD
 from instruments.laboratory import Laboratory
-=======
 from instruments.standards import Standard
->>>>>>> budget24
 from instruments.toml_documents import read_toml
 
 #: A serial number becomes part of file names, addresses and C comments.
@@ -156,11 +153,8 @@ class BenchFile(Strict):
     chamber: SerializeAsAny[ChamberSettings] | None = None  #: absent: the units are at room temperature
     gyros: tuple[SerializeAsAny[GyroSettings], ...] = Field(min_length=1)
     references: tuple[SerializeAsAny[ReferenceSettings], ...] = ()
-<<<<<<< HEAD
     laboratory: Laboratory | None = None  #: as certificates name it
-=======
     standards: tuple[Standard, ...] = ()  #: reference standards, at most one of each quantity and name
->>>>>>> budget24
     simulation: SimulationSettings | None = None
     #: "table", "chamber" or gyro name -> its driver's release, filled in when the drivers are found; what a file says
     #: here is not used.

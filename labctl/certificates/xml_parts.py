@@ -23,10 +23,9 @@ def child(parent: ET.Element, name: str, text: str | None = None, **attributes: 
 
 
 def texts(parent: ET.Element, name: str, *said: str, **attributes: str) -> ET.Element:
-    """Add an element with texts in English."""
+    """Add an element with a text in English: one of each language, as PTB's rules ask."""
     made = child(parent, name, **attributes)
-    for each in said:
-        child(made, "content", each, lang=ENGLISH)
+    child(made, "content", " ".join(said), lang=ENGLISH)
     return made
 
 

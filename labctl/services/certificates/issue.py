@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from datetime import date, datetime
 from importlib.metadata import version as package_version
 
@@ -12,9 +14,11 @@ from labctl.certificates.document import (
     Authorisation,
     CalibrationFacts,
     Certificate,
+    Condition,
     Item,
     Method,
     Replaced,
+    ResultPoint,
     StandardUsed,
     StateOfItem,
     Uncertainty,
@@ -44,6 +48,32 @@ class CertificateRefused(Conflict):
     slug = "certificate-refused"
 
 
+@dataclass(frozen=True)
+class Found:
+    """What the recordings of a version show."""
+
+    measurements: Measurements | None = None  #: None: there are none
+    results: tuple[ResultPoint, ...] = ()
+    unknown: Mapping[str, str] = field(default_factory=dict)  #: part of the uncertainty -> why it is not known
+    conditions: tuple[Condition, ...] = ()
+
+    @staticmethod
+    def of(store: Store, facts: Facts) -> Found:
+        """Return it for a version; nothing where no recording holds measurements."""
+        if not facts.recordings:
+            return Found()
+        measurements = Measurements(store, facts.recordings)
+        results, unknown = measured.results(store, facts.row, facts.calibration)
+        return Found(measurements, results, unknown, measured.environment(measurements.points))
+
+    def missing(self) -> Iterator[tuple[str, str]]:
+        """Yield what is not known of the results, and what makes it known."""
+        for part, why in self.unknown.items():
+            yield f"uncertainty of the {part}", why
+        if self.measurements is not None and not any(each.unit == "°C" for each in self.conditions):
+            yield "temperature of the item or of the chamber", "a recording with temperature_c or chamber_c"
+
+
 def issue(store: Store, serial: str, version: int, request: CertificateRequest, at: datetime) -> CertificateResponse:
     """Issue the certificate of a version at an aware time; one that was issued is answered as it is.
 
@@ -55,8 +85,9 @@ def issue(store: Store, serial: str, version: int, request: CertificateRequest, 
     if kept is None and request.amend is not None:
         raise CertificateRefused(f"{serial} version {version} has no certificate to amend; issue one without --amend")
     facts = facts_of(store, serial, version, request.order)
-    refuse(facts)
-    certificate = _certificate(store, facts, request, at, kept)
+    found = Found.of(store, facts)
+    refuse(facts, found)
+    certificate = _certificate(store, facts, found, request, at, kept)
     document = certificate.to_bytes()
     xml = dcc_of(certificate)
     forms = CertificateForms(document, xml, pdf_of(certificate, xml))
@@ -79,9 +110,9 @@ def _unchanged(kept: CertificateRow, request: CertificateRequest) -> Certificate
     return kept
 
 
-def refuse(facts: Facts) -> None:
+def refuse(facts: Facts, found: Found) -> None:
     """Raise MissingFacts, or CertificateRefused for a revoked version and a standard outside its dates."""
-    if missing := list(facts.missing()):
+    if missing := [*facts.missing(), *found.missing()]:
         raise MissingFacts(facts.what, missing)
     act = facts.authorised
     if act is not None and act.act == "revoke":
@@ -91,9 +122,7 @@ def refuse(facts: Facts) -> None:
         )
     first, last = facts.performed_from, facts.performed_until
     if first is not None and last is not None and (bad := [each for each in facts.standards if _off(each, first, last)]):
-        said = "; ".join(
-            f"{each.label}: calibrated {each.calibrated or 'on no stated day'}, due {each.due}" for each in bad
-        )
+        said = "; ".join(f"{each.label}: calibrated {each.calibrated or 'on no stated day'}, due {each.due}" for each in bad)
         raise CertificateRefused(
             f"no certificate of {facts.what}: measured from {first} to {last} with a reference standard outside its "
             f"dates. {said}. Have it calibrated and measure again"
@@ -105,18 +134,12 @@ def _off(standard: Standard, first: date, last: date) -> bool:
 
 
 def _certificate(
-    store: Store, facts: Facts, request: CertificateRequest, at: datetime, kept: CertificateRow | None
+    store: Store, facts: Facts, found: Found, request: CertificateRequest, at: datetime, kept: CertificateRow | None
 ) -> Certificate:
-    measurements = Measurements(store, facts.recordings)
-    points, unknown = measured.results(store, facts.row, facts.calibration)
-    conditions = measured.environment(measurements.points)
-    lacking = [(f"uncertainty of the {part}", why) for part, why in unknown.items()]
-    if not any(each.unit == "°C" for each in conditions):
-        lacking.append(("temperature of the item or of the chamber", "a recording with temperature_c or chamber_c"))
     first, last, act = facts.performed_from, facts.performed_until, facts.authorised
-    if lacking or first is None or last is None or act is None:
-        raise MissingFacts(facts.what, lacking)
-    found, left, adjustment = _states(store, facts, measurements)
+    if first is None or last is None or act is None or found.measurements is None:
+        raise MissingFacts(facts.what, [])  # refused before
+    before, left, adjustment = _states(store, facts, found.measurements)
     order, number = facts.order, _number(store, facts, at)
     return Certificate(
         number=number,
@@ -129,18 +152,18 @@ def _certificate(
         method=_method(facts),
         performed_from=first,
         performed_until=last,
-        environment=conditions,
+        environment=found.conditions,
         standards=tuple(_standard(each) for each in facts.standards),
         uncertainty=Uncertainty(
             coverage_factor=COVERAGE, coverage_probability=PROBABILITY,
             components=("coefficients of the model", "error of the model", "repeatability from power-on to power-on"),
         ),
-        results=points,
+        results=found.results,
         coefficients=measured.coefficients(facts.calibration),
-        as_found=found,
+        as_found=before,
         as_left=left,
         adjustment=adjustment,
-        conformity=conformity(order.conformity, left, points) if order.conformity else None,
+        conformity=conformity(order.conformity, left, found.results) if order.conformity else None,
         due=act.due_at.date() if order.state_due and act.due_at else None,
         external=order.external or NONE,
         authorised=Authorisation(name=act.by, at=act.at, reason=act.reason),

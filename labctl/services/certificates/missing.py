@@ -22,8 +22,9 @@ class MissingFacts(BadInput):
         places: dict[str, list[str]] = {}
         for fact, place in facts:
             places.setdefault(place, []).append(fact)
+        count = "1 fact is missing" if len(facts) == 1 else f"{len(facts)} facts are missing"
         said = "; ".join(f"{', '.join(names)}: {place}" for place, names in places.items())
-        super().__init__(f"no certificate of {what}: {len(facts)} facts are missing. {said}")
+        super().__init__(f"no certificate of {what}: {count}. {said}")
 
     @property
     def members(self) -> JsonObject:
