@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping, Sequence
 
 from instruments.laboratory import Contact
-from labctl.certificates.document import Certificate, CoefficientResult, ResultPoint, StateOfItem
+from labctl.certificates.document import Certificate, CoefficientResult, ResultPoint, StandardUsed, StateOfItem
 from labctl.certificates.units import readable
 
 #: Digits of an uncertainty (GUM 7.2.6), and of a number without one.
@@ -38,12 +38,13 @@ def _pages(given: Certificate) -> dict[str, object]:
         "authorised": f"{given.authorised.name}, {given.authorised.at:%Y-%m-%d %H:%M} UTC",
         "authorised_name": given.authorised.name,
         "method": _method(given),
+        "plan_hash": given.method.plan_hash or "",
         "environment": [
-            [each.name, _number(each.low), _number(each.high), each.unit] for each in given.environment
+            [each.name, _signed(f"{each.low:.2f}"), _signed(f"{each.high:.2f}"), each.unit] for each in given.environment
         ],
         "standards": [
             [
-                " ".join(filter(None, (each.name or each.quantity.replace("_", " "), f"({each.quantity})" if each.name else ""))).replace("_", " "),
+                _standard_name(each),
                 f"{each.u:.2g} {readable(each.unit)}",
                 each.certificate or "–",
                 each.issued_by or "–",
@@ -65,6 +66,11 @@ def _pages(given: Certificate) -> dict[str, object]:
         "hash": given.calibration.hash,
         "address": given.calibration.address,
     }
+
+
+def _standard_name(given: StandardUsed) -> str:
+    quantity = given.quantity.replace("_", " ")
+    return f"{quantity}: {given.name}" if given.name else quantity
 
 
 def rounded(value: float, expanded: float) -> tuple[str, str]:
@@ -126,7 +132,6 @@ def _method(given: Certificate) -> list[list[str]]:
     found = [
         ["Method", method.name],
         ["Procedure", method.procedure],
-        ["Plan, SHA-256", method.plan_hash or ""],
         ["Error model", f"{method.model}: {', '.join(method.effects)}"],
         [f"Recording{several}", ", ".join(map(str, method.recordings))],
         ["Software", method.software],
@@ -171,7 +176,7 @@ def _coefficient(given: CoefficientResult) -> list[str]:
 
 
 def _state(title: str, given: StateOfItem) -> Mapping[str, object]:
-    rows = [[each.axis, f"{each.rms_dps:.3g}", f"{each.max_dps:.3g}"] for each in given.axes]
+    rows = [[each.axis, f"{each.rms_dps:#.3g}", f"{each.max_dps:#.3g}"] for each in given.axes]
     return {"title": title, "basis": given.basis, "datasets": given.datasets, "rows": rows}
 
 

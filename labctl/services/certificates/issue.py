@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from datetime import date, datetime
 from importlib.metadata import version as package_version
@@ -18,7 +18,6 @@ from labctl.certificates.document import (
     Item,
     Method,
     Replaced,
-    ResultPoint,
     StandardUsed,
     StateOfItem,
     Uncertainty,
@@ -53,8 +52,7 @@ class Found:
     """What the recordings of a version show."""
 
     measurements: Measurements | None = None  #: None: there are none
-    results: tuple[ResultPoint, ...] = ()
-    unknown: Mapping[str, str] = field(default_factory=dict)  #: part of the uncertainty -> why it is not known
+    results: measured.Results = field(default_factory=measured.Results)
     conditions: tuple[Condition, ...] = ()
 
     @staticmethod
@@ -63,13 +61,12 @@ class Found:
         if not facts.recordings:
             return Found()
         measurements = Measurements(store, facts.recordings)
-        results, unknown = measured.results(store, facts.row, facts.calibration)
-        return Found(measurements, results, unknown, measured.environment(measurements.points))
+        results = measured.results(store, facts.row, facts.calibration)
+        return Found(measurements, results, measured.environment(measurements.points))
 
     def missing(self) -> Iterator[tuple[str, str]]:
         """Yield what is not known of the results, and what makes it known."""
-        for part, why in self.unknown.items():
-            yield f"uncertainty of the {part}", why
+        yield from self.results.missing()
         if self.measurements is not None and not any(each.unit == "°C" for each in self.conditions):
             yield "temperature of the item or of the chamber", "a recording with temperature_c or chamber_c"
 
@@ -120,7 +117,12 @@ def refuse(facts: Facts, found: Found) -> None:
             f"{facts.what} was revoked at {act.at:%Y-%m-%d %H:%M} UTC by {act.by} ({act.reason}); certify a version "
             "that holds, and issue its certificate"
         )
-    first, last = facts.performed_from, facts.performed_until
+    first, last, received = facts.performed_from, facts.performed_until, facts.order.item.received
+    if first is not None and received is not None and received > first:
+        raise CertificateRefused(
+            f"[item] of the order: received = {received} is after the calibration of {facts.what} began, {first}; "
+            "correct the date"
+        )
     if first is not None and last is not None and (bad := [each for each in facts.standards if _off(each, first, last)]):
         said = "; ".join(f"{each.label}: calibrated {each.calibrated or 'on no stated day'}, due {each.due}" for each in bad)
         raise CertificateRefused(
@@ -158,19 +160,19 @@ def _certificate(
             coverage_factor=COVERAGE, coverage_probability=PROBABILITY,
             components=("coefficients of the model", "error of the model", "repeatability from power-on to power-on"),
         ),
-        results=found.results,
+        results=found.results.points,
         coefficients=measured.coefficients(facts.calibration),
         as_found=before,
         as_left=left,
         adjustment=adjustment,
-        conformity=conformity(order.conformity, left, found.results) if order.conformity else None,
+        conformity=conformity(order.conformity, left, found.results.points) if order.conformity else None,
         due=act.due_at.date() if order.state_due and act.due_at else None,
         external=order.external or NONE,
         authorised=Authorisation(name=act.by, at=act.at, reason=act.reason),
         calibration=CalibrationFacts(
             version=facts.row.version, hash=facts.row.hash, address=address_of(facts.laboratory.url, facts.row)
         ),
-        statements=statements(facts),
+        statements=(*statements(facts), *found.results.left_out),
     )  # fmt: skip
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from datetime import date, timedelta
 
 import numpy as np
@@ -32,6 +33,30 @@ CONDITIONS: Mapping[str, tuple[str, str]] = {
 }
 
 
+@dataclass(frozen=True)
+class Results:
+    """Error and U where U is known, and how many places there are where it is not, by part of U and reason."""
+
+    points: tuple[ResultPoint, ...] = ()
+    unknown: Mapping[tuple[str, str], int] = field(default_factory=dict)
+    axes_without: frozenset[str] = frozenset()
+
+    def missing(self) -> Iterator[tuple[str, str]]:
+        """Yield the parts of U that are not known, where an axis has no result without them."""
+        if self.axes_without:
+            for part, why in self.unknown:
+                yield f"uncertainty of the {part}", why
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """The sentences that name the places without a result."""
+        return tuple(
+            f"At {places} further rates and temperatures of the calibrated range no result is stated: the uncertainty "
+            f"of the {part} is not known there ({why})."
+            for (part, why), places in self.unknown.items()
+        )
+
+
 def performed(store: Store, row: RecordingRow) -> tuple[date, date | None]:
     """Return the first and the last day of a campaign, or of an imported recording as far as it tells. UTC."""
     if row.campaign is not None:
@@ -53,29 +78,29 @@ def environment(points: Recording) -> tuple[Condition, ...]:
     return tuple(found)
 
 
-def results(
-    store: Store, row: CalibrationRecord, calibration: Calibration
-) -> tuple[tuple[ResultPoint, ...], dict[str, str]]:
-    """Return error and U over the calibrated range, and why U is not known where it is not.
+def results(store: Store, row: CalibrationRecord, calibration: Calibration) -> Results:
+    """Return error and U over the calibrated range, at those places where U is known.
 
     Raises BadInput, NotEnoughData, NotConverged.
     """
     grid = uncertainty_grid(calibration)
     errors = errors_on_grid(store, row, grid.rate_dps, grid.temperature_c)
-    has_temperature = np.isfinite(calibration.temperature_c).all()
-    found, unknown = [], {}
-    for axis in calibration.axes:
-        for i, temperature in enumerate(grid.temperature_c):
-            for j, rate in enumerate(grid.rate_dps):
-                u = grid.axes[axis][i][j]
-                unknown |= u.unknown
+    has_temperature = bool(np.isfinite(calibration.temperature_c).all())
+    found, unknown = [], dict[tuple[str, str], int]()
+    for axis, rows in grid.axes.items():
+        for temperature, cells, values in zip(grid.temperature_c, rows, errors[axis], strict=True):
+            for rate, u, error in zip(grid.rate_dps, cells, values, strict=True):
+                if u.expanded_dps is None:
+                    for part in u.unknown.items():
+                        unknown[part] = unknown.get(part, 0) + 1
+                    continue
+                warm = temperature if has_temperature else None
                 found.append(
                     ResultPoint(
-                        axis=axis, temperature_c=temperature if has_temperature else None, rate_dps=rate,
-                        error_dps=errors[axis][i][j], expanded_dps=u.expanded_dps or 0.0,
+                        axis=axis, temperature_c=warm, rate_dps=rate, error_dps=error, expanded_dps=u.expanded_dps
                     )
                 )  # fmt: skip
-    return tuple(found), unknown
+    return Results(tuple(found), unknown, frozenset(calibration.axes) - {point.axis for point in found})
 
 
 def coefficients(calibration: Calibration) -> tuple[CoefficientResult, ...]:
