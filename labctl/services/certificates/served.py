@@ -21,7 +21,7 @@ class CertificateFile:
     content: bytes
     media_type: str
     name: str
-    hash: str  #: of the certificate's JSON
+    etag: str  #: hash of the certificate's JSON, and the format
 
 
 def format_of(name: str) -> CertificateFormat:
@@ -48,7 +48,7 @@ def certificate_file(
     forms = store.certificates.forms(found.number)
     content = {"pdf": forms.pdf, "xml": forms.xml, "json": forms.document}[chosen]
     plain = "".join(char if char.isalnum() or char in "._-" else "_" for char in found.number)
-    return CertificateFile(content, MEDIA_TYPES[chosen], f"{plain}.{chosen}", found.hash)
+    return CertificateFile(content, MEDIA_TYPES[chosen], f"{plain}.{chosen}", f"{found.hash}-{chosen}")
 
 
 def list_certificates(store: Store, serial: str) -> list[CertificateResponse]:
