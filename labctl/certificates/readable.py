@@ -40,12 +40,15 @@ def _pages(given: Certificate) -> dict[str, object]:
         "method": _method(given),
         "plan_hash": given.method.plan_hash or "",
         "environment": [
-            [each.name, _signed(f"{each.low:.2f}"), _signed(f"{each.high:.2f}"), each.unit] for each in given.environment
+            [each.name, _signed(f"{each.low:.2f}"), _signed(f"{each.high:.2f}"), each.unit]
+            for each in given.environment
         ],
         "standards": [
             [
                 _standard_name(each),
-                f"{each.u:.2g} {readable(each.unit)}",
+                f"{each.u:.2g} {readable(each.unit)}".replace(" °", "°")
+                if each.unit == "deg"
+                else f"{each.u:.2g} {readable(each.unit)}",
                 each.certificate or "–",
                 each.issued_by or "–",
                 each.calibrated.isoformat() if each.calibrated else "–",
@@ -56,7 +59,10 @@ def _pages(given: Certificate) -> dict[str, object]:
         ],
         "uncertainty": _uncertainty(given),
         "results": _results(given.results),
-        "states": [_state("As found, before adjustment", given.as_found), _state("As left, after adjustment", given.as_left)],
+        "states": [
+            _state("As found, before adjustment", given.as_found),
+            _state("As left, after adjustment", given.as_left),
+        ],
         "adjustment": given.adjustment,
         "coefficients": [_coefficient(each) for each in given.coefficients],
         "conformity": _conformity(given),

@@ -23,14 +23,14 @@ def conformity(ordered: OrderedConformity, left: StateOfItem, results: tuple[Res
     if acceptance <= 0:
         raise NoAcceptance(
             f"conformity to {ordered.specification}: the guard band, U = {expanded:.3g} deg/s, is as wide as the limit of "
-            f"{ordered.limit_dps:g} deg/s; measure with a smaller uncertainty, or agree on rule = \"simple\""
+            f'{ordered.limit_dps:g} deg/s; measure with a smaller uncertainty, or agree on rule = "simple"'
         )
     passed = largest <= acceptance
     rule = "guard band w = U" if ordered.rule == "guard-band" else "simple acceptance, no guard band (w = 0)"
     statement = (
         f"{'PASS' if passed else 'FAIL'}: the largest error of the corrected rate, {largest:.3g} °/s, "
         f"{'does not exceed' if passed else 'exceeds'} the acceptance limit of {acceptance:.3g} °/s = "
-        f"{ordered.limit_dps:g} °/s - {band:.3g} °/s. Decision rule: {rule} (ILAC-G8:09/2019); risk of a false "
+        f"{ordered.limit_dps:g} °/s − {band:.3g} °/s. Decision rule: {rule} (ILAC-G8:09/2019); risk of a false "
         f"acceptance {RISKS[ordered.rule]}."
     )
     return Conformity(

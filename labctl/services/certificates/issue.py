@@ -33,7 +33,7 @@ from labctl.services.certificates.facts import Facts, facts_of
 from labctl.services.certificates.missing import MissingFacts
 from labctl.services.certificates.statements import statements
 from labctl.services.criticism.measurements import Measurements
-from labctl.services.schemas.certificates import CertificateRequest, CertificateResponse
+from labctl.services.schemas.certificates import CertificateOrder, CertificateRequest, CertificateResponse
 from labctl.store import CertificateForms, CertificateRow, Store
 
 #: Coverage probability that belongs to k = 2 of a normal distribution (GUM, annex G).
@@ -81,7 +81,8 @@ def issue(store: Store, serial: str, version: int, request: CertificateRequest, 
         return response(_unchanged(kept, request))
     if kept is None and request.amend is not None:
         raise CertificateRefused(f"{serial} version {version} has no certificate to amend; issue one without --amend")
-    facts = facts_of(store, serial, version, request.order)
+    order = CertificateOrder.model_validate(kept.order) if kept and not _given(request) else request.order
+    facts = facts_of(store, serial, version, order)
     found = Found.of(store, facts)
     refuse(facts, found)
     certificate = _certificate(store, facts, found, request, at, kept)
@@ -90,14 +91,19 @@ def issue(store: Store, serial: str, version: int, request: CertificateRequest, 
     forms = CertificateForms(document, xml, pdf_of(certificate, xml))
     row = CertificateRow(
         certificate.number, serial, version, kept.number if kept else None, request.amend or "", request.by, at,
-        hash_of_certificate(document), request.order.model_dump(mode="json", exclude_defaults=True),
+        hash_of_certificate(document), order.model_dump(mode="json", exclude_defaults=True),
     )  # fmt: skip
     return response(store.certificates.add(row, forms))
 
 
+def _given(request: CertificateRequest) -> dict[str, object]:
+    """Return the facts that a request states."""
+    return request.order.model_dump(mode="json", exclude_defaults=True)
+
+
 def _unchanged(kept: CertificateRow, request: CertificateRequest) -> CertificateRow:
     """Return what was issued; raises Conflict where the request states other facts of the order."""
-    given = request.order.model_dump(mode="json", exclude_defaults=True)
+    given = _given(request)
     if given and given != kept.order:
         other = ", ".join(sorted(name for name in {*given, *kept.order} if given.get(name) != kept.order.get(name)))
         raise CertificateRefused(
@@ -123,8 +129,14 @@ def refuse(facts: Facts, found: Found) -> None:
             f"[item] of the order: received = {received} is after the calibration of {facts.what} began, {first}; "
             "correct the date"
         )
-    if first is not None and last is not None and (bad := [each for each in facts.standards if _off(each, first, last)]):
-        said = "; ".join(f"{each.label}: calibrated {each.calibrated or 'on no stated day'}, due {each.due}" for each in bad)
+    if (
+        first is not None
+        and last is not None
+        and (bad := [each for each in facts.standards if _off(each, first, last)])
+    ):
+        said = "; ".join(
+            f"{each.label}: calibrated {each.calibrated or 'on no stated day'}, due {each.due}" for each in bad
+        )
         raise CertificateRefused(
             f"no certificate of {facts.what}: measured from {first} to {last} with a reference standard outside its "
             f"dates. {said}. Have it calibrated and measure again"

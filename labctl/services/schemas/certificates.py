@@ -93,5 +93,3 @@ class CertificateResponse(ResponseModel):
     replaces: str | None = Field(description="Number of the certificate that it replaces; null: none.")
     reason: str = Field(description="Why it replaces another one; empty: it does not.")
     replaced_by: str | None = Field(default=None, description="Number of the one that replaces it; null: it is valid.")
-
-
