@@ -163,7 +163,8 @@ def _method(made: ET.Element, given: Certificate) -> None:
     texts(
         made,
         "description",
-        f"Error model {method.model}: {', '.join(method.effects)}. Recordings: {', '.join(map(str, method.recordings))}.",
+        f"Error model {method.model}: {', '.join(method.effects)}.",
+        f"Recordings: {', '.join(map(str, method.recordings))}.",
         f"Additions to, deviations or exclusions from the method: {method.deviations}",
     )
     optional(made, "reference", method.procedure)

@@ -33,8 +33,8 @@ def pdf_of(given: Certificate, xml: bytes) -> bytes:
         made = typst.compile(files, ignore_system_fonts=True, pdf_standards=[STANDARD], timestamp=issued)
     except typst.TypstError as error:
         raise BadInput(
-            f"certificate {given.number} cannot be printed: {error.message}; use Latin, Greek or Cyrillic letters in the "
-            "names and texts of the order"
+            f"certificate {given.number} cannot be printed: {error.message}; use Latin, Greek or Cyrillic letters "
+            "in the names and texts of the order"
         ) from error
     if not isinstance(made, bytes):
         raise TypeError(f"typst answered {type(made).__name__} instead of the bytes of one PDF")

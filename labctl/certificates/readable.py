@@ -13,9 +13,12 @@ from labctl.certificates.units import readable
 #: Digits of an uncertainty (GUM 7.2.6), and of a number without one.
 U_DIGITS, DIGITS = 2, 4
 PLACES = {
-    "laboratory": "at the laboratory", "customer": "at the customer", "laboratoryBranch": "at a branch of the laboratory",
-    "customerBranch": "at a branch of the customer", "other": "at another place",
-}  # fmt: skip
+    "laboratory": "at the laboratory",
+    "customer": "at the customer",
+    "laboratoryBranch": "at a branch of the laboratory",
+    "customerBranch": "at a branch of the customer",
+    "other": "at another place",
+}
 MINUS = "−"
 
 
@@ -46,9 +49,7 @@ def _pages(given: Certificate) -> dict[str, object]:
         "standards": [
             [
                 _standard_name(each),
-                f"{each.u:.2g} {readable(each.unit)}".replace(" °", "°")
-                if each.unit == "deg"
-                else f"{each.u:.2g} {readable(each.unit)}",
+                _with_unit(each.u, each.unit),
                 each.certificate or "–",
                 each.issued_by or "–",
                 each.calibrated.isoformat() if each.calibrated else "–",
@@ -72,6 +73,10 @@ def _pages(given: Certificate) -> dict[str, object]:
         "hash": given.calibration.hash,
         "address": given.calibration.address,
     }
+
+
+def _with_unit(value: float, unit: str) -> str:
+    return f"{value:.2g}{'' if unit == 'deg' else ' '}{readable(unit)}"
 
 
 def _standard_name(given: StandardUsed) -> str:
@@ -150,8 +155,8 @@ def _method(given: Certificate) -> list[list[str]]:
 def _uncertainty(given: Certificate) -> str:
     found = given.uncertainty
     return (
-        f"The expanded uncertainty U is the standard uncertainty times k = {found.coverage_factor:g}, which for a normal "
-        f"distribution is a coverage of about {found.coverage_probability * 100:.0f} %, by the GUM (JCGM 100:2008). It "
+        f"The expanded uncertainty U is the standard uncertainty times k = {found.coverage_factor:g}, which for a "
+        f"normal distribution is a coverage of about {found.coverage_probability * 100:.0f} %, by the GUM (JCGM 100:2008). It "
         f"is that of a corrected rate and contains: {', '.join(found.components)}."
     )
 

@@ -15,14 +15,14 @@ class NoAcceptance(BadInput):
 
 
 def conformity(ordered: OrderedConformity, left: StateOfItem, results: tuple[ResultPoint, ...]) -> Conformity:
-    """Return the statement on the largest error of a corrected rate over all data sets and axes. Raises NoAcceptance."""
+    """Return the statement on the largest error of a corrected rate over all data sets. Raises NoAcceptance."""
     largest = max(axis.max_dps for axis in left.axes)
     expanded = max(point.expanded_dps for point in results)
     band = expanded if ordered.rule == "guard-band" else 0.0
     acceptance = ordered.limit_dps - band
     if acceptance <= 0:
         raise NoAcceptance(
-            f"conformity to {ordered.specification}: the guard band, U = {expanded:.3g} deg/s, is as wide as the limit of "
+            f"conformity to {ordered.specification}: the guard band, U = {expanded:.3g} deg/s, reaches the limit, "
             f'{ordered.limit_dps:g} deg/s; measure with a smaller uncertainty, or agree on rule = "simple"'
         )
     passed = largest <= acceptance

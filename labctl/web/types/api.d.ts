@@ -26,6 +26,7 @@ export type BenchStatus = Schema<"BenchStatus">;
 export type CalibrationRow = Schema<"CalibrationRow">;
 export type Campaign = Schema<"CampaignResponse">;
 export type CampaignPlan = Schema<"CampaignPlanResponse">;
+export type Certificate = Schema<"CertificateResponse">;
 export type Certification = Schema<"CertificationResponse">;
 export type Comparison = Schema<"ComparisonResponse">;
 export type ComparisonColumns = Schema<"ComparisonColumns">;
