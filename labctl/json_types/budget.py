@@ -108,3 +108,21 @@ class UncertaintyJson(TypedDict):
     not_stated: list[str]
     overdue: bool
     axes: dict[str, AxisBoundJson]
+
+
+class ContributionLinesJson(TypedDict):
+    """Contributions along one variable, deg/s; null: not stated or unknown."""
+
+    at: list[float]
+    contributions: dict[str, list[float | None]]
+    combined: list[float | None]
+    expanded: list[float | None]
+
+
+class ContributionsOverJson(TypedDict):
+    """Contributions to the uncertainty of one axis, over rate and over temperature."""
+
+    temperature_c: float
+    rate_dps: float
+    over_rate: ContributionLinesJson
+    over_temperature: ContributionLinesJson

@@ -17,6 +17,7 @@ from labctl.fitting.uncertainty import (
 from labctl.fitting.uncertainty.combination import LEVEL
 from labctl.fitting.uncertainty.document import Covered
 from labctl.services.calibrations.contributions import contributions_over
+from labctl.services.criticism.versions import version_of
 from labctl.services.schemas.budget import BudgetResponse
 from labctl.services.schemas.uncertainty import AxisUncertainty, UncertaintyGrid, UncertaintyResponse
 from labctl.store import Store
@@ -28,6 +29,24 @@ def uncertainty_at(
     """Return the uncertainty about each axis, with `grid` also over the validity. Raises NotFound, BadInput."""
     document, _ = store.calibrations.document(serial, version)
     return uncertainty_answer(read_calibration(document), rate_dps, temperature_c, grid=grid)
+
+
+def uncertainty_of_unit(
+    store: Store, serial: str, version: int | None, rate_dps: float | None, temperature_c: float | None, *, grid: bool
+) -> UncertaintyResponse:
+    """Return the uncertainty of a version, or of the newest, at half of the fastest rate and the middle temperature.
+
+    Raises NotFound, BadInput, NotEnoughData.
+    """
+    calibration = read_calibration(version_of(store, serial, version).document)
+    covered = Covered(calibration.rate_dps, calibration.temperature_c)
+    rates, warm = covered.rates(_evidence(calibration)), covered.temperatures()
+    return uncertainty_answer(
+        calibration,
+        max(rates) / 2 if rate_dps is None else rate_dps,
+        warm[len(warm) // 2] if temperature_c is None else temperature_c,
+        grid=grid,
+    )
 
 
 @single_threaded
