@@ -9,9 +9,11 @@ data sets in memory (the wires and the readings are left out), so that hundreds 
 from __future__ import annotations
 
 import os
+from collections import defaultdict
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +45,8 @@ STANDARDS = (
     Standard(quantity="fixture_angle", expanded=0.05),
     Standard(quantity="tilt", half_width=0.02, distribution="rectangular"),
 )
+#: Begins the keys of what was compared with the budget of a bench that states no standard.
+UNSTATED = "not stated: "
 Array = NDArray[np.float64]
 
 
@@ -137,39 +141,34 @@ def campaign(unit: Unit, bench: Bench, rng: np.random.Generator) -> Recording:
 
 
 def scores(seed: int) -> dict[str, list[float]]:
-    """Return what was compared -> errors over U, of one campaign."""
+    """Return what was compared -> errors over U, of one campaign; also over the U of a bench that states nothing."""
     rng = np.random.default_rng(seed)
     unit, bench = Unit.of(rng), Bench.of(rng)
     recording = with_temperature(campaign(unit, bench, rng))
     data, preset = fit_data_of(recording), preset_for(None, list(MODEL))
     result, evidence = fit_preset(data, preset), use_evidence(data, preset)
-    conditions = conditions_of(recording.info, result.environment)
+    stated = conditions_of(recording.info, result.environment)
     later = rng.normal(0, TURN_ON_DPS, 3) + rng.normal(0, DRIFT_DPS, 3)
-    found: dict[str, list[float]] = {}
-    for warm in AT_C:
-        for rate in AT_DPS:
-            claimed = rate_uncertainty(result.fitted, rate, warm, evidence=evidence, name="unit", bench=conditions)
-            key = f"corrected rate, {rate:+.0f} deg/s, {warm:+.0f} deg C"
+    found: defaultdict[str, list[float]] = defaultdict(list)
+    for prefix, conditions in (("", stated), (UNSTATED, replace(stated, standards=()))):
+        known = {"evidence": evidence, "name": "unit", "bench": conditions}
+        for warm, rate in product(AT_C, AT_DPS):
+            claimed = rate_uncertainty(result.fitted, rate, warm, **known)  # type: ignore[arg-type]
+            key = f"{prefix}corrected rate, {rate:+.0f} deg/s, {warm:+.0f} deg C"
             for number, axis in enumerate(AXES):
                 true = np.zeros(3)
                 true[number] = rate
                 corrected = _corrected(result.fitted, unit.output(true, warm) + later, warm)
-                expanded = claimed[axis].expanded_dps
-                assert expanded is not None
-                found.setdefault(key, []).append(float(corrected[number] - rate) / expanded)
-    budgets = coefficient_budgets(result.fitted, 20.0, evidence=evidence, name="unit", bench=conditions)
-    gain, offset = unit.gain(20.0), unit.offset(20.0) + later
-    for row, axis in enumerate(AXES):
-        for name, budget in budgets[axis].items():
-            true_value = (
-                offset[row] if name == "bias" else gain[row, row if name == "scale_factor" else AXES.index(name[-1])]
-            )
-            assert budget.expanded is not None
-            assert budget.value is not None
-            found.setdefault(name.partition("_x")[0].partition("_y")[0].partition("_z")[0], []).append(
-                float(budget.value - true_value) / budget.expanded
-            )
-    return found
+                found[key].append(float(corrected[number] - rate) / (claimed[axis].expanded_dps or np.nan))
+        budgets = coefficient_budgets(result.fitted, 20.0, **known)  # type: ignore[arg-type]
+        gain, offset = unit.gain(20.0), unit.offset(20.0) + later
+        for row, axis in enumerate(AXES):
+            for name, budget in budgets[axis].items():
+                kind = "misalignment" if name.startswith("misalignment") else name
+                column = AXES.index(name[-1]) if kind == "misalignment" else row
+                true_value = float(offset[row] if kind == "bias" else gain[row, column])
+                found[prefix + kind].append(((budget.value or 0.0) - true_value) / (budget.expanded or np.nan))
+    return dict(found)
 
 
 def _corrected(fitted: FittedModel, output: Array, warm: float) -> Array:
@@ -196,17 +195,19 @@ def run(campaigns: int = CAMPAIGNS) -> str:
     else:
         each = [scores(seed) for seed in seeds]
     found = {key: np.array([one[key] for one in each]) for key in each[0]}
-    rates = [key for key in found if key.startswith("corrected")]
-    pooled = np.concatenate([found[key] for key in rates], axis=1)
-    lines = [f"| {campaigns} campaigns | inside U, % | 95 % interval |", "| --- | --- | --- |"]
-    lines += [f"| {key} | {share(found[key])} |" for key in ("scale_factor", "bias", "misalignment")]
-    lines += [f"| corrected rate, all 25 points | {share(pooled)} |"]
+    places = {(warm, rate): f"corrected rate, {rate:+.0f} deg/s, {warm:+.0f} deg C" for warm in AT_C for rate in AT_DPS}
+    for prefix in ("", UNSTATED):
+        found[prefix + "corrected rate"] = np.concatenate([found[prefix + key] for key in places.values()], axis=1)
+    lines = [
+        f"| {campaigns} campaigns | inside U, % | 95 % interval | no standards stated: inside U, % |",
+        "| --- | --- | --- | --- |",
+    ]
+    for kind in ("scale_factor", "bias", "misalignment", "corrected rate"):
+        without = share(found[UNSTATED + kind]).partition(" | ")[0]
+        lines.append(f"| {kind} | {share(found[kind])} | {without} |")
     head = " | ".join(["corrected rate, inside U, %", *(f"{rate:+.0f} deg/s" for rate in AT_DPS)])
     lines += ["", f"| {head} |", "| --- " * (len(AT_DPS) + 1) + "|"]
     for warm in AT_C:
-        cells = [
-            f"{100 * np.mean(np.abs(found[f'corrected rate, {rate:+.0f} deg/s, {warm:+.0f} deg C']) <= 1):.1f}"
-            for rate in AT_DPS
-        ]
+        cells = [f"{100 * np.mean(np.abs(found[places[warm, rate]]) <= 1):.1f}" for rate in AT_DPS]
         lines.append(f"| {warm:+.0f} deg C | " + " | ".join(cells) + " |")
     return "\n".join(lines)
