@@ -145,6 +145,8 @@ def build_calibration(
     exported, left_out = result.exported()
     bench = conditions_of(info, result.environment, used_on)
     covered = Covered(_limits(result.rate_dps), _limits(result.temperature_c))
+    use = {axis: one.to_json() for axis, one in (evidence or {}).items()}
+    kept = {axis: AxisEvidence.from_json(one) for axis, one in use.items()}  # by what a reader of the document has
     document: CalibrationJson = {
         "schema": SCHEMA,
         "serial": info.serial,
@@ -163,9 +165,9 @@ def build_calibration(
         "noise": dict(result.noise),
         "environment": result.environment,
         "validity": {"temperature_c": list(result.temperature_c), "rate_dps": list(result.rate_dps)},
-        "use": {axis: one.to_json() for axis, one in (evidence or {}).items()},
+        "use": use,
         "standards": bench.to_json(),
-        "uncertainty": uncertainty_json(exported, covered, evidence or {}, bench),
+        "uncertainty": uncertainty_json(exported, covered, kept, bench),
         "provenance": dict(provenance),
         "how_to_use": (
             "rate = (output - offset) / scale per axis; then the model's error is taken off: argument 'output' "
