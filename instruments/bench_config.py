@@ -130,6 +130,8 @@ class SimulationSettings(Strict):
     chamber: dict[str, object] = Field(default_factory=dict)
     hand: dict[str, object] = Field(default_factory=dict)  #: of the person who turns the units of a bench by hand
     hidden: dict[str, float | str] = Field(default_factory=dict)  #: effect id -> size, hidden in every unit
+    #: Whether the bench is off by errors drawn from the distributions of its [[standards]]; else it is exact.
+    draw_standards: bool = False
     control: str | None = None  #: HOST:PORT of a simulator in another process, for its unit handler
     speed: float = Field(
         default=1.0, gt=0

@@ -28,6 +28,7 @@ from labctl.cli.commands import (
     schedule,
     server,
     trend,
+    uncertainty,
 )
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.interrupts import process_of_one_command
@@ -72,6 +73,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "calibration": calibrations.calibration,
     "certificate": certificate.certificate,
     "certificates": certificate.certificates,
+    "uncertainty": uncertainty.uncertainty,
     "compensate": calibrations.compensate,
     "backup": database.backup,
     "check": database.check,
