@@ -125,7 +125,7 @@ def _statements(parent: ET.Element, given: Certificate) -> None:
     quantity(data, "Limit of the error", [found.limit_dps], "deg/s")
     quantity(data, "Guard band", [found.guard_band_dps], "deg/s")
     quantity(data, "Largest error of the corrected rate", [found.largest_error_dps], "deg/s",
-             expanded=[found.expanded_dps], k=given.uncertainty.coverage_factor)  # fmt: skip
+             expanded=[found.expanded_dps], k=[max(each.k for each in given.results)])  # fmt: skip
 
 
 def _statement(
@@ -189,7 +189,7 @@ def _standard(parent: ET.Element, given: StandardUsed) -> None:
 
 
 def _results(parent: ET.Element, given: Certificate) -> None:
-    k, probability = given.uncertainty.coverage_factor, given.uncertainty.coverage_probability
+    probability = given.uncertainty.coverage_probability
     for axis, of_axis in groupby(given.results, key=lambda point: point.axis):
         points = list(of_axis)
         made = _result(parent, f"Error of indication of axis {axis}", "Output by its nominal scale minus true rate.")
@@ -200,15 +200,25 @@ def _results(parent: ET.Element, given: Certificate) -> None:
             quantity(table, "Temperature of the item", warm, "deg C")
         quantity(
             table, "Error of indication", [each.error_dps for each in points], "deg/s",
-            expanded=[each.expanded_dps for each in points], k=k, probability=probability,
+            expanded=[each.expanded_dps for each in points], k=[each.k for each in points], probability=probability,
         )  # fmt: skip
     _state(parent, "Errors as found, before adjustment", given.as_found)
     _state(parent, "Errors as left, after adjustment", given.as_left)
-    made = _result(parent, "Coefficients of the correction", "Of the error model that the method names.")
+    made = _result(parent, "Coefficients of the correction", "Of the error model that the method names; standard uncertainties are those of the fit alone.")
     for each in given.coefficients:
         where = "" if each.temperature_c is None else f" at {each.temperature_c:g} °C"
         name = f"Axis {each.axis}: {each.name}{where}"
-        quantity(made, name, [each.value], each.unit, expanded=[each.expanded], k=k, probability=probability)
+        quantity(made, name, [each.value], each.unit, u=each.u)
+    _budget(parent, given)
+
+
+def _budget(parent: ET.Element, given: Certificate) -> None:
+    found = given.uncertainty
+    warm = "" if found.temperature_c is None else f" and {found.temperature_c:g} °C"
+    where = f"Of axis {found.axis} at {found.rate_dps:g} °/s{warm}, where U is largest."
+    made = _result(parent, "Contributions to the standard uncertainty", where)
+    for each in found.budget:
+        quantity(made, f"{each.source}, type {each.type}", [each.contribution_dps], "deg/s")
 
 
 def _result(parent: ET.Element, name: str, description: str) -> ET.Element:

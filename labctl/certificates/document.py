@@ -82,12 +82,23 @@ class Condition(Part):
     high: float
 
 
-class Uncertainty(Part):
-    """How the expanded uncertainties of the certificate are to be read."""
+class Contribution(Part):
+    """A line of the budget: what a source adds to the standard uncertainty of a corrected rate."""
 
-    coverage_factor: float
+    source: str
+    type: Literal["A", "B"]
+    contribution_dps: float
+    freedom: float | None  #: degrees of freedom; None: infinite
+
+
+class Uncertainty(Part):
+    """How the expanded uncertainties are to be read, and the budget of the largest of them."""
+
     coverage_probability: float
-    components: tuple[str, ...]
+    axis: str
+    rate_dps: float
+    temperature_c: float | None
+    budget: tuple[Contribution, ...]
 
 
 class ResultPoint(Part):
@@ -98,6 +109,7 @@ class ResultPoint(Part):
     rate_dps: float
     error_dps: float
     expanded_dps: float
+    k: float  #: coverage factor
 
 
 class CoefficientResult(Part):
@@ -107,7 +119,7 @@ class CoefficientResult(Part):
     name: str
     temperature_c: float | None  #: of a node of a temperature table
     value: float
-    expanded: float | None  #: None: not known
+    u: float | None  #: standard uncertainty of the fit alone; None: not known
     unit: str
 
 

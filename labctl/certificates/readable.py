@@ -59,6 +59,10 @@ def _pages(given: Certificate) -> dict[str, object]:
             for each in given.standards
         ],
         "uncertainty": _uncertainty(given),
+        "budget": [
+            [each.source.replace("_", " "), each.type, f"{each.contribution_dps:.2g}", _freedom(each.freedom)]
+            for each in given.uncertainty.budget
+        ],
         "results": _results(given.results),
         "states": [
             _state("As found, before adjustment", given.as_found),
@@ -154,11 +158,17 @@ def _method(given: Certificate) -> list[list[str]]:
 
 def _uncertainty(given: Certificate) -> str:
     found = given.uncertainty
+    warm = "" if found.temperature_c is None else f" and {_number(found.temperature_c)} °C"
     return (
-        f"The expanded uncertainty U is the standard uncertainty times k = {found.coverage_factor:g}, which for a "
-        f"normal distribution is a coverage of about {found.coverage_probability * 100:.0f} %, by the GUM (JCGM 100:2008). It "
-        f"is that of a corrected rate and contains: {', '.join(found.components)}."
+        "The expanded uncertainty U is that of a corrected rate: the standard uncertainty times the coverage factor k "
+        f"that is stated with each result, for a coverage of about {found.coverage_probability * 100:.0f} % "
+        "(JCGM 100:2008). The standard uncertainty is made of the contributions below, here at the place where U is "
+        f"largest: axis {found.axis}, {_number(found.rate_dps)} °/s{warm}."
     )
+
+
+def _freedom(freedom: float | None) -> str:
+    return "∞" if freedom is None else f"{freedom:.0f}"
 
 
 def _results(points: Sequence[ResultPoint]) -> list[Mapping[str, object]]:
@@ -171,6 +181,7 @@ def _results(points: Sequence[ResultPoint]) -> list[Mapping[str, object]]:
                     "–" if point.temperature_c is None else _number(point.temperature_c),
                     _number(point.rate_dps),
                     *rounded(point.error_dps, point.expanded_dps),
+                    f"{point.k:.2f}",
                 ]
                 for point in points
                 if point.axis == axis
@@ -181,7 +192,7 @@ def _results(points: Sequence[ResultPoint]) -> list[Mapping[str, object]]:
 
 
 def _coefficient(given: CoefficientResult) -> list[str]:
-    value, u = rounded(given.value, given.expanded or 0.0)
+    value, u = rounded(given.value, given.u or 0.0)
     warm = "" if given.temperature_c is None else _number(given.temperature_c)
     return [given.axis, given.name.replace("_", " "), warm, value, u, readable(given.unit)]
 

@@ -56,23 +56,22 @@ def quantity(
     values: Sequence[float],
     unit: str,
     *,
-    expanded: Sequence[float | None] = (),
-    k: float = 2.0,
-    probability: float = 0.95,
+    expanded: Sequence[float] = (),
+    k: Sequence[float] = (),
+    probability: float = 0.9545,
+    u: float | None = None,
     element: str = "quantity",
     ref_type: str = "",
 ) -> ET.Element:
-    """Add a quantity: one number, or a list of them, with expanded uncertainties where all are known.
+    """Add a quantity: one number, or a list of them, with their expanded uncertainties or one standard uncertainty.
 
     Where D-SI has no word for the unit the numbers are a text.
     """
     made = child(parent, element, **({"refType": ref_type} if ref_type else {}))
     texts(made, "name", name)
     symbol = dsi(unit)
-    known = [each for each in expanded if each is not None]
     if symbol is None:
-        u = [f", U = {each:.{DIGITS}g}" for each in known] or [""] * len(values)
-        said = "; ".join(f"{value:.{DIGITS}g}{one}" for value, one in zip(values, u, strict=False))
+        said = "; ".join(f"{value:.{DIGITS}g}" for value in values) + ("" if u is None else f", u = {u:.{DIGITS}g}")
         texts(made, "noQuantity", f"{said} {readable(unit)}")
         return made
     several = len(values) > 1
@@ -80,12 +79,14 @@ def quantity(
     real = ET.SubElement(made, f"{{{SI}}}{'realListXMLList' if several else 'real'}")
     _si(real, f"value{tail}", _listed(values))
     _si(real, f"unit{tail}", symbol)
-    if known and len(known) == len(values):
+    if u is not None:
+        standard = _si(_si(real, "measurementUncertaintyUnivariate"), "standardMU")
+        _si(standard, "valueStandardMU", _listed([u]))
+    elif expanded:
         uncertainty = _si(_si(real, f"measurementUncertaintyUnivariate{tail}"), f"expandedMU{tail}")
-        _si(uncertainty, f"valueExpandedMU{tail}", _listed(known))
-        _si(uncertainty, f"coverageFactor{tail}", _listed([k]))
+        _si(uncertainty, f"valueExpandedMU{tail}", _listed(expanded))
+        _si(uncertainty, f"coverageFactor{tail}", _listed(k))
         _si(uncertainty, f"coverageProbability{tail}", _listed([probability]))
-        _si(uncertainty, f"distribution{tail}", "normal")
     return made
 
 

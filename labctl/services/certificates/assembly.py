@@ -16,10 +16,8 @@ from labctl.certificates.document import (
     Replaced,
     StandardUsed,
     StateOfItem,
-    Uncertainty,
 )
 from labctl.errors import BadInput, NotEnoughData
-from labctl.fitting.uncertainty.rate import COVERAGE
 from labctl.services.certificates import measured
 from labctl.services.certificates.address import address_of
 from labctl.services.certificates.conformity import conformity
@@ -31,8 +29,6 @@ from labctl.services.criticism.measurements import Measurements
 from labctl.services.schemas.certificates import CertificateRequest
 from labctl.store import CertificateRow, Store
 
-#: Coverage probability that belongs to k = 2 of a normal distribution (GUM, annex G).
-PROBABILITY = 0.95
 NONE = "None."
 
 
@@ -41,9 +37,10 @@ def assembled(
 ) -> Certificate:
     """Return the certificate with the next number of the laboratory. Raises MissingFacts, BadInput, NotEnoughData."""
     first, last, act = facts.performed_from, facts.performed_until, facts.authorised
-    if first is None or last is None or act is None or found.measurements is None:
+    measurements, uncertainty = found.measurements, found.results.uncertainty
+    if first is None or last is None or act is None or measurements is None or uncertainty is None:
         raise MissingFacts(facts.what, [])  # refused before
-    before, left, adjustment = _states(store, facts, found.measurements)
+    before, left, adjustment = _states(store, facts, measurements)
     order, number = facts.order, _number(store, facts, at)
     return Certificate(
         number=number,
@@ -58,10 +55,7 @@ def assembled(
         performed_until=last,
         environment=found.conditions,
         standards=tuple(_standard(each) for each in facts.standards),
-        uncertainty=Uncertainty(
-            coverage_factor=COVERAGE, coverage_probability=PROBABILITY,
-            components=("coefficients of the model", "error of the model", "repeatability from power-on to power-on"),
-        ),
+        uncertainty=uncertainty,
         results=found.results.points,
         coefficients=measured.coefficients(facts.calibration),
         as_found=before,

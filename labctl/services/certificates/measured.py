@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.calibration import Calibration
-from labctl.certificates.document import AxisError, CoefficientResult, Condition, ResultPoint, StateOfItem
+from labctl.certificates.document import AxisError, CoefficientResult, Condition, Contribution, ResultPoint, StateOfItem, Uncertainty
 from labctl.fitting.data.fit_data import fit_data_of
-from labctl.fitting.uncertainty.rate import COVERAGE
+from labctl.fitting.uncertainty.budget import Budget
+from labctl.fitting.uncertainty.combination import LEVEL
 from labctl.json_types.models import Coefficients
 from labctl.recording import Recording, RecordingInfo
 from labctl.services.calibrations.surface import errors_on_grid
-from labctl.services.calibrations.uncertainty import uncertainty_grid
+from labctl.services.calibrations.uncertainty import places_of, uncertainty_of
 from labctl.services.criticism.measurements import Measurements
 from labctl.services.criticism.verification.of_version import applied_errors
 from labctl.store import CalibrationRecord, RecordingRow, Store
@@ -38,6 +39,7 @@ class Results:
     """Error and U where U is known, and how many places there are where it is not, by part of U and reason."""
 
     points: tuple[ResultPoint, ...] = ()
+    uncertainty: Uncertainty | None = None  #: where U is largest; None: there is no result
     unknown: Mapping[tuple[str, str], int] = field(default_factory=dict)
     axes_without: frozenset[str] = frozenset()
 
@@ -83,28 +85,48 @@ def results(store: Store, row: CalibrationRecord, calibration: Calibration) -> R
 
     Raises BadInput, NotEnoughData, NotConverged.
     """
-    grid = uncertainty_grid(calibration)
-    errors = errors_on_grid(store, row, grid.rate_dps, grid.temperature_c)
+    rates, temperatures = places_of(calibration)
+    errors = errors_on_grid(store, row, rates, temperatures)
     has_temperature = bool(np.isfinite(calibration.temperature_c).all())
-    found, unknown = [], dict[tuple[str, str], int]()
-    for axis, rows in grid.axes.items():
-        for temperature, cells, values in zip(grid.temperature_c, rows, errors[axis], strict=True):
-            for rate, u, error in zip(grid.rate_dps, cells, values, strict=True):
-                if u.expanded_dps is None:
+    found, unknown = list[tuple[ResultPoint, Budget]](), dict[tuple[str, str], int]()
+    for i, temperature in enumerate(temperatures):
+        for j, rate in enumerate(rates):
+            for axis, u in uncertainty_of(calibration, rate, temperature).items():
+                expanded, k = u.budget.expanded, u.budget.k
+                if expanded is None or k is None:
                     for part in u.unknown.items():
                         unknown[part] = unknown.get(part, 0) + 1
                     continue
-                warm = temperature if has_temperature else None
-                found.append(
-                    ResultPoint(
-                        axis=axis, temperature_c=warm, rate_dps=rate, error_dps=error, expanded_dps=u.expanded_dps
-                    )
+                point = ResultPoint(
+                    axis=axis, temperature_c=temperature if has_temperature else None, rate_dps=rate,
+                    error_dps=errors[axis][i][j], expanded_dps=expanded, k=k,
                 )  # fmt: skip
-    return Results(tuple(found), unknown, frozenset(calibration.axes) - {point.axis for point in found})
+                found.append((point, u.budget))
+    found.sort(key=lambda each: calibration.axes.index(each[0].axis))
+    points = tuple(point for point, _ in found)
+    largest = max(found, key=lambda each: each[0].expanded_dps, default=None)
+    without = frozenset(calibration.axes) - {point.axis for point in points}
+    return Results(points, None if largest is None else _largest(*largest), unknown, without)
+
+
+def _largest(point: ResultPoint, budget: Budget) -> Uncertainty:
+    """Return the budget of a place, without the lines that add nothing."""
+    lines = tuple(
+        Contribution(
+            source=line.source, type=line.kind, contribution_dps=abs(line.contribution) + abs(line.uncorrected),
+            freedom=line.freedom,
+        )
+        for line in budget.lines
+        if line.contribution
+    )  # fmt: skip
+    return Uncertainty(
+        coverage_probability=LEVEL, axis=point.axis, rate_dps=point.rate_dps, temperature_c=point.temperature_c,
+        budget=lines,
+    )  # fmt: skip
 
 
 def coefficients(calibration: Calibration) -> tuple[CoefficientResult, ...]:
-    """Return each coefficient with its expanded uncertainty; of a temperature table at each of its nodes."""
+    """Return each coefficient with its standard uncertainty by the fit; of a temperature table at each of its nodes."""
     tables: Mapping[str, Coefficients] = calibration.document["coefficients"]
     found: list[CoefficientResult] = []
     for axis, table in tables.items():
@@ -119,7 +141,7 @@ def coefficients(calibration: Calibration) -> tuple[CoefficientResult, ...]:
             found += [
                 CoefficientResult(
                     axis=axis, name=name, temperature_c=where, value=value, unit=entry["unit"],
-                    expanded=None if one is None else COVERAGE * one,
+                    u=one,
                 )
                 for where, value, one in zip(at, listed, u_listed, strict=True)
             ]  # fmt: skip

@@ -15,7 +15,7 @@ def state(*largest_dps: float) -> StateOfItem:
 
 
 def point(expanded_dps: float) -> ResultPoint:
-    return ResultPoint(axis="z", temperature_c=20.0, rate_dps=1.0, error_dps=0.0, expanded_dps=expanded_dps)
+    return ResultPoint(axis="z", temperature_c=20.0, rate_dps=1.0, error_dps=0.0, expanded_dps=expanded_dps, k=2.0)
 
 
 @pytest.mark.parametrize(
