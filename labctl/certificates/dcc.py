@@ -204,7 +204,11 @@ def _results(parent: ET.Element, given: Certificate) -> None:
         )  # fmt: skip
     _state(parent, "Errors as found, before adjustment", given.as_found)
     _state(parent, "Errors as left, after adjustment", given.as_left)
-    made = _result(parent, "Coefficients of the correction", "Of the error model that the method names; standard uncertainties are those of the fit alone.")
+    made = _result(
+        parent,
+        "Coefficients of the correction",
+        "Of the error model that the method names; standard uncertainties are those of the fit alone.",
+    )
     for each in given.coefficients:
         where = "" if each.temperature_c is None else f" at {each.temperature_c:g} °C"
         name = f"Axis {each.axis}: {each.name}{where}"

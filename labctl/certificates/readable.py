@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping, Sequence
+from decimal import Decimal
 
 from instruments.laboratory import Contact
 from labctl.certificates.document import Certificate, CoefficientResult, ResultPoint, StandardUsed, StateOfItem
@@ -60,7 +61,12 @@ def _pages(given: Certificate) -> dict[str, object]:
         ],
         "uncertainty": _uncertainty(given),
         "budget": [
-            [each.source.replace("_", " "), each.type, f"{each.contribution_dps:.2g}", _freedom(each.freedom)]
+            [
+                each.source.replace("_", " "),
+                each.type,
+                f"{Decimal(f'{each.contribution_dps:.2g}'):f}",
+                _freedom(each.freedom),
+            ]
             for each in given.uncertainty.budget
         ],
         "results": _results(given.results),

@@ -59,8 +59,8 @@ def write(calibration: Calibration, options: Mapping[str, str]) -> Written:
     differs = largest_difference(part, table)
     losses = (Loss("the uncertainty of the correction"), *part.memory_losses())
     head = head_lines(calibration, "the whole correction of output and temperature", differs, losses, [
-        "Rate of a component = its Output - the sum over By axis of Error, linear between Output of By axis and between",
-        "Temperature; outside the table hold both at its edge.",
+        "Rate of a component = its Output - the sum over By axis of Error, linear between Output of By axis and",
+        "between Temperature; outside the table hold both at its edge.",
     ])  # fmt: skip
     root = _register(calibration, options, table)
     root.insert(0, ET.Comment("\n" + "\n".join(head).replace("--", "- -") + "\n"))

@@ -10,7 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.calibration import Calibration
-from labctl.certificates.document import AxisError, CoefficientResult, Condition, Contribution, ResultPoint, StateOfItem, Uncertainty
+from labctl.certificates.document import (
+    AxisError,
+    CoefficientResult,
+    Condition,
+    Contribution,
+    ResultPoint,
+    StateOfItem,
+    Uncertainty,
+)
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.uncertainty.budget import Budget
 from labctl.fitting.uncertainty.combination import LEVEL
