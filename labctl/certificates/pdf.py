@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from datetime import UTC, datetime, time
 from importlib import resources
 from io import BytesIO
@@ -15,6 +16,8 @@ from labctl.errors import BadInput
 
 #: PDF/A-3, level A: tagged, and with fonts, colours and attachments as PDF/A-3b asks.
 STANDARD = "a-3a"
+#: It takes a project as a dictionary of files too, which its types leave out.
+_COMPILE: Callable[..., bytes | list[bytes] | None] = typst.compile
 #: Error correction of the QR code: a quarter of it may be damaged.
 CORRECTION = "q"
 
@@ -30,7 +33,7 @@ def pdf_of(given: Certificate, xml: bytes) -> bytes:
     }
     issued = datetime.combine(given.issued_on, time(), UTC)
     try:
-        made = typst.compile(files, ignore_system_fonts=True, pdf_standards=[STANDARD], timestamp=issued)
+        made = _COMPILE(files, ignore_system_fonts=True, pdf_standards=[STANDARD], timestamp=issued)
     except typst.TypstError as error:
         raise BadInput(
             f"certificate {given.number} cannot be printed: {error.message}; use Latin, Greek or Cyrillic letters "

@@ -150,7 +150,7 @@ def test_an_amended_certificate_has_its_own_number_and_names_what_it_replaces(st
 def test_there_is_nothing_to_amend_or_to_fetch_before_the_first(store: Store) -> None:
     with pytest.raises(CertificateRefused, match="no certificate to amend"):
         issue(store, SERIAL, 1, request().model_copy(update={"amend": "because"}), AT)
-    with pytest.raises(NotFound, match="--order ORDER.toml"):
+    with pytest.raises(NotFound, match=r"--order ORDER\.toml"):
         certificate_file(store, SERIAL, 1, "pdf")
     with pytest.raises(BadInput, match="give pdf, xml or json"):
         certificate_file(store, SERIAL, 1, ".docx")
@@ -158,7 +158,7 @@ def test_there_is_nothing_to_amend_or_to_fetch_before_the_first(store: Store) ->
 
 def test_a_revoked_version_gets_no_certificate(store: Store) -> None:
     store.calibrations.certify(SERIAL, 1, "revoke", by="Ada Authoriser", reason="was dropped", at=AT)
-    with pytest.raises(CertificateRefused, match="was revoked at .* by Ada Authoriser .was dropped"):
+    with pytest.raises(CertificateRefused, match=r"was revoked at .* by Ada Authoriser \(was dropped"):
         issue(store, SERIAL, 1, request(), AT)
 
 
