@@ -47,18 +47,7 @@ def _pages(given: Certificate) -> dict[str, object]:
             [each.name, _signed(f"{each.low:.2f}"), _signed(f"{each.high:.2f}"), each.unit]
             for each in given.environment
         ],
-        "standards": [
-            [
-                _standard_name(each),
-                _with_unit(each.u, each.unit),
-                each.certificate or "–",
-                each.issued_by or "–",
-                each.calibrated.isoformat() if each.calibrated else "–",
-                each.due.isoformat() if each.due else "–",
-                each.traceability or "–",
-            ]
-            for each in given.standards
-        ],
+        "standards": [_standard(each) for each in given.standards],
         "uncertainty": _uncertainty(given),
         "budget": [
             [
@@ -87,6 +76,12 @@ def _pages(given: Certificate) -> dict[str, object]:
 
 def _with_unit(value: float, unit: str) -> str:
     return f"{value:.2g}{'' if unit == 'deg' else ' '}{readable(unit)}"
+
+
+def _standard(given: StandardUsed) -> list[str]:
+    dates = [each.isoformat() if each else "–" for each in (given.calibrated, given.due)]
+    said = [each or "–" for each in (given.certificate, given.issued_by)]
+    return [_standard_name(given), _with_unit(given.u, given.unit), *said, *dates, given.traceability or "–"]
 
 
 def _standard_name(given: StandardUsed) -> str:

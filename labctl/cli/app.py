@@ -17,7 +17,6 @@ from labctl.cli.commands import (
     calibrations,
     campaign,
     campaign_control,
-    certificate,
     criticism,
     database,
     effects,
@@ -30,6 +29,7 @@ from labctl.cli.commands import (
     trend,
     uncertainty,
 )
+from labctl.cli.commands.documents import certificate
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.interrupts import process_of_one_command
 from labctl.config import os_user

@@ -34,7 +34,7 @@ from labctl.store.repositories.calibrations import Calibrations, NewCalibration
 from labctl.store.repositories.campaign_journal import StoreJournal
 from labctl.store.repositories.campaign_summaries import CampaignSummary
 from labctl.store.repositories.campaigns import Campaigns, NewCampaign
-from labctl.store.repositories.certificates import CertificateForms, CertificateRow, Certificates
+from labctl.store.repositories.documents.certificates import CertificateForms, CertificateRow, Certificates
 from labctl.store.repositories.keys import Keys
 from labctl.store.repositories.leases import LeaseRow, Leases
 from labctl.store.repositories.recording_writer import Imports, ImportTicket

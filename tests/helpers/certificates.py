@@ -12,7 +12,7 @@ from labctl.recording import Recording, to_points
 from labctl.services.calibrations.fitting import fit_unit
 from labctl.services.certificates.issue import issue
 from labctl.services.schemas.calibrations import FitRequest
-from labctl.services.schemas.certificates import CertificateOrder, CertificateRequest, CertificateResponse
+from labctl.services.schemas.documents.certificates import CertificateOrder, CertificateRequest, CertificateResponse
 from labctl.store import CertificateForms, Store, open_store
 from tests.helpers.simulated_recordings import single_axis
 

@@ -12,7 +12,7 @@ from labctl.api.dependencies import ServiceDep, command_route
 from labctl.services.certificates.served import certificate_file, list_certificates
 from labctl.services.commands.registry import ISSUE_CERTIFICATE
 from labctl.services.commands.requests import ToVersion
-from labctl.services.schemas.certificates import CertificateRequest, CertificateResponse
+from labctl.services.schemas.documents.certificates import CertificateRequest, CertificateResponse
 
 router = APIRouter(prefix="/api/units/{serial}", tags=["certificates"])
 

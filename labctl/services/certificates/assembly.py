@@ -26,7 +26,7 @@ from labctl.services.certificates.found import Found
 from labctl.services.certificates.missing import MissingFacts
 from labctl.services.certificates.statements import statements
 from labctl.services.criticism.measurements import Measurements
-from labctl.services.schemas.certificates import CertificateRequest
+from labctl.services.schemas.documents.certificates import CertificateRequest
 from labctl.store import CertificateRow, Store
 
 NONE = "None."

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from labctl.certificates.document import Conformity, ResultPoint, StateOfItem
 from labctl.errors import BadInput
-from labctl.services.schemas.certificates import OrderedConformity
+from labctl.services.schemas.documents.certificates import OrderedConformity
 
 #: Largest probability of a false acceptance at the limit (ILAC-G8, table 1), normal distribution.
 RISKS = {"simple": "up to 50 % at the limit", "guard-band": "up to 2.5 % at the limit"}

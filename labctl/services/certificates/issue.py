@@ -13,7 +13,7 @@ from labctl.services.certificates.assembly import assembled
 from labctl.services.certificates.facts import Facts, facts_of
 from labctl.services.certificates.found import Found
 from labctl.services.certificates.missing import MissingFacts
-from labctl.services.schemas.certificates import CertificateOrder, CertificateRequest, CertificateResponse
+from labctl.services.schemas.documents.certificates import CertificateOrder, CertificateRequest, CertificateResponse
 from labctl.store import CertificateForms, CertificateRow, Store
 
 

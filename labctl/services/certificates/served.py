@@ -7,7 +7,7 @@ from typing import Literal, get_args
 
 from labctl.errors import BadInput, NotFound
 from labctl.services.certificates.issue import response
-from labctl.services.schemas.certificates import CertificateResponse
+from labctl.services.schemas.documents.certificates import CertificateResponse
 from labctl.store import Store
 
 CertificateFormat = Literal["pdf", "xml", "json"]

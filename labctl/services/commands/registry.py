@@ -30,8 +30,8 @@ from labctl.services.schemas.admin import BackupNote, KeyRequest, KeyResponse, N
 from labctl.services.schemas.benches import BenchCheckResponse, BenchStatus, CheckRequest, ClearRequest
 from labctl.services.schemas.calibrations import FitRequest, FitResponse, ImproveRequest, ImproveResponse
 from labctl.services.schemas.campaigns import CampaignResponse, ConfirmRequest, ReasonRequest
-from labctl.services.schemas.certificates import CertificateRequest, CertificateResponse
 from labctl.services.schemas.certification import CertificationResponse, CertifyRequest, RevokeRequest
+from labctl.services.schemas.documents.certificates import CertificateRequest, CertificateResponse
 from labctl.services.schemas.recordings import (
     ExampleRequest,
     ImportResponse,

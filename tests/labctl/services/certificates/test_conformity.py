@@ -6,7 +6,7 @@ import pytest
 
 from labctl.certificates.document import AxisError, ResultPoint, StateOfItem
 from labctl.services.certificates.conformity import NoAcceptance, conformity
-from labctl.services.schemas.certificates import OrderedConformity
+from labctl.services.schemas.documents.certificates import OrderedConformity
 
 
 def state(*largest_dps: float) -> StateOfItem:

@@ -12,7 +12,23 @@ from labctl.cli.options import Database, Json, Serial
 from labctl.cli.output import console, print_json
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.certificates import CertificateOrder
+    from labctl.services.schemas.documents.certificates import CertificateOrder
+
+Order = Annotated[
+    Path | None,
+    typer.Option(
+        "--order",
+        metavar="ORDER.toml",
+        help="Facts of the order: customer, item, method, conformity. With it the certificate is issued.",
+    ),
+]
+By = Annotated[
+    str | None, typer.Option("--by", metavar="NAME", help="Person who issues it; default: who is logged in.")
+]
+Amend = Annotated[
+    str | None,
+    typer.Option("--amend", metavar="REASON", help="Replace the certificate that was issued; the reason is in it."),
+]
 
 
 def certificate(
@@ -23,21 +39,9 @@ def certificate(
     version: Annotated[
         int | None, typer.Option("--version", metavar="N", help="Calibration version; default: the certified version.")
     ] = None,
-    order: Annotated[
-        Path | None,
-        typer.Option(
-            "--order",
-            metavar="ORDER.toml",
-            help="Facts of the order: customer, item, method, conformity. With it the certificate is issued.",
-        ),
-    ] = None,
-    by: Annotated[
-        str | None, typer.Option("--by", metavar="NAME", help="Person who issues it; default: who is logged in.")
-    ] = None,
-    amend: Annotated[
-        str | None,
-        typer.Option("--amend", metavar="REASON", help="Replace the certificate that was issued; the reason is in it."),
-    ] = None,
+    order: Order = None,
+    by: By = None,
+    amend: Amend = None,
     as_json: Json = False,
     database: Database = None,
 ) -> None:
@@ -51,7 +55,7 @@ def certificate(
     from labctl.services.commands.open import execute, open_readonly
     from labctl.services.commands.registry import ISSUE_CERTIFICATE
     from labctl.services.commands.requests import ToVersion
-    from labctl.services.schemas.certificates import CertificateRequest
+    from labctl.services.schemas.documents.certificates import CertificateRequest
 
     with one_clear_line():
         chosen = format_of(out.suffix)
@@ -63,10 +67,10 @@ def certificate(
             out.write_bytes(certificate_file(store, serial, number, chosen, answer.number).content)
     if as_json:
         print_json(answer)
-    else:
-        replaced = f", replaces {answer.replaces}" if answer.replaces else ""
-        issued = f"issued {answer.issued_at:%Y-%m-%d} by {answer.by}{replaced}"
-        console.print(f"certificate {answer.number} of {serial} version {number}, {issued} -> {out}", markup=False)
+        return
+    issued = f"issued {answer.issued_at:%Y-%m-%d} by {answer.by}"
+    issued += f", replaces {answer.replaces}" if answer.replaces else ""
+    console.print(f"certificate {answer.number} of {serial} version {number}, {issued} -> {out}", markup=False)
 
 
 def certificates(serial: Serial, as_json: Json = False, database: Database = None) -> None:
@@ -94,7 +98,7 @@ def read_order(path: Path | None) -> CertificateOrder:
 
     from instruments.toml_documents import listed, read_toml, shown
     from labctl.errors import BadInput
-    from labctl.services.schemas.certificates import CertificateOrder
+    from labctl.services.schemas.documents.certificates import CertificateOrder
 
     if path is None:
         return CertificateOrder()
@@ -106,4 +110,4 @@ def read_order(path: Path | None) -> CertificateOrder:
         said = listed(
             f"{'.'.join(map(str, each['loc']))} = {shown(each['input'])}: {each['msg']}" for each in error.errors()
         )
-        raise BadInput(f"{path}: {said}; docs/how-to/certificates.md lists the keys of an order") from error
+        raise BadInput(f"{path}: {said}; correct it (docs/how-to/certificates.md lists the keys)") from error

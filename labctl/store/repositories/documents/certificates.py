@@ -74,7 +74,7 @@ class Certificates:
                 append(connection, row.at, "certificate", f"{row.serial} version {row.version}", detail, who=row.by)
         except exc.IntegrityError as error:
             raise Conflict(
-                f"certificate {row.number} of {row.serial} was issued by another request in the meantime; issue again"
+                f"certificate {row.number} of {row.serial} was issued by another request in the meantime; repeat the request"
             ) from error
         return row
 

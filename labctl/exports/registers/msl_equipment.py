@@ -1,7 +1,7 @@
 """A calibration as an entry of an equipment register that MSL's msl-equipment reads: XML, a table for each axis.
 
 Structure and names of the elements: https://mslnz.github.io/msl-equipment, schema of 2026. The schema also lists MSL's
-own staff, teams, rooms and quantities; the register that is read takes any.
+own staff, teams, locations and quantities; the register that is read takes any.
 """
 
 from __future__ import annotations
