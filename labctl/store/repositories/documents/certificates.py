@@ -74,7 +74,8 @@ class Certificates:
                 append(connection, row.at, "certificate", f"{row.serial} version {row.version}", detail, who=row.by)
         except exc.IntegrityError as error:
             raise Conflict(
-                f"certificate {row.number} of {row.serial} was issued by another request in the meantime; repeat the request"
+                f"certificate {row.number} of {row.serial} was issued by another request in the meantime; send this "
+                "one again"
             ) from error
         return row
 
