@@ -208,6 +208,6 @@ def run(campaigns: int = CAMPAIGNS) -> str:
     head = " | ".join(["corrected rate, inside U, %", *(f"{rate:+.0f} deg/s" for rate in AT_DPS)])
     lines += ["", f"| {head} |", "| --- " * (len(AT_DPS) + 1) + "|"]
     for warm in AT_C:
-        cells = [f"{100 * np.mean(np.abs(found[places[warm, rate]]) <= 1):.1f}" for rate in AT_DPS]
+        cells = [share(found[places[warm, rate]]).replace(" | ", " (") + ")" for rate in AT_DPS]
         lines.append(f"| {warm:+.0f} deg C | " + " | ".join(cells) + " |")
     return "\n".join(lines)

@@ -21,9 +21,7 @@ def bound_lines(calibration: Calibration) -> list[str]:
     unknown = ", ".join(axis for axis, bound in bounds.items() if bound is None)
     lines = []
     if known:
-        lines.append(
-            f"Uncertainty of a corrected rate on later days, U (95.45 %), at most: {known}; noise comes on top."
-        )
+        lines.append(f"Expanded uncertainty U (95.45 %) of a corrected rate on later days, at most: {known}.")
     if unknown:
         lines.append(f"Uncertainty of a corrected rate: unknown for {unknown}.")
     if known and found is not None and found["not_stated"]:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 
 from labctl.calibration import Calibration, read_calibration
+from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.numeric.blas_threads import single_threaded
 from labctl.fitting.uncertainty import (
     COVERAGE,
@@ -40,7 +42,7 @@ def uncertainty_of_unit(
     """
     calibration = read_calibration(version_of(store, serial, version).document)
     covered = Covered(calibration.rate_dps, calibration.temperature_c)
-    rates, warm = covered.rates(_evidence(calibration)), covered.temperatures()
+    rates, warm = covered.rates(_Known.of(calibration).evidence), covered.temperatures()
     return uncertainty_answer(
         calibration,
         max(rates) / 2 if rate_dps is None else rate_dps,
@@ -57,13 +59,10 @@ def uncertainty_answer(
 
     Raises BadInput, NotEnoughData.
     """
-    found = uncertainty_of(calibration, rate_dps, temperature_c)
+    known = _Known.of(calibration)
+    found = known.at(rate_dps, temperature_c)
     coefficients = coefficient_budgets(
-        calibration.fitted,
-        temperature_c,
-        evidence=_evidence(calibration),
-        name=_name(calibration),
-        bench=_conditions(calibration),
+        known.fitted, temperature_c, evidence=known.evidence, name=known.name, bench=known.bench
     )
     budgets = {axis: BudgetResponse.model_validate(one.budget.to_json()) for axis, one in found.items()}
     return UncertaintyResponse(
@@ -89,24 +88,17 @@ def uncertainty_answer(
 @single_threaded
 def uncertainty_grid(calibration: Calibration) -> UncertaintyGrid:
     """Return the uncertainty about each axis on a small grid over the validity. Raises BadInput, NotEnoughData."""
-    covered = Covered(calibration.rate_dps, calibration.temperature_c)
-    rates, temperatures = covered.rates(_evidence(calibration)), covered.temperatures()
-    found = [[uncertainty_of(calibration, rate, warm) for rate in rates] for warm in temperatures]
+    covered, known = Covered(calibration.rate_dps, calibration.temperature_c), _Known.of(calibration)
+    rates, temperatures = covered.rates(known.evidence), covered.temperatures()
+    found = [[known.at(rate, warm) for rate in rates] for warm in temperatures]
     axes = {axis: [[_response(place[axis]) for place in row] for row in found] for axis in found[0][0]}
-    over = contributions_over(rates, temperatures, lambda rate, warm: uncertainty_of(calibration, rate, warm))
+    over = contributions_over(rates, temperatures, known.at)
     return UncertaintyGrid(rate_dps=rates, temperature_c=temperatures, axes=axes, contributions=over)
 
 
 def uncertainty_of(calibration: Calibration, rate_dps: float, temperature_c: float) -> dict[str, RateUncertainty]:
     """Return axis -> the uncertainty of a calibration's corrected rate. Raises BadInput, NotEnoughData."""
-    return rate_uncertainty(
-        calibration.fitted,
-        rate_dps,
-        temperature_c,
-        evidence=_evidence(calibration),
-        name=_name(calibration),
-        bench=_conditions(calibration),
-    )
+    return _Known.of(calibration).at(rate_dps, temperature_c)
 
 
 def places_of(calibration: Calibration) -> tuple[list[float], list[float]]:
@@ -121,18 +113,29 @@ def is_inside(calibration: Calibration, rate_dps: float, temperature_c: float) -
     return cold <= temperature_c <= warm and slow <= rate_dps <= fast
 
 
-def _name(calibration: Calibration) -> str:
-    return f"{calibration.serial} version {calibration.version}"
+@dataclass(frozen=True)
+class _Known:
+    """What a document holds of the uncertainty, read once for many places."""
 
+    fitted: FittedModel
+    evidence: Mapping[str, AxisEvidence]
+    bench: BenchConditions | None  #: None: an older labctl made the version
+    name: str
 
-def _evidence(calibration: Calibration) -> dict[str, AxisEvidence]:
-    return {axis: AxisEvidence.from_json(one) for axis, one in calibration.document.get("use", {}).items()}
+    @staticmethod
+    def of(calibration: Calibration) -> _Known:
+        stated = calibration.document.get("standards")
+        return _Known(
+            calibration.fitted,
+            {axis: AxisEvidence.from_json(one) for axis, one in calibration.document.get("use", {}).items()},
+            None if stated is None else BenchConditions.from_json(stated),
+            f"{calibration.serial} version {calibration.version}",
+        )
 
-
-def _conditions(calibration: Calibration) -> BenchConditions | None:
-    """Return the standards of a version; None of one that an older labctl made."""
-    stated = calibration.document.get("standards")
-    return None if stated is None else BenchConditions.from_json(stated)
+    def at(self, rate_dps: float, temperature_c: float) -> dict[str, RateUncertainty]:
+        return rate_uncertainty(
+            self.fitted, rate_dps, temperature_c, evidence=self.evidence, name=self.name, bench=self.bench
+        )
 
 
 def _response(found: RateUncertainty) -> AxisUncertainty:
