@@ -104,7 +104,7 @@ def uncertainty_of(calibration: Calibration, rate_dps: float, temperature_c: flo
 def places_of(calibration: Calibration) -> tuple[list[float], list[float]]:
     """Return the rates, deg/s, and temperatures, deg C, of a small grid over the validity."""
     covered = Covered(calibration.rate_dps, calibration.temperature_c)
-    return list(covered.rates(_evidence(calibration))), list(covered.temperatures())
+    return list(covered.rates(_Known.of(calibration).evidence)), list(covered.temperatures())
 
 
 def is_inside(calibration: Calibration, rate_dps: float, temperature_c: float) -> bool:

@@ -17,7 +17,7 @@ from labctl.services.schemas.documents.certificates import CertificateOrder
 from labctl.store import CalibrationRecord, CampaignRow, CertificationRow, RecordingRow, Store
 
 BENCH = "[laboratory] of the bench file of the campaign, or [laboratory] of the order"
-STANDARDS = "[[standards]] of the bench file of the campaign, or of the order"
+STANDARDS = "[[standards]] of the bench file before the campaign, or of recording.toml"
 #: Quantities that a rate, or an angle over a time, is known from.
 RATE = frozenset({"clock", "table_rate", "turn_angle"})
 
@@ -105,7 +105,7 @@ def facts_of(store: Store, serial: str, version: int, order: CertificateOrder) -
         campaign=campaign,
         order=order,
         laboratory=(bench.laboratory if bench else None) or order.laboratory or Laboratory(),
-        standards=_standards(measured, order),
+        standards=_standards(measured),
         authorised=next((act for act in store.calibrations.history(serial) if act.version == version), None),
         performed_from=min((first for first, _ in spans), default=None) if campaign else method.performed_from
         or min((first for first, _ in spans), default=None),
@@ -114,7 +114,6 @@ def facts_of(store: Store, serial: str, version: int, order: CertificateOrder) -
     )  # fmt: skip
 
 
-def _standards(rows: tuple[RecordingRow, ...], order: CertificateOrder) -> tuple[Standard, ...]:
-    """Return the standards that the recordings were made with, each once, else those of the order."""
-    kept = [each for row in rows for each in RecordingInfo.model_validate(row.info).standards]
-    return tuple(dict.fromkeys(kept)) or order.standards
+def _standards(rows: tuple[RecordingRow, ...]) -> tuple[Standard, ...]:
+    """Return the standards that the recordings were made with, each once: those whose uncertainties are in U."""
+    return tuple(dict.fromkeys(each for row in rows for each in RecordingInfo.model_validate(row.info).standards))

@@ -7,7 +7,6 @@ from datetime import date, datetime
 from pydantic import Field
 
 from instruments.laboratory import LINE, Laboratory
-from instruments.standards import Standard
 from labctl.certificates.document import Customer, DecisionRule
 from labctl.services.schemas.base import Request, ResponseModel
 
@@ -62,9 +61,6 @@ class CertificateOrder(Request):
     )
     laboratory: Laboratory | None = Field(
         default=None, description="Where the bench file of the campaign has no [laboratory]."
-    )
-    standards: tuple[Standard, ...] = Field(
-        default=(), description="Reference standards, where the recording was made with none that is stated."
     )
 
 
