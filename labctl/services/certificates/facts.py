@@ -18,6 +18,8 @@ from labctl.store import CalibrationRecord, CampaignRow, CertificationRow, Recor
 
 BENCH = "[laboratory] of the bench file of the campaign, or [laboratory] of the order"
 STANDARDS = "[[standards]] of the bench file before the campaign, or of recording.toml"
+#: Traceability of the standards of a simulated bench, also where its recording was exported and imported.
+SIMULATED = "none: simulated"
 #: Quantities that a rate, or an angle over a time, is known from.
 RATE = frozenset({"clock", "table_rate", "turn_angle"})
 
@@ -110,7 +112,8 @@ def facts_of(store: Store, serial: str, version: int, order: CertificateOrder) -
         performed_from=min((first for first, _ in spans), default=None) if campaign else method.performed_from
         or min((first for first, _ in spans), default=None),
         performed_until=max(until, default=None) if campaign else method.performed_until or max(until, default=None),
-        simulated=bench is not None and bench.has_simulated,
+        simulated=(bench is not None and bench.has_simulated)
+        or any(each.traceability == SIMULATED for each in _standards(measured)),
     )  # fmt: skip
 
 

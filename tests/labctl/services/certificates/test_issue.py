@@ -14,6 +14,7 @@ import pytest
 
 from instruments.standards import Standard
 from labctl.errors import BadInput, NotFound
+from labctl.recording import Recording
 from labctl.services.certificates.issue import CertificateRefused, issue
 from labctl.services.certificates.missing import MissingFacts
 from labctl.services.certificates.served import certificate_file, list_certificates
@@ -45,7 +46,7 @@ def empty(tmp_path: Path) -> Iterator[Store]:
         yield opened
 
 
-def with_standards(*standards: Standard) -> object:
+def with_standards(*standards: Standard) -> Recording:
     recording = simulated()
     return replace(recording, info=recording.info.model_copy(update={"standards": standards}))
 
@@ -94,7 +95,7 @@ def test_a_standard_past_its_due_date_is_refused_by_name(empty: Store) -> None:
     )  # fmt: skip
     early = late.model_copy(update={"due": date(2099, 1, 1), "calibrated": day + timedelta(days=1)})
     for bad in (late, early):
-        version = add_version(empty, with_standards(good, bad))  # type: ignore[arg-type]
+        version = add_version(empty, with_standards(good, bad))
         with pytest.raises(CertificateRefused, match=r"Pt100 no\. 7, certificate T-9.*measure again"):
             issue(empty, SERIAL, version, request(), AT)
     assert rows_of(empty) == 0
@@ -102,10 +103,10 @@ def test_a_standard_past_its_due_date_is_refused_by_name(empty: Store) -> None:
 
 def test_standards_without_certificate_or_traceability_are_missing(empty: Store) -> None:
     bare = Standard(quantity="clock", u=1.0)
-    version = add_version(empty, with_standards(bare))  # type: ignore[arg-type]
+    version = add_version(empty, with_standards(bare))
     with pytest.raises(MissingFacts, match=r"certificate, issued_by, due \(or traceability\) of standard clock"):
         issue(empty, SERIAL, version, request(), AT)
-    version = add_version(empty, with_standards(Standard(quantity="thermometer", u=1.0, traceability="SI")))  # type: ignore[arg-type]
+    version = add_version(empty, with_standards(Standard(quantity="thermometer", u=1.0, traceability="SI")))
     with pytest.raises(MissingFacts, match="standard of the rate"):
         issue(empty, SERIAL, version, request(), AT)
 
@@ -165,6 +166,17 @@ def test_a_revoked_version_gets_no_certificate(store: Store) -> None:
 def test_an_item_that_came_after_its_calibration_is_refused(store: Store) -> None:
     with pytest.raises(CertificateRefused, match="received = 2099-01-01 is after the calibration"):
         issue(store, SERIAL, 1, request(item={**ORDER["item"], "received": "2099-01-01"}), AT)
+
+
+def test_a_simulated_bench_gives_a_specimen_that_claims_no_traceability(empty: Store) -> None:
+    first = json.loads(issued()[1].document)["statements"]
+    assert first[0].startswith("SPECIMEN")
+    assert not any("traceable to the SI" in each for each in first)
+    real = Standard(quantity="clock", u=1.0, certificate="C-1", issued_by="PTB", due=date(2099, 1, 1))
+    version = add_version(empty, with_standards(real))
+    other = json.loads(_document(empty, version))["statements"]
+    assert not any(each.startswith("SPECIMEN") for each in other)
+    assert any("traceable to the SI" in each for each in other)
 
 
 def test_the_issue_is_in_the_audit_trail(store: Store) -> None:
