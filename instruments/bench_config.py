@@ -17,6 +17,8 @@ from typing import Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, SerializeAsAny, model_validator
 
+from instruments.laboratory import Laboratory
+from instruments.standards import Standard
 from instruments.toml_documents import read_toml
 
 #: A serial number becomes part of file names, addresses and C comments.
@@ -128,6 +130,8 @@ class SimulationSettings(Strict):
     chamber: dict[str, object] = Field(default_factory=dict)
     hand: dict[str, object] = Field(default_factory=dict)  #: of the person who turns the units of a bench by hand
     hidden: dict[str, float | str] = Field(default_factory=dict)  #: effect id -> size, hidden in every unit
+    #: Whether the bench is off by errors drawn from the distributions of its [[standards]]; else it is exact.
+    draw_standards: bool = False
     control: str | None = None  #: HOST:PORT of a simulator in another process, for its unit handler
     speed: float = Field(
         default=1.0, gt=0
@@ -151,6 +155,8 @@ class BenchFile(Strict):
     chamber: SerializeAsAny[ChamberSettings] | None = None  #: absent: the units are at room temperature
     gyros: tuple[SerializeAsAny[GyroSettings], ...] = Field(min_length=1)
     references: tuple[SerializeAsAny[ReferenceSettings], ...] = ()
+    laboratory: Laboratory | None = None  #: as certificates name it
+    standards: tuple[Standard, ...] = ()  #: reference standards, at most one of each quantity and name
     simulation: SimulationSettings | None = None
     #: "table", "chamber" or gyro name -> its driver's release, filled in when the drivers are found; what a file says
     #: here is not used.
@@ -178,6 +184,16 @@ class BenchFile(Strict):
             names.append(reference.name)
         if len(chosen := [each.name for each in self.references if each.is_temperature]) > 1:
             raise ValueError(f"is_temperature is set for {' and '.join(chosen)}; the fit takes one temperature")
+        return self
+
+    @model_validator(mode="after")
+    def _standards_are_distinct(self) -> BenchFile:
+        """Reject one quantity stated twice under one name: its uncertainty would count twice."""
+        stated = [(each.quantity, each.name) for each in self.standards]
+        if twice := next((one for one in stated if stated.count(one) > 1), None):
+            raise ValueError(
+                f"two [[standards]] have the quantity {twice[0]!r} and the name {twice[1]!r}; remove one, or name both"
+            )
         return self
 
     @property

@@ -8,7 +8,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import date, datetime
 from functools import cached_property
 from importlib.metadata import version as package_version
 from pathlib import Path
@@ -18,7 +18,8 @@ from labctl.certification import CalibrationWarning, Certification, read_certifi
 from labctl.errors import BadCalibrationFile
 from labctl.fitting import FitResult, FittedModel, coefficients_json
 from labctl.fitting.models.paper_units import in_paper_units
-from labctl.fitting.uncertainty import AxisEvidence
+from labctl.fitting.uncertainty import AxisEvidence, conditions_of
+from labctl.fitting.uncertainty.document import Covered, uncertainty_json
 from labctl.json_types import JsonObject
 from labctl.json_types.calibrations import CalibrationJson, OutputUnitJson
 from labctl.recording import OutputUnit, RecordingInfo
@@ -134,12 +135,18 @@ def build_calibration(
     issued_at: datetime,
     provenance: JsonObject,
     evidence: Mapping[str, AxisEvidence] | None = None,
+    used_on: Sequence[date] = (),
 ) -> Calibration:
     """Make the document of a fit. What belongs to bench, fixture or environment is left out, and named.
 
-    `evidence`, by axis, is what the uncertainty in use is computed from; without it that is unknown.
+    `evidence`, by axis, is what the uncertainty in use is computed from; without it that is unknown. `used_on` are the
+    days of several recordings, on which the standards of the bench were used; default: the day of `info`.
     """
     exported, left_out = result.exported()
+    bench = conditions_of(info, result.environment, used_on)
+    covered = Covered(_limits(result.rate_dps), _limits(result.temperature_c))
+    use = {axis: one.to_json() for axis, one in (evidence or {}).items()}
+    kept = {axis: AxisEvidence.from_json(one) for axis, one in use.items()}  # by what a reader of the document has
     document: CalibrationJson = {
         "schema": SCHEMA,
         "serial": info.serial,
@@ -158,7 +165,9 @@ def build_calibration(
         "noise": dict(result.noise),
         "environment": result.environment,
         "validity": {"temperature_c": list(result.temperature_c), "rate_dps": list(result.rate_dps)},
-        "use": {axis: one.to_json() for axis, one in (evidence or {}).items()},
+        "use": use,
+        "standards": bench.to_json(),
+        "uncertainty": uncertainty_json(exported, covered, kept, bench),
         "provenance": dict(provenance),
         "how_to_use": (
             "rate = (output - offset) / scale per axis; then the model's error is taken off: argument 'output' "

@@ -8,6 +8,7 @@ import sys
 STUDIES = (
     "coverage",
     "use_coverage",
+    "budget_coverage",
     "hand_turns",
     "poses",
     "joint_recordings",

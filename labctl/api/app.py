@@ -19,6 +19,7 @@ from labctl.api.routers import (
     benches,
     calibrations,
     campaigns,
+    certificates,
     certification,
     effects,
     health,
@@ -48,7 +49,7 @@ certifying and keys for an approver's.
 
 #: In the order of the API's description.
 ROUTERS = (
-    health, units, benches, effects, calibrations, certification, plans,
+    health, units, benches, effects, calibrations, certification, certificates, plans,
     campaigns, schedule, recordings, motions, admin, swagger_ui,
 )  # fmt: skip
 #: Which of their routes take a key; every route of the others does.

@@ -27,7 +27,9 @@ from labctl.cli.commands import (
     schedule,
     server,
     trend,
+    uncertainty,
 )
+from labctl.cli.commands.documents import certificate
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.interrupts import process_of_one_command
 from labctl.config import os_user
@@ -69,6 +71,9 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "revoke": calibrations.revoke,
     "certifications": calibrations.certifications,
     "calibration": calibrations.calibration,
+    "certificate": certificate.certificate,
+    "certificates": certificate.certificates,
+    "uncertainty": uncertainty.uncertainty,
     "compensate": calibrations.compensate,
     "backup": database.backup,
     "check": database.check,

@@ -15,6 +15,7 @@ from labctl.exports.c_orientation import orientation_body
 from labctl.exports.c_sine import sine_body
 from labctl.exports.c_tables import c_table
 from labctl.exports.format import Format
+from labctl.exports.uncertainty_bound import bound_constant, bound_lines
 from labctl.fitting.models.matrix_form import LINEAR as LINEAR_EFFECTS
 from labctl.fitting.models.matrix_form import Linear, linear_of
 from labctl.fitting.models.memory import split_memory
@@ -32,7 +33,7 @@ HEAD = """/* Calibration of gyro {serial}, version {version}: model {model}.
  * inside: a thermometer's last digits, corrected at the edge, and rates in the output's, as the range is of true rates.
  * What is not a number gives no number, and 1.
  * Input: output of the gyro as a rate, deg/s ({nominal}); result: rate in deg/s.
- * Define LABCTL_REAL as float before including it for single precision. */
+{uncertainty} * Define LABCTL_REAL as float before including it for single precision. */
 #ifndef {guard}
 #define {guard}
 
@@ -43,7 +44,7 @@ HEAD = """/* Calibration of gyro {serial}, version {version}: model {model}.
 #endif
 
 #define {name}_AXES {axes}
-static const char {name}_hash[] = "{hash}";
+{bound}static const char {name}_hash[] = "{hash}";
 static const double {name}_temperature_c[2] = {{{low}, {high}}};
 static const double {name}_inside_c[2] = {{{coldest}, {warmest}}};
 static const double {name}_output_dps[2] = {{{slowest}, {fastest}}};
@@ -214,6 +215,8 @@ def _head(name: str, calibration: Calibration) -> str:
         guard=f"LABCTL_{name}_V{calibration.version}_{calibration.hash[:GUARD_DIGITS]}_H",
         name=name,
         axes=len(calibration.axes),
+        uncertainty="".join(f" * {_in_comment(line)}\n" for line in bound_lines(calibration)),
+        bound=bound_constant(name, calibration),
     )
 
 

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from labctl.calibration import Calibration
 from labctl.exports.format import Loss, at_most
+from labctl.exports.uncertainty_bound import bound_lines
 
 
 def plain(text: str) -> str:
@@ -27,6 +28,7 @@ def head_lines(
     ]
     if differs_dps is not None:
         lines.append(f"Differs from the calibration in what it carries by at most {at_most(differs_dps):.3g} deg/s.")
+    lines += [plain(line) for line in bound_lines(calibration)]
     lines += [f"LOST {loss.text}." for loss in losses]
     return lines + list(notes)
 

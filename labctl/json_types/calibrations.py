@@ -6,6 +6,7 @@ from typing import NotRequired
 
 from typing_extensions import TypedDict
 
+from labctl.json_types.budget import BenchConditionsJson, UncertaintyJson
 from labctl.json_types.models import (
     AxisNoiseJson,
     Coefficients,
@@ -85,6 +86,8 @@ class CalibrationJson(TypedDict):
     environment: FitEnvironment
     validity: ValidityJson
     use: NotRequired[dict[str, AxisEvidenceJson]]
+    standards: NotRequired[BenchConditionsJson]
+    uncertainty: NotRequired[UncertaintyJson | None]
     poses: NotRequired[PosesJson]
     provenance: dict[str, object]
     how_to_use: str

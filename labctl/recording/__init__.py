@@ -1,5 +1,6 @@
 """A recording in memory, and the interchange format it is read from and written to."""
 
+from instruments.standards import Standard
 from labctl.recording.data_set_limits import refuse_too_many_data_sets
 from labctl.recording.files import read_recording, write_recording
 from labctl.recording.importer import Importer, NoOptions, TableImporter, TableOptions
@@ -17,6 +18,7 @@ __all__ = [
     "RawTable",
     "Recording",
     "RecordingInfo",
+    "Standard",
     "TableImporter",
     "TableOptions",
     "dataset_starts",

@@ -7,6 +7,8 @@ from typing import Any, Literal
 
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, model_validator
 
+from instruments.standards import Standard
+
 Axis = Literal["x", "y", "z"]
 #: What moves the unit, and so what its true rate is known from: `rates` a table, at one rate in each data set; `rest`
 #: nothing; `turns` a hand or a table, by a known angle in each data set; `profile` a table whose rate changes and is
@@ -82,6 +84,9 @@ class RecordingInfo(BaseModel):
     technology: Literal["fog", "mems", "piezo"] | None = None
     datasheet: dict[str, float] = Field(default_factory=dict)
     output: dict[Axis, OutputUnit] = Field(default_factory=dict)
+    #: Reference standards of the bench, as they were when the readings were taken.
+    standards: tuple[Standard, ...] = ()
+    thermometer: str = ""  #: the instrument that `temperature_c` is by; empty: the unit's own, or the chamber's
 
     @model_validator(mode="after")
     def _axes_once(self) -> RecordingInfo:

@@ -34,6 +34,7 @@ from labctl.store.repositories.calibrations import Calibrations, NewCalibration
 from labctl.store.repositories.campaign_journal import StoreJournal
 from labctl.store.repositories.campaign_summaries import CampaignSummary
 from labctl.store.repositories.campaigns import Campaigns, NewCampaign
+from labctl.store.repositories.documents.certificates import CertificateForms, CertificateRow, Certificates
 from labctl.store.repositories.keys import Keys
 from labctl.store.repositories.leases import LeaseRow, Leases
 from labctl.store.repositories.recording_writer import Imports, ImportTicket
@@ -53,6 +54,9 @@ __all__ = [
     "CampaignRow",
     "CampaignSummary",
     "Campaigns",
+    "CertificateForms",
+    "CertificateRow",
+    "Certificates",
     "CertificationRow",
     "Checked",
     "Copy",
@@ -112,6 +116,7 @@ class Store:
         self.benches = Benches(database)
         self.calibrations = Calibrations(database)
         self.certifications = Certifications(database)
+        self.certificates = Certificates(database)
         self.audit = Audit(database)
         self.keys = Keys(database)
         self.starts = Starts(database)

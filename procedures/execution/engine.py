@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from instruments.clock import Clock
 from instruments.errors import InstrumentError
@@ -10,7 +10,7 @@ from procedures.contracts.bench import Bench
 from procedures.contracts.campaign_state import CampaignState
 from procedures.contracts.control import Control
 from procedures.contracts.errors import Aborted, Interrupted, ProcedureError
-from procedures.contracts.journal import Journal
+from procedures.contracts.journal import Event, Journal
 from procedures.contracts.operator import Operator
 from procedures.contracts.steps import Mount
 from procedures.execution.active_bench import ActiveBench
@@ -32,7 +32,7 @@ class Engine:
 
     `run` blocks until the campaign is over; `control` and `progress` are for other threads. Journal times are
     campaign time: that of `time` for a resumed campaign, else seconds since `run` was called. Without `guards` the
-    recipe's own rules are compared with the limits of the bench.
+    recipe's own rules are compared with the limits of the bench. `notices` are recorded as the campaign starts.
     """
 
     def __init__(
@@ -47,8 +47,10 @@ class Engine:
         *,
         observer: Observer | None = None,
         time: CampaignTime | None = None,
+        notices: Sequence[Event] = (),
     ) -> None:
         self.plan = plan
+        self._notices = notices
         self.control = control or Control()
         self._tracker = ProgressTracker(plan, clock, observer)
         self._recorder = CampaignRecorder(journal, clock, self._tracker, time or CampaignTime(clock))
@@ -114,6 +116,8 @@ class Engine:
             self._resume(start_at, restart or Restart())
             return
         self._recorder.change_state(CampaignState.RUNNING, "started")
+        for notice in self._notices:
+            self._recorder.event(notice)
         self._context.monitor.begin()
         self._context.poll(read_latest=False)
 

@@ -39,6 +39,11 @@ def two_digits(value: float) -> float:
     return float(f"{value:.1e}")
 
 
+def shown_number(text: str) -> float:
+    """Return a number as the page writes it, with a power of ten where it is far from 1."""
+    return float(text.replace(" × 10", "e").translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")))
+
+
 def cells(region: Locator) -> list[list[str]]:
     """Return the texts of a table's body, row by row, without the headings that a narrow screen shows."""
     return [
@@ -76,12 +81,14 @@ def test_the_figures_of_the_page_are_those_of_the_service(
     heads = [float(text.split()[0]) for text in over.locator("th").all_inner_texts()[1:]]
     assert heads == pytest.approx(here["grid"]["rate_dps"], rel=5e-3)
 
-    card.get_by_label("Rate").fill("50")
-    card.get_by_label("Temperature").fill("40")
-    card.get_by_label("Temperature").press("Enter")
+    card.get_by_role("spinbutton", name="Rate").fill("50")
+    card.get_by_role("spinbutton", name="Temperature").fill("40")
+    card.get_by_role("spinbutton", name="Temperature").press("Enter")
     page.wait_for_url("**rate=50&temperature=40")
     one = here["axes"]["z"]
-    names = ("coefficients_dps", "model_dps", "repeatability_dps", "combined_dps", "expanded_dps")
+    names = (
+        "coefficients_dps", "model_dps", "repeatability_dps", "standards_dps", "combined_dps", "expanded_dps"
+    )  # fmt: skip
     expect(parts.locator("tbody tr").last.locator("td").nth(1)).to_have_text(f"{two_digits(one['expanded_dps'])}")
     assert [float(row[1]) for row in cells(parts)] == [two_digits(one[name]) for name in names]
     assert cells(parts)[2][2] == one["repeatability_source"] == "data sheet"
@@ -91,11 +98,35 @@ def test_the_figures_of_the_page_are_those_of_the_service(
     page.reload()  # the place is in the address
     card, _, parts = card_of(page)
     assert [float(row[1]) for row in cells(parts)] == [two_digits(one[name]) for name in names]
-    card.get_by_label("Temperature").fill("90")
-    card.get_by_label("Temperature").press("Enter")
+    card.get_by_role("spinbutton", name="Temperature").fill("90")
+    card.get_by_role("spinbutton", name="Temperature").press("Enter")
     expect(card).to_contain_text("was not calibrated")
     expect(parts).to_contain_text("no data set was measured near there")
-    assert [row[1] for row in cells(parts)][1:] == ["unknown", cells(parts)[2][1], "unknown", "unknown"]
+    kept = [cells(parts)[k][1] for k in (2, 3)]
+    assert [row[1] for row in cells(parts)][1:] == ["unknown", *kept, "unknown", "unknown"]
+
+
+def test_the_lines_of_the_budget_and_the_pictures_are_those_of_the_service(
+    service: Service, visit: Callable[..., Page], fog: str
+) -> None:
+    from playwright.sync_api import expect
+
+    page = visit(f"/units/{fog}?rate=50&temperature=40")
+    card, _, _ = card_of(page)
+    here = asked(service, fog, 50, 40)
+    card.get_by_text("Budget, line by line").click()
+    lines = cells(card.get_by_role("region", name="Budget of axis z"))
+    budget = here["budget"]["z"]
+    assert [shown_number(row[5]) for row in lines] == [two_digits(line["contribution"]) for line in budget["lines"]]
+    assert [row[1] for row in lines] == [line["type"] for line in budget["lines"]]
+    figure = card.get_by_role("group", name="Contributions, axis z, over rate")
+    figure.scroll_into_view_if_needed()
+    expect(figure.locator(".legendtext").first).to_be_visible()
+    drawn = figure.evaluate("plot => plot.data.map(({ name, x, y }) => [name, x, y])")
+    over = here["grid"]["contributions"]["z"]["over_rate"]
+    expected = {**over["contributions"], "combined u": over["combined"], "expanded U": over["expanded"]}
+    assert drawn == [[f"{name}, deg/s", over["at"], values] for name, values in expected.items()]
+    assert figure.locator(".legendtext").count() == len(expected)
 
 
 @pytest.mark.parametrize("size", [None, NARROW])
@@ -108,7 +139,7 @@ def test_published_coefficients_are_unknown_and_never_zero(
     drawn = cells(over)
     assert {text for row in drawn for text in row[1:]} == {"unknown"}
     assert all(len(row) == 6 for row in drawn)
-    assert [row[1] for row in cells(parts)] == ["unknown"] * 5
+    assert [row[1] for row in cells(parts)] == ["unknown"] * 3 + ["not stated"] + ["unknown"] * 2
     assert cells(parts)[0][2] == "published coefficients come without uncertainties"
     expect(card).to_contain_text("Coefficients: published coefficients come without uncertainties.")
 

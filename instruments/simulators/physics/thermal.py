@@ -65,7 +65,9 @@ class Heat:
         bodies: dict[str, Body],
         noise_c: float,
         seed: int,
+        indicated_too_much_c: float = 0.0,
     ) -> None:
+        self._off_c = indicated_too_much_c  #: by which the chamber's thermometer is above the air at the units
         self._ramp_per_s = ramp_c_per_min / 60.0
         self._air_share = _share(air_tau_s)
         self._target_c = self._ramped_c = self._air_c = start_c
@@ -90,11 +92,11 @@ class Heat:
             body.powered = on
 
     def air_c(self, t_s: float) -> float:
-        """Return the air temperature of the chamber at one time, deg C."""
+        """Return the air temperature that the chamber indicates at one time, deg C."""
         return float(self._at(self._air, np.array([t_s]))[0])
 
     def airs_c(self, t_s: Array) -> Array:
-        """Return the air temperature of the chamber, (n,) deg C, at rising times (n,) s."""
+        """Return the air temperature that the chamber indicates, (n,) deg C, at rising times (n,) s."""
         return self._at(self._air, t_s)
 
     def sensor_c(self, name: str, t_s: Array) -> Array:
@@ -120,8 +122,9 @@ class Heat:
             return
         airs_c = self._airs_after(seconds)
         self._air += airs_c
+        felt_c = [air_c - self._off_c for air_c in airs_c] if self._off_c else airs_c
         for name, body in self._bodies.items():
-            body.follow(airs_c, self._sensor[name], self._deep[name])
+            body.follow(felt_c, self._sensor[name], self._deep[name])
 
     def _airs_after(self, seconds: int) -> list[float]:
         """Return the air temperature after each of the next seconds, deg C."""

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from instruments.bench_config import BenchFile, GyroSettings, SimulationSettings
 from instruments.simulators.hidden import HiddenEffect, State, hidden_effects
 from instruments.simulators.physics.ambient import humidity_pct, supply_wander_v
+from instruments.simulators.physics.bench_errors import BenchErrors
 from instruments.simulators.physics.earth import BodyFrame, EarthRotation
 from instruments.simulators.physics.hand_motion import HandMotion
 from instruments.simulators.physics.instability import BiasInstability
@@ -55,7 +56,9 @@ class World:
         self.settings = settings
         self.north_deg = number(settings.table, "north_deg", 33.0)
         latitude_deg = settings.latitude_deg if settings.latitude_deg is not None else bench.latitude_deg
-        self._earth = EarthRotation(latitude_deg, self.north_deg)
+        self.errors = BenchErrors.drawn(bench.standards, [settings.seed]) if settings.draw_standards else BenchErrors()
+        leaning_deg = None if latitude_deg is None else latitude_deg + self.errors.level_deg
+        self._earth = EarthRotation(leaning_deg, self.north_deg)
         self.table = TableMotion(
             USUAL_STEPS_PER_TURN if bench.table is None else bench.table.steps_per_turn,
             step_error_deg=number(settings.table, "step_error_deg", 0.0225),
@@ -82,6 +85,7 @@ class World:
             bodies,
             number(settings.chamber, "noise_c", 0.02),
             settings.seed + 1000 * settings.noise_seed,
+            self.errors.air_c,
         )
         self._gyros = {gyro.name: SimulatedGyro(self, gyro, truths[gyro.name]) for gyro in bench.gyros}
 
@@ -151,7 +155,9 @@ class World:
 
     def body_rates(self, table_dps: Array, angle_deg: Array) -> Array:
         """Return the inertial rate in body axes, (n, 3) deg/s: table and Earth, at table angles (n,)."""
-        return self._earth.body_rates(BodyFrame.of(self.position), table_dps, angle_deg)
+        frame = BodyFrame.of(self.position)
+        rates = self._earth.body_rates(frame, table_dps / (1.0 + self.errors.rate), angle_deg)
+        return self.errors.felt(rates, frame.up)
 
     def gravity(self, n: int) -> Array:
         """Return the specific force in body axes, (n, 3) g: one g up."""

@@ -16,7 +16,7 @@ from labctl.errors import BadInput
 from labctl.fitting.data.channels import OWN_DATASET, RECORDING, WITHIN_S
 from labctl.fitting.data.covered import Covered
 from labctl.fitting.data.temperature.channel import with_temperature
-from labctl.recording import Recording, RecordingInfo, to_points
+from labctl.recording import Recording, RecordingInfo, Standard, to_points
 
 #: Numbers that go on counting from recording to recording.
 COUNTED = ("dataset", "run", "mounting")
@@ -59,7 +59,12 @@ def joined_recording(parts: Mapping[int, Recording]) -> Recording:
         rows, environment = _renumbered(number, whole[number], first, counts)
         tables.append(rows)
         surroundings.append(environment)
-    info = first.model_copy(update={"max_rate_dps": max((r.info.max_rate_dps or 0.0) for r in whole.values()) or None})
+    info = first.model_copy(
+        update={
+            "max_rate_dps": max((r.info.max_rate_dps or 0.0) for r in whole.values()) or None,
+            "standards": _least_known([whole[number].info for number in order]),
+        }
+    )
     around = _below_one_another(surroundings) if all(surroundings) else None
     return Recording(info, _below_one_another(tables), around)
 
@@ -89,6 +94,19 @@ def joined_coverage(parts: Sequence[Covered | None]) -> Covered | None:
         (min(low), max(high)) if is_known else (None, None),
         {a: (min(part.rate_dps[a][0] for part in known), max(part.rate_dps[a][1] for part in known)) for a in axes},
     )
+
+
+def _least_known(infos: Sequence[RecordingInfo]) -> tuple[Standard, ...]:
+    """Return the standards of several recordings; of one that several have, the entry with the largest uncertainty.
+
+    Campaigns of one bench share what their standards are off by, so that more of them make nothing more certain.
+    """
+    found: dict[tuple[str, str], Standard] = {}
+    for each in (standard for info in infos for standard in info.standards):
+        known = found.get((each.quantity, each.name))
+        if known is None or known.standard_u <= each.standard_u:
+            found[each.quantity, each.name] = each
+    return tuple(found.values())
 
 
 def _require_alike(order: Sequence[int], parts: Mapping[int, Recording]) -> None:

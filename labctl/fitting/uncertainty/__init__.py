@@ -1,6 +1,21 @@
 """Uncertainty of what a calibration gives, after the GUM (JCGM 100)."""
 
+from labctl.fitting.uncertainty.budget import Budget, BudgetLine
+from labctl.fitting.uncertainty.coefficient_budget import coefficient_budgets
+from labctl.fitting.uncertainty.conditions import BenchConditions, conditions_of
 from labctl.fitting.uncertainty.rate import COVERAGE, RateUncertainty, rate_uncertainty
 from labctl.fitting.uncertainty.use import AxisEvidence, evidence_of, use_evidence
 
-__all__ = ["COVERAGE", "AxisEvidence", "RateUncertainty", "evidence_of", "rate_uncertainty", "use_evidence"]
+__all__ = [
+    "COVERAGE",
+    "AxisEvidence",
+    "BenchConditions",
+    "Budget",
+    "BudgetLine",
+    "RateUncertainty",
+    "coefficient_budgets",
+    "conditions_of",
+    "evidence_of",
+    "rate_uncertainty",
+    "use_evidence",
+]

@@ -2,33 +2,25 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from labctl.errors import BadInput, NotEnoughData
-from labctl.fitting.data.channels import BODY_AXES, Channels
 from labctl.fitting.models.fitted_model import FittedModel
-from labctl.fitting.models.presets import POSES
-from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.uncertainty.use import AxisEvidence, combined_dps
+from labctl.fitting.uncertainty.budget import Budget, budget_of, without_repeatability
+from labctl.fitting.uncertainty.combination import combined_u
+from labctl.fitting.uncertainty.conditions import BenchConditions
+from labctl.fitting.uncertainty.evaluated_lines import coefficient_line, model_line, repeatability_line
+from labctl.fitting.uncertainty.sensitivity import corrected_rate
+from labctl.fitting.uncertainty.standard_lines import Sensitivities, no_conditions, standard_lines
+from labctl.fitting.uncertainty.use import AxisEvidence
 
-#: Coverage factor of the expanded uncertainty: about 95 % for a normal distribution (GUM 6.2).
+#: Factor between the expanded uncertainty and the standard one that is given beside it.
 COVERAGE = 2.0
 #: Largest rate, deg/s, and temperature, deg C, that are taken for a gyro's.
 LARGEST = 1e5
-#: Why a part is unknown.
-PUBLISHED = "published coefficients come without uncertainties"
-NO_DATA_SETS = "published coefficients have no data sets from which it could be estimated"
-NOT_KEPT = "the version was made by an older labctl, which did not store it: fit it again"
-BY_HAND = (
-    "the rate during turns between rests is not known, so it cannot be estimated; measure the unit on a table as well"
-)
-NO_POWER_ON = "only one power-on was recorded, and neither a data sheet nor a static record gives the repeatability"
-#: Step of the numerical derivative of the error along the rate, deg/s.
-STEP_DPS = 0.01
 
 
 @dataclass(frozen=True)
@@ -39,10 +31,12 @@ class RateUncertainty:
     model_dps: float | None  #: standard, error of the model and drift near there, by held-out data sets; None: unknown
     repeatability_dps: float | None  #: standard, from one power-on to the next; None: unknown
     repeatability_source: str  #: "between runs", "data sheet", "static record" or "none"
-    same_run_dps: float | None  #: of coefficients and model alone: without another power-on
-    combined_dps: float | None  #: root of the sum of squares, wider where few runs say it; None where one is unknown
-    expanded_dps: float | None  #: combined, times the coverage factor
+    standards_dps: float | None  #: standard, of all stated reference standards; None: none is stated
+    same_run_dps: float | None  #: of all but repeatability: without another power-on
+    combined_dps: float | None  #: expanded over the coverage factor; None where one of the first three is unknown
+    expanded_dps: float | None  #: U of the budget
     unknown: Mapping[str, str]  #: "coefficients", "model" and "repeatability", those that are unknown -> why
+    budget: Budget
 
 
 def rate_uncertainty(
@@ -52,17 +46,25 @@ def rate_uncertainty(
     *,
     evidence: Mapping[str, AxisEvidence],
     name: str,
+    bench: BenchConditions | None = None,
 ) -> dict[str, RateUncertainty]:
     """Return axis -> the uncertainty of a corrected rate of `rate_dps` about that axis, the other axes at rest.
 
     It holds for use on later days. `evidence` is what the calibration's recording shows by axis (`use_evidence`); an
-    axis without it is uncertain by an unknown amount. `name` identifies the calibration in messages.
+    axis without it is uncertain by an unknown amount. `bench` states the reference standards; None: not known. `name`
+    identifies the calibration in messages.
     Raises BadInput for a number that no gyro measures, and where the model needs more than rate and temperature;
     NotEnoughData where the coefficients have no uncertainty.
     """
     for what, value, unit in (("rate_dps", rate_dps, "deg/s"), ("temperature_c", temperature_c, "deg C")):
         if not abs(value) <= LARGEST:  # also false for NaN
             raise BadInput(f"{what} = {value} {unit}: give a number between {-LARGEST:g} and {LARGEST:g} {unit}")
+    require_law_of_rate_and_temperature(fitted, name)
+    return {axis: _of_axis(fitted, axis, rate_dps, temperature_c, evidence.get(axis), bench) for axis in fitted.axes}
+
+
+def require_law_of_rate_and_temperature(fitted: FittedModel, name: str) -> None:
+    """Raise BadInput where a model needs more than these; NotEnoughData where its coefficients have no uncertainty."""
     if fitted.model.needs:
         raise BadInput(
             f"{name}: its model also needs {', '.join(fitted.model.needs)};"
@@ -73,70 +75,41 @@ def rate_uncertainty(
             f"{name} has as many coefficients as data sets: no residual is left to estimate the uncertainty from; "
             "measure more data sets"
         )
-    return {axis: _of_axis(fitted, axis, rate_dps, temperature_c, evidence.get(axis)) for axis in fitted.axes}
 
 
 def _of_axis(
-    fitted: FittedModel, axis: str, rate_dps: float, temperature_c: float, evidence: AxisEvidence | None
+    fitted: FittedModel,
+    axis: str,
+    rate_dps: float,
+    temperature_c: float,
+    evidence: AxisEvidence | None,
+    bench: BenchConditions | None,
 ) -> RateUncertainty:
-    coefficients = _of_coefficients(fitted, axis, rate_dps, temperature_c)
-    beyond = evidence.model_error.at(rate_dps, temperature_c) if evidence else None
-    repeatability = evidence.repeatability if evidence else None
-    model = fitted.model.name
-    later = repeatability.u_dps if repeatability else None
-    same_run, combined = combined_dps(coefficients, beyond), combined_dps(coefficients, beyond, later)
-    if combined is not None and repeatability is not None:
-        combined *= repeatability.widening(same_run or 0.0)
+    law = corrected_rate(fitted, axis, rate_dps, temperature_c)
+    coefficients = coefficient_line(fitted, law, temperature_c, evidence, "deg/s")
+    model = model_line(fitted, evidence, rate_dps, temperature_c)
+    later = repeatability_line(fitted, evidence)
+    sensitivities = Sensitivities(
+        relative_rate=rate_dps,
+        rate_dps=float(np.sign(rate_dps)),
+        temperature=law.temperature_slope(fitted, temperature_c),
+        angle=0.0,  # what a tilt adds across the axis is a misalignment; along it only the cosine is lost
+        angle_squared=rate_dps / 2,
+        level=1.0 / law.divisor,
+    )
+    standards = standard_lines(bench, sensitivities) if bench is not None else [no_conditions()]
+    lines = [coefficients, model, later, *standards]
+    budget = budget_of("corrected_rate", "deg/s", lines)
+    known = [line.contribution for line in standards if line.contribution is not None]
     return RateUncertainty(
-        coefficients,
-        beyond,
-        later,
-        repeatability.source if repeatability else "none",
-        same_run,
-        combined,
-        None if combined is None else COVERAGE * combined,
-        {part: why for part, why in _unknown(coefficients, evidence, model, rate_dps, temperature_c).items() if why},
+        coefficients.contribution,
+        model.contribution,
+        later.contribution,
+        evidence.repeatability.source if evidence and evidence.repeatability else "none",
+        combined_u(np.array(known)) if known else None,
+        without_repeatability(lines),
+        None if budget.expanded is None else budget.expanded / COVERAGE,
+        budget.expanded,
+        {line.source: line.why for line in (coefficients, model, later) if line.contribution is None},
+        budget,
     )
-
-
-def _unknown(
-    coefficients_dps: float | None, evidence: AxisEvidence | None, model: str, rate_dps: float, temperature_c: float
-) -> dict[str, str | None]:
-    """Return part -> why it is unknown, in words; None for a part that is known."""
-    published = coefficients_dps is None
-    if evidence is None:
-        lacking = NO_DATA_SETS if published else BY_HAND if model == POSES else NOT_KEPT
-        return {"coefficients": PUBLISHED if published else None, "model": lacking, "repeatability": lacking}
-    return {
-        "coefficients": PUBLISHED if published else None,
-        "model": evidence.model_error.unknown_at(rate_dps, temperature_c),
-        "repeatability": None if evidence.repeatability else NO_POWER_ON,
-    }
-
-
-def _of_coefficients(fitted: FittedModel, axis: str, rate_dps: float, temperature_c: float) -> float | None:
-    """Return the standard uncertainty from the coefficients, deg/s; None for published ones, which state none."""
-    fit = fitted.axes[axis]
-    if not np.any(fit.covariance):
-        return None
-    basis = fitted.model.temperature.basis(np.array([temperature_c]))[0]
-    here = _channels(axis, np.array([rate_dps, rate_dps + STEP_DPS]), temperature_c)
-    slope = float(np.diff(fitted.error_dps(here, axis))[0] / STEP_DPS) if fitted.model.argument == "rate" else 0.0
-    columns = {column.name: column for _, column in fitted.model.columns(here, axis)}
-    gradient = np.concatenate(
-        [
-            (float(columns[name].slope(np.full(2, at @ basis))[0]) if name in columns else 0.0) * basis
-            for name, at in zip(fit.names, fit.values, strict=True)
-        ]
-    )
-    return math.sqrt(max(float(gradient @ fit.covariance @ gradient), 0.0)) / abs(1.0 + slope)
-
-
-def _channels(axis: str, rates_dps: Array, temperature_c: float) -> Channels:
-    n = len(rates_dps)
-    columns = {
-        "temperature_c": np.full(n, temperature_c),
-        "table_rate_dps": rates_dps,
-        "position": np.full(n, axis),
-    }
-    return Channels(columns, {name: rates_dps if name == axis else np.zeros(n) for name in BODY_AXES})

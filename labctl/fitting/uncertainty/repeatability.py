@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import stdtrit
 
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.numeric.arrays import Array
@@ -17,8 +16,6 @@ DATASHEET_SHARE = 0.5
 DRIFT_OVER_INSTABILITY = 1.35
 #: One run was calibrated and another is corrected: both are off, independently.
 OF_TWO = float(np.sqrt(2.0))
-#: Probability of an interval of two standard uncertainties.
-LEVEL = 0.9545
 
 
 @dataclass(frozen=True)
@@ -29,14 +26,6 @@ class Repeatability:
     source: str
     freedom: int | None = None  #: degrees of freedom of the figure; None where it is stated and not estimated
 
-    def widening(self, others_dps: float) -> float:
-        """Return the factor by which few runs widen the uncertainty combined with others (GUM G.4, Student's t)."""
-        total = self.u_dps**2 + others_dps**2
-        if self.freedom is None or total == 0:
-            return 1.0
-        effective = self.freedom * (total / max(self.u_dps**2, 1e-300)) ** 2
-        return float(stdtrit(min(effective, 1e6), (1 + LEVEL) / 2)) / 2
-
 
 def repeatability_of(
     data: FitData, residual_dps: Mapping[str, Array], instability_dps: Mapping[str, float | None]
@@ -44,7 +33,7 @@ def repeatability_of(
     """Return axis -> repeatability: between runs, by the data sheet, or by a static record; None where none tells.
 
     `instability_dps` is each axis' bias instability by a static record. The scatter between runs is pooled over the
-    axes; two or three runs say little of a standard deviation, which `widening` answers for.
+    axes; two or three runs say little of a standard deviation, which Student's t answers for.
     """
     between = _between_runs(data, residual_dps)
     found: dict[str, Repeatability | None] = {}

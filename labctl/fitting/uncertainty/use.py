@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -94,9 +93,3 @@ def evidence_of(recording: Recording, model: str | None, effects: list[str] | No
         return {}
     data = fit_data_of(recording)
     return use_evidence(data, with_shapes(data, preset_for(model, effects or [])))
-
-
-def combined_dps(*components_dps: float | None) -> float | None:
-    """Return the root of the sum of squares of standard uncertainties; None as soon as one of them is not known."""
-    known = [component for component in components_dps if component is not None]
-    return math.hypot(*known) if len(known) == len(components_dps) else None

@@ -47,6 +47,11 @@ def refuse_doubled_columns(name: str, channels: tuple[RawChannelJson, ...], othe
         )
 
 
+def temperature_instrument(bench: BenchFile) -> str:
+    """Return the name of the reference instrument by whose temperature the units are fitted; empty: their own."""
+    return next((each.name for each in bench.references if each.is_temperature), "")
+
+
 def reference_notes(bench: BenchFile) -> str:
     """Return what a recording says about the instrument whose temperature it is fitted by; empty for the unit's own."""
     for each in bench.references:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from datetime import datetime
+from datetime import date, datetime
 
 from labctl.calibration import build_calibration, read_calibration
 from labctl.fitting import fit
@@ -53,8 +53,9 @@ def fit_unit(store: Store, serial: str, request: FitRequest, at: datetime) -> Fi
 
     def build(version: int) -> NewCalibration:
         calibration = build_calibration(
-            source.info, result, version=version, parent=None, issued_at=at, provenance=made, evidence=evidence
-        )
+            source.info, result, version=version, parent=None, issued_at=at, provenance=made, evidence=evidence,
+            used_on=days_of(measured.rows),
+        )  # fmt: skip
         answer: KeptFit = {
             "serial": serial, "version": version, **result.to_json(), "recording": recording,
             "recordings": list(recordings), "campaign": campaign, "recipe": recipe, "bench": bench,
@@ -78,6 +79,11 @@ def reference_of(rows: Sequence[RecordingRow]) -> dict[str, str]:
     infos = [RecordingInfo.model_validate(row.info) for row in rows]
     known = dict.fromkeys(REFERENCES[info.rate_reference] for info in infos if info.rate_reference is not None)
     return {"rate_reference": "; ".join(known)} if known else {}
+
+
+def days_of(rows: Sequence[RecordingRow]) -> list[date]:
+    """Return the days on which recordings were begun."""
+    return [RecordingInfo.model_validate(row.info).started_at.date() for row in rows]
 
 
 def list_calibrations(store: Store, serial: str) -> list[CalibrationRow]:

@@ -23,7 +23,7 @@ from labctl.json_types.models import ChangeFigures, KeptChange, UsualRange
 from labctl.recording import Recording
 from labctl.services.cache import RecentResults, cached
 from labctl.services.calibrations.comparison import worse_than_before
-from labctl.services.calibrations.fitting import reference_of, several
+from labctl.services.calibrations.fitting import days_of, reference_of, several
 from labctl.services.calibrations.next_version import keep_next_version
 from labctl.services.criticism.evaluation import model_of
 from labctl.services.criticism.measurements import Measurements
@@ -205,8 +205,9 @@ def _keep(store: Store, serial: str, change: _Change, at: datetime) -> ImproveRe
 
     def build(version: int) -> NewCalibration:
         calibration = build_calibration(
-            change.points.info, after, version=version, parent=parent, issued_at=at, provenance=made, evidence=evidence
-        )
+            change.points.info, after, version=version, parent=parent, issued_at=at, provenance=made, evidence=evidence,
+            used_on=days_of(change.measured.rows),
+        )  # fmt: skip
         answer: KeptChange = {
             "serial": serial, "version": version, "parent": parent, **change.figures,
             "left_out": list(calibration.document["left_out"]), "hash": calibration.hash,

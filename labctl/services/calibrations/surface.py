@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from labctl.calibration import Calibration, read_calibration
@@ -39,6 +41,16 @@ def surface_of(store: Store, serial: str, version: int, rate_points: int, temper
     validity = Validity.model_validate(calibration.document["validity"])
     left_out = list(calibration.document["left_out"])
     return SurfaceResponse(serial=serial, version=version, validity=validity, held=held, left_out=left_out, axes=axes)
+
+
+def errors_on_grid(
+    store: Store, row: CalibrationRecord, rates: Sequence[float], temperatures: Sequence[float]
+) -> dict[str, list[list[float]]]:
+    """Return axis -> modelled error, deg/s, a row for each temperature, deg C. Raises BadInput, NotConverged."""
+    calibration = read_calibration(row.document)
+    held = _held(store, row, calibration)
+    at = np.asarray(rates, dtype=np.float64), np.asarray(temperatures, dtype=np.float64)
+    return {axis: _error(calibration.fitted, axis, *at, held).tolist() for axis in calibration.axes}
 
 
 def _rate_span(store: Store, row: CalibrationRecord, calibration: Calibration) -> tuple[float, float]:

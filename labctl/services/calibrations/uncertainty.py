@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import asdict
-
-import numpy as np
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
 
 from labctl.calibration import Calibration, read_calibration
-from labctl.fitting.data.temperature.channel import STAND_IN_C
+from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.numeric.blas_threads import single_threaded
-from labctl.fitting.uncertainty import COVERAGE, AxisEvidence, RateUncertainty, rate_uncertainty
+from labctl.fitting.uncertainty import (
+    COVERAGE,
+    AxisEvidence,
+    BenchConditions,
+    RateUncertainty,
+    coefficient_budgets,
+    rate_uncertainty,
+)
+from labctl.fitting.uncertainty.combination import LEVEL
+from labctl.fitting.uncertainty.document import Covered
+from labctl.services.calibrations.contributions import contributions_over
+from labctl.services.criticism.versions import version_of
+from labctl.services.schemas.budget import BudgetResponse
 from labctl.services.schemas.uncertainty import AxisUncertainty, UncertaintyGrid, UncertaintyResponse
 from labctl.store import Store
-
-#: Rates of a grid are at least this share of the fastest apart.
-RATES_APART = 0.02
-#: A calibration over less is one temperature, K.
-LEAST_SPAN_K = 1.0
 
 
 def uncertainty_at(
@@ -25,16 +30,57 @@ def uncertainty_at(
 ) -> UncertaintyResponse:
     """Return the uncertainty about each axis, with `grid` also over the validity. Raises NotFound, BadInput."""
     document, _ = store.calibrations.document(serial, version)
-    calibration = read_calibration(document)
-    found = uncertainty_of(calibration, rate_dps, temperature_c)
+    return uncertainty_answer(read_calibration(document), rate_dps, temperature_c, grid=grid)
+
+
+def uncertainty_of_unit(
+    store: Store, serial: str, version: int | None, rate_dps: float | None, temperature_c: float | None, *, grid: bool
+) -> UncertaintyResponse:
+    """Return the uncertainty of a version, or of the newest, at half of the fastest rate and the middle temperature.
+
+    Raises NotFound, BadInput, NotEnoughData.
+    """
+    calibration = read_calibration(version_of(store, serial, version).document)
+    covered = Covered(calibration.rate_dps, calibration.temperature_c)
+    rates, warm = covered.rates(_Known.of(calibration).evidence), covered.temperatures()
+    return uncertainty_answer(
+        calibration,
+        max(rates) / 2 if rate_dps is None else rate_dps,
+        warm[len(warm) // 2] if temperature_c is None else temperature_c,
+        grid=grid,
+    )
+
+
+@single_threaded
+def uncertainty_answer(
+    calibration: Calibration, rate_dps: float, temperature_c: float, *, grid: bool = False
+) -> UncertaintyResponse:
+    """Return the uncertainty of a calibration about each axis with its budgets, with `grid` also over the validity.
+
+    Raises BadInput, NotEnoughData.
+    """
+    known = _Known.of(calibration)
+    found = known.at(rate_dps, temperature_c)
+    coefficients = coefficient_budgets(
+        known.fitted, temperature_c, evidence=known.evidence, name=known.name, bench=known.bench
+    )
+    budgets = {axis: BudgetResponse.model_validate(one.budget.to_json()) for axis, one in found.items()}
     return UncertaintyResponse(
-        serial=serial,
-        version=version,
+        serial=calibration.serial,
+        version=calibration.version,
         rate_dps=rate_dps,
         temperature_c=temperature_c,
         coverage_factor=COVERAGE,
+        coverage=LEVEL,
         inside=is_inside(calibration, rate_dps, temperature_c),
         axes={axis: _response(one) for axis, one in found.items()},
+        budget=budgets,
+        coefficients={
+            axis: {name: BudgetResponse.model_validate(one.to_json()) for name, one in named.items()}
+            for axis, named in coefficients.items()
+        },
+        not_stated=list(dict.fromkeys(name for one in budgets.values() for name in one.not_stated)),
+        overdue=any(one.overdue for one in budgets.values()),
         grid=uncertainty_grid(calibration) if grid else None,
     )
 
@@ -42,42 +88,23 @@ def uncertainty_at(
 @single_threaded
 def uncertainty_grid(calibration: Calibration) -> UncertaintyGrid:
     """Return the uncertainty about each axis on a small grid over the validity. Raises BadInput, NotEnoughData."""
-    rates, temperatures = grid_rates(*_rate_span(calibration)), grid_temperatures(*calibration.temperature_c)
-    found = [[uncertainty_of(calibration, rate, warm) for rate in rates] for warm in temperatures]
+    covered, known = Covered(calibration.rate_dps, calibration.temperature_c), _Known.of(calibration)
+    rates, temperatures = covered.rates(known.evidence), covered.temperatures()
+    found = [[known.at(rate, warm) for rate in rates] for warm in temperatures]
     axes = {axis: [[_response(place[axis]) for place in row] for row in found] for axis in found[0][0]}
-    return UncertaintyGrid(rate_dps=rates, temperature_c=temperatures, axes=axes)
-
-
-def grid_rates(low_dps: float, high_dps: float) -> list[float]:
-    """Return zero, both limits and half of each, deg/s, as far as they are within the limits and apart, rising."""
-    apart = RATES_APART * max(abs(low_dps), abs(high_dps))
-    found: list[float] = []
-    for rate in (0.0, low_dps, high_dps, low_dps / 2, high_dps / 2):
-        if low_dps <= rate <= high_dps and all(abs(rate - other) > apart for other in found):
-            found.append(rate)
-    return sorted(found)
-
-
-def grid_temperatures(low_c: float, high_c: float) -> list[float]:
-    """Return the lowest, the middle and the highest temperature, deg C, or the middle of a calibration at one.
-
-    Without limits, of a calibration made without a thermometer, any one stands for all.
-    """
-    if not math.isfinite(high_c - low_c):
-        return [STAND_IN_C]
-    middle = (low_c + high_c) / 2
-    return [low_c, middle, high_c] if high_c - low_c >= LEAST_SPAN_K else [middle]
+    over = contributions_over(rates, temperatures, known.at)
+    return UncertaintyGrid(rate_dps=rates, temperature_c=temperatures, axes=axes, contributions=over)
 
 
 def uncertainty_of(calibration: Calibration, rate_dps: float, temperature_c: float) -> dict[str, RateUncertainty]:
     """Return axis -> the uncertainty of a calibration's corrected rate. Raises BadInput, NotEnoughData."""
-    return rate_uncertainty(
-        calibration.fitted,
-        rate_dps,
-        temperature_c,
-        evidence=_evidence(calibration),
-        name=f"{calibration.serial} version {calibration.version}",
-    )
+    return _Known.of(calibration).at(rate_dps, temperature_c)
+
+
+def places_of(calibration: Calibration) -> tuple[list[float], list[float]]:
+    """Return the rates, deg/s, and temperatures, deg C, of a small grid over the validity."""
+    covered = Covered(calibration.rate_dps, calibration.temperature_c)
+    return list(covered.rates(_Known.of(calibration).evidence)), list(covered.temperatures())
 
 
 def is_inside(calibration: Calibration, rate_dps: float, temperature_c: float) -> bool:
@@ -86,18 +113,32 @@ def is_inside(calibration: Calibration, rate_dps: float, temperature_c: float) -
     return cold <= temperature_c <= warm and slow <= rate_dps <= fast
 
 
-def _evidence(calibration: Calibration) -> dict[str, AxisEvidence]:
-    return {axis: AxisEvidence.from_json(one) for axis, one in calibration.document.get("use", {}).items()}
+@dataclass(frozen=True)
+class _Known:
+    """What a document holds of the uncertainty, read once for many places."""
 
+    fitted: FittedModel
+    evidence: Mapping[str, AxisEvidence]
+    bench: BenchConditions | None  #: None: an older labctl made the version
+    name: str
 
-def _rate_span(calibration: Calibration) -> tuple[float, float]:
-    """Return the calibrated rates, deg/s; of a model without a limit those that were measured, else 0."""
-    low, high = calibration.rate_dps
-    if np.isfinite(low) and np.isfinite(high):
-        return low, high
-    measured = [rate for one in _evidence(calibration).values() for rate in one.model_error.rate_dps.tolist()]
-    return min(measured, default=0.0), max(measured, default=0.0)
+    @staticmethod
+    def of(calibration: Calibration) -> _Known:
+        stated = calibration.document.get("standards")
+        return _Known(
+            calibration.fitted,
+            {axis: AxisEvidence.from_json(one) for axis, one in calibration.document.get("use", {}).items()},
+            None if stated is None else BenchConditions.from_json(stated),
+            f"{calibration.serial} version {calibration.version}",
+        )
+
+    def at(self, rate_dps: float, temperature_c: float) -> dict[str, RateUncertainty]:
+        return rate_uncertainty(
+            self.fitted, rate_dps, temperature_c, evidence=self.evidence, name=self.name, bench=self.bench
+        )
 
 
 def _response(found: RateUncertainty) -> AxisUncertainty:
-    return AxisUncertainty.model_validate(asdict(found))
+    known = asdict(found)
+    known.pop("budget")
+    return AxisUncertainty.model_validate(known)

@@ -13,6 +13,7 @@ from labctl.log.campaign_journal import LoggedJournal
 from labctl.log.context import for_campaign
 from labctl.services.benches.confirmation import SafeStateRetry, describe_safe_state
 from labctl.services.benches.lease import holding, open_for
+from labctl.services.benches.standards import overdue_events
 from labctl.services.benches.start_confirmation import confirmation_text, start_questions
 from labctl.services.campaigns.bench_lending import BenchLending, lending_journal
 from labctl.services.campaigns.preparation import Prepared, clock_for, prepare, refuse_unconfirmed, seeded
@@ -61,8 +62,8 @@ def _engine(
     lending: BenchLending | None = None,
 ) -> Engine:
     row = store.campaigns.get(prepared.id)
-    gyros = BenchFile.model_validate({**row.bench, "simulation": None}).gyros
-    serials = {gyro.name: gyro.serial for gyro in gyros}
+    bench = BenchFile.model_validate({**row.bench, "simulation": None})
+    serials = {gyro.name: gyro.serial for gyro in bench.gyros}
     journal = LoggedJournal(store.campaigns.journal(prepared.id), prepared.id, row.bench_name, prepared.plan, serials)
     return Engine(
         prepared.plan,
@@ -73,6 +74,7 @@ def _engine(
         control=control or Control(),
         observer=observe,
         time=prepared.time,
+        notices=overdue_events(bench.standards, prepared.clock.utc().date()),
     )
 
 

@@ -25,7 +25,9 @@ from labctl.services.benches.reference_columns import (
     reference_channels,
     reference_notes,
     refuse_doubled_columns,
+    temperature_instrument,
 )
+from labctl.services.benches.standards import standards_of
 from labctl.services.planning.loading import load_recipe, with_drivers
 from labctl.services.planning.timeline import step_json
 from labctl.store import NewCampaign, NewUnit, Store
@@ -231,6 +233,8 @@ def _unit(
             "technology": identity.technology or None,
             "datasheet": dict(identity.datasheet),
             "output": {axis: dict(unit) for axis, unit in identity.output.items()},
+            "standards": standards_of(bench),
+            "thermometer": temperature_instrument(bench),
         }
     )
     channels = tuple(raw_channel(channel) for channel in gyro.channels)

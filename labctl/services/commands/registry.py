@@ -7,6 +7,7 @@ from typing import Any
 from labctl.services.admin import api_keys
 from labctl.services.calibrations import certification, fitting, revision
 from labctl.services.campaigns.bench_status import bench_status
+from labctl.services.certificates import issue as certificates
 from labctl.services.commands.command import Command, Newest, NoContent
 from labctl.services.commands.context import CommandContext
 from labctl.services.commands.encoding import log_file, recording_files
@@ -30,6 +31,7 @@ from labctl.services.schemas.benches import BenchCheckResponse, BenchStatus, Che
 from labctl.services.schemas.calibrations import FitRequest, FitResponse, ImproveRequest, ImproveResponse
 from labctl.services.schemas.campaigns import CampaignResponse, ConfirmRequest, ReasonRequest
 from labctl.services.schemas.certification import CertificationResponse, CertifyRequest, RevokeRequest
+from labctl.services.schemas.documents.certificates import CertificateRequest, CertificateResponse
 from labctl.services.schemas.recordings import (
     ExampleRequest,
     ImportResponse,
@@ -71,6 +73,10 @@ def _certify(context: CommandContext, asked: ToVersion[CertifyRequest]) -> Certi
 
 def _revoke(context: CommandContext, asked: ToVersion[RevokeRequest]) -> CertificationResponse:
     return certification.revoke(context.store, asked.serial, asked.version, asked.body, context.now())
+
+
+def _issue_certificate(context: CommandContext, asked: ToVersion[CertificateRequest]) -> CertificateResponse:
+    return certificates.issue(context.store, asked.serial, asked.version, asked.body, context.now())
 
 
 def _start_campaign(context: CommandContext, asked: CampaignStart) -> CampaignResponse | ScheduledResponse:
@@ -174,6 +180,13 @@ CERTIFY = Command(
 )
 REVOKE = Command(
     method="POST", path=_UNIT + "/{version}/revoke", handler=_revoke, responses={200: CertificationResponse}
+)
+ISSUE_CERTIFICATE = Command(
+    method="POST",
+    path=_UNIT + "/{version}/certificate",
+    handler=_issue_certificate,
+    responses={201: CertificateResponse},
+    computes=True,
 )
 START_CAMPAIGN: Command[CampaignStart, CampaignResponse | ScheduledResponse] = Command(
     method="POST",

@@ -6,6 +6,7 @@ from pydantic import Field
 
 from labctl.json_types.models import LeftOut
 from labctl.services.schemas.base import ResponseModel
+from labctl.services.schemas.budget import BudgetResponse, ContributionsOver
 from labctl.services.schemas.calibrations import Validity
 
 
@@ -27,14 +28,21 @@ class AxisUncertainty(ResponseModel):
         description="What `repeatability_dps` was computed from: differences between "
         "runs, the data sheet, a static record, or none of these."
     )
+    standards_dps: float | None = Field(
+        description="Standard uncertainty from all stated reference standards of the bench, deg/s; null: none is "
+        "stated."
+    )
     same_run_dps: float | None = Field(
-        description="Coefficients and model combined, for use in the same power-on as the calibration, deg/s; null "
-        "if one of the two is unknown."
+        description="Coefficients, model and standards combined, for use in the same power-on as the calibration, "
+        "deg/s; null if coefficients or model are unknown."
     )
     combined_dps: float | None = Field(
-        description="Coefficients, model and repeatability combined, deg/s; null if one of the three is unknown."
+        description="`expanded_dps` over `coverage_factor`, deg/s; null if coefficients, model or repeatability are "
+        "unknown."
     )
-    expanded_dps: float | None = Field(description="`combined_dps` times the coverage factor, deg/s.")
+    expanded_dps: float | None = Field(
+        description="Expanded uncertainty U of the budget, deg/s; it covers with a probability of 95.45 %."
+    )
     unknown: dict[str, str] = Field(
         description="Which of coefficients, model and repeatability are unknown, each with the reason."
     )
@@ -51,6 +59,9 @@ class UncertaintyGrid(ResponseModel):
     axes: dict[str, list[list[AxisUncertainty]]] = Field(
         description="For each axis: one row per temperature, one entry per rate in each row."
     )
+    contributions: dict[str, ContributionsOver] = Field(
+        default_factory=dict, description="For each axis: the lines of the budget over rate and over temperature."
+    )
 
 
 class UncertaintyResponse(ResponseModel):
@@ -60,9 +71,16 @@ class UncertaintyResponse(ResponseModel):
     version: int
     rate_dps: float
     temperature_c: float
-    coverage_factor: float
+    coverage_factor: float = Field(description="`expanded_dps` over `combined_dps`.")
+    coverage: float = Field(description="Probability that the interval covers.")
     inside: bool = Field(description="Whether rate and temperature are within the calibrated range.")
     axes: dict[str, AxisUncertainty]
+    budget: dict[str, BudgetResponse] = Field(description="For each axis: the budget of the corrected rate, deg/s.")
+    coefficients: dict[str, dict[str, BudgetResponse]] = Field(
+        description="For each axis: the budgets of bias, scale factor and misalignments at this temperature."
+    )
+    not_stated: list[str] = Field(description="Standards that the bench does not state; they are not in U.")
+    overdue: bool = Field(description="Whether a standard was past its due date when it was used.")
     grid: UncertaintyGrid | None = Field(
         default=None, description="The uncertainty over the calibrated range; null unless `grid` was requested."
     )

@@ -17,6 +17,7 @@ from instruments.protocols.arrick_c4_settings import StepperSettings
 from instruments.simulation import open_simulation
 from labctl.errors import BadInput
 from labctl.recording import Recording, RecordingInfo
+from labctl.services.benches.standards import standards_of
 from procedures.contracts.steps import Acquire, Mount, MoveChamber, PowerOff, PowerOn
 from procedures.planning.plan import Plan
 from procedures.recipe.profiles import Ramp, SineSweep
@@ -179,6 +180,7 @@ class _Walk:
             max_rate_dps=settings.max_rate_dps,
             technology=settings.technology or None,
             datasheet=settings.datasheet,
+            standards=standards_of(self._bench),
             notes=f"simulated: recipe {self._plan.recipe.name}, seed {self._seed()}",
         )
         columns = {name: np.concatenate([part[name] for part in self._parts]) for name in self._parts[0]}

@@ -16,11 +16,10 @@ from labctl.errors import BadInput
 from labctl.fitting import FittedModel, fit
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.uncertainty import AxisEvidence, RateUncertainty, evidence_of, rate_uncertainty
+from labctl.fitting.uncertainty.grid import grid_rates, grid_temperatures
 from labctl.fitting.uncertainty.local_model_error import LocalModelError
 from labctl.recording import Recording, read_recording
 from labctl.services.calibrations.uncertainty import (
-    grid_rates,
-    grid_temperatures,
     is_inside,
     uncertainty_grid,
     uncertainty_of,

@@ -18,23 +18,25 @@ import { query, updateQuery } from "../core/router.js";
 import { ladderFigure } from "../explore/error_ladder.js";
 import { askCertification, askRevocation, certificationTable } from "../unit/certification.js";
 import { coefficients, comparison } from "../unit/coefficients.js";
+import { certificateFiles } from "../unit/certificate.js";
 import { exportFiles } from "../unit/export_files.js";
 import { inForce } from "../unit/in_force.js";
 import { trendCard } from "../trend/card.js";
 import { uncertaintyInUse } from "../unit/uncertainty.js";
 import { versionFacts } from "../unit/version_facts.js";
 
-/** @import { CalibrationRow, Unit } from "../../../types/api.js" */
+/** @import { CalibrationRow, Certificate, Unit } from "../../../types/api.js" */
 
 /** @import { PageContext } from "../../../types/pages.js" */
 
 /** @param {PageContext} context */
 export async function page({ params, signal }) {
   const path = { serial: params.serial };
-  const [unit, rows, history] = await Promise.all([
+  const [unit, rows, history, issued] = await Promise.all([
     get("/api/units/{serial}", { path, signal }),
     get("/api/units/{serial}/calibrations", { path, signal }),
     get("/api/units/{serial}/certifications", { path, signal }),
+    get("/api/units/{serial}/certificates", { path, signal }),
   ]);
   const force = history.find((act) => act.version === unit.certified_version && act.act === "certify");
   const explore = `/explore?unit=${encodeURIComponent(unit.serial)}`;
@@ -49,7 +51,7 @@ export async function page({ params, signal }) {
     h("section", { class: "card", "aria-label": "In force" }, inForce(unit, rows, force)),
     rows.length
       ? [
-          versions(unit, rows, explore),
+          versions(unit, rows, issued, explore),
           ladder(unit.serial, signal),
           unit.recordings.length > 1 ? trendCard(unit.serial, rows, signal) : null,
           ...versionCards(unit.serial, rows, signal),
@@ -80,9 +82,10 @@ export async function page({ params, signal }) {
 /**
  * @param {Unit} unit
  * @param {readonly CalibrationRow[]} rows
+ * @param {readonly Certificate[]} issued
  * @param {string} explore
  */
-function versions(unit, rows, explore) {
+function versions(unit, rows, issued, explore) {
   /** @param {CalibrationRow} row */
   const act = (row) =>
     row.certified
@@ -133,6 +136,7 @@ function versions(unit, rows, explore) {
               { class: "row tight", style: "gap: .2rem" },
               act(row),
               h("details", {}, h("summary", {}, "Files"), exportFiles(unit, row.version)),
+              certificateFiles(unit.serial, row.version, issued),
             ),
         },
       ],

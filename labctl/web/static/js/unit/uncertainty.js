@@ -7,6 +7,7 @@ import { number } from "../core/format.js";
 import { busyIndicator, notice, table } from "../core/components.js";
 import { labelledField } from "../core/fields.js";
 import { query, updateQuery } from "../core/router.js";
+import { budgetLines, contributionFigures } from "./budget.js";
 import { atPlace, joined, shown, titleOf, unknown } from "./uncertainty_parts.js";
 
 /** @import { AxisUncertainty, Uncertainty, Validity, Version } from "../../../types/api.js" */
@@ -34,7 +35,7 @@ export function uncertaintyInUse(serial, signal) {
       try {
         const place = placeOf(version.validity);
         const answer = await get(PATH, { path, query: { ...place, grid: true }, signal });
-        if (own === latest) setChildren(element, over(answer), parts(answer, place, path, signal));
+        if (own === latest) setChildren(element, over(answer), parts(answer, place, path, signal), pictures(answer));
       } catch (error) {
         // a model that needs more than a rate and a temperature, or without data to be uncertain by
         if (!isAbort(error) && own === latest)
@@ -99,6 +100,11 @@ function over({ grid, coverage_factor }) {
   );
 }
 
+/** @param {Uncertainty} answer */
+function pictures({ grid }) {
+  return grid ? h("div", { class: "stack" }, h("h3", {}, "Contributions"), contributionFigures(grid.contributions)) : null;
+}
+
 /**
  * An expanded uncertainty; where it is unknown, what is known of it below.
  * @param {AxisUncertainty} one
@@ -142,7 +148,7 @@ function reasons(cells) {
       ? h(
           "p",
           { class: "small" },
-          "“same run”: uncertainty of coefficients and model only, expanded; valid only until the unit is switched off.",
+          "“same run”: uncertainty of coefficients, model and standards, expanded; valid only until the unit is switched off.",
         )
       : null,
   );
@@ -179,12 +185,12 @@ function parts(first, place, path, signal) {
     try {
       const asked = { rate_dps: Number(rate.value), temperature_c: Number(warm.value) };
       const answer = await get(PATH, { path, query: asked, signal });
-      if (own === latest) setChildren(result, atPlace(answer));
+      if (own === latest) setChildren(result, atPlace(answer), budgetLines(answer));
     } catch (error) {
       if (!isAbort(error) && own === latest) setChildren(result, notice("bad", messageOf(error)));
     }
   }
-  setChildren(result, atPlace(first));
+  setChildren(result, atPlace(first), budgetLines(first));
   return h(
     "div",
     { class: "stack" },

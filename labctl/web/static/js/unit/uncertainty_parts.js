@@ -34,6 +34,7 @@ const PARTS = [
     from: (one) => one.repeatability_source ?? "",
   },
 ];
+const STANDARDS = "Reference standards of the bench";
 /**
  * Uncertainties have two significant digits (GUM 7.2.6).
  * @param {number | null} u_dps
@@ -64,13 +65,18 @@ export function atPlace(answer) {
       /** @param {AxisUncertainty} one */
       from: (one) => one.unknown[key] ?? from(one),
     })),
+    {
+      title: STANDARDS,
+      of: (one) => (one.standards_dps === null ? h("span", { class: "warn-text" }, "not stated") : shown(one.standards_dps)),
+      from: (one) => (one.standards_dps === null ? "the bench file states none" : "the budget below names each"),
+    },
     { title: "Combined", of: (one) => figure(one.combined_dps), from: becauseOf },
     { title: `Expanded, k = ${k}`, of: (one) => figure(one.expanded_dps, true), from: becauseOf },
     axes.some(([, one]) => one.expanded_dps === null && one.same_run_dps !== null)
       ? {
           title: `Same run, expanded, k = ${k}`,
           of: (one) => figure(one.same_run_dps === null ? null : k * one.same_run_dps),
-          from: () => "coefficients and model only; valid until the unit is switched off",
+          from: () => "coefficients, model and standards; valid until the unit is switched off",
         }
       : null,
   ];

@@ -1,0 +1,40 @@
+"""The laboratory that a bench belongs to, as its certificates name it (ISO/IEC 17025:2017, 7.8.2.1 b and c)."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+#: Where a calibration was performed, in the words of the DCC schema.
+Place = Literal["laboratory", "customer", "laboratoryBranch", "customerBranch", "other"]
+#: ISO 3166-1 alpha-2.
+COUNTRY = r"^[A-Z]{2}$"
+#: One line of text; an empty one is a fact that is missing.
+LINE = r"^[^\x00-\x1f\x7f]{0,300}$"
+
+
+class Contact(BaseModel):
+    """Name and address of an organisation; what is empty was not stated."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, str_strip_whitespace=True)
+
+    name: str = Field(default="", pattern=LINE)
+    street: str = Field(default="", pattern=LINE, description="Street and number, or box.")
+    post_code: str = Field(default="", pattern=LINE)
+    city: str = Field(default="", pattern=LINE)
+    country: str = Field(default="", pattern=rf"{COUNTRY}|^$", description="ISO 3166-1 alpha-2, as DE.")
+    email: str = Field(default="", pattern=LINE)
+    phone: str = Field(default="", pattern=LINE)
+
+
+class Laboratory(Contact):
+    """The laboratory of a bench file: `[laboratory]`."""
+
+    accreditation: str = Field(default="", pattern=LINE, description="Code under which it is accredited; empty: none.")
+    place: Place = "laboratory"
+    #: Address of labctl as a customer reaches it: a certificate's QR code leads to the version there.
+    url: str = Field(default="", pattern=r"^(https?://[^\s\x00-\x1f]{1,300})?$")
+    #: In front of the number of every certificate: two laboratories then have none in common.
+    number_prefix: str = Field(default="", pattern=r"^[A-Za-z0-9._/-]{0,40}$")
+    procedure: str = Field(default="", pattern=LINE, description="Number of its written procedure.")

@@ -1,0 +1,239 @@
+"""A certificate as Digital Calibration Certificate: XML by the schema 3.3.0 of PTB, the same bytes every time."""
+
+from __future__ import annotations
+
+from itertools import groupby
+from xml.etree import ElementTree as ET
+
+from labctl.certificates.document import Certificate, StandardUsed, StateOfItem
+from labctl.certificates.units import readable
+from labctl.certificates.xml_parts import DCC, ENGLISH, SI, child, contact, optional, quantity, texts
+
+VERSION = "3.3.0"
+XSI = "http://www.w3.org/2001/XMLSchema-instance"
+#: Identifiers of statements and results: what the documentation of certificates refers to.
+STATED = "https://ptb.de/dcc"
+
+
+def dcc_of(given: Certificate) -> bytes:
+    """Return the XML of a certificate."""
+    for prefix, space in (("dcc", DCC), ("si", SI), ("xsi", XSI)):
+        ET.register_namespace(prefix, space)
+    root = ET.Element(f"{{{DCC}}}digitalCalibrationCertificate", {"schemaVersion": VERSION})
+    root.set(f"{{{XSI}}}schemaLocation", f"{STATED} {STATED}/v{VERSION}/dcc.xsd")
+    _administrative(child(root, "administrativeData"), given)
+    _measured(child(root, "measurementResults"), given)
+    ET.indent(root, " ")
+    return ET.tostring(root, encoding="utf-8", xml_declaration=True) + b"\n"
+
+
+def _administrative(parent: ET.Element, given: Certificate) -> None:
+    _software(child(parent, "dccSoftware"), given.method.software)
+    _core(child(parent, "coreData"), given)
+    _item(child(parent, "items"), given)
+    laboratory = child(parent, "calibrationLaboratory")
+    optional(laboratory, "calibrationLaboratoryCode", given.laboratory.accreditation)
+    contact(laboratory, "contact", given.laboratory)
+    people = child(parent, "respPersons")
+    _person(people, given.authorised.name, "authorised the results", signs=True)
+    if given.issued_by != given.authorised.name:
+        _person(people, given.issued_by, "issued the certificate", signs=False)
+    reached = f"Contact: {given.customer.contact}" if given.customer.contact else ""
+    contact(parent, "customer", given.customer, reached)
+    _statements(child(parent, "statements"), given)
+
+
+def _software(parent: ET.Element, software: str) -> None:
+    name, _, release = software.rpartition(" ")
+    made = child(parent, "software")
+    texts(made, "name", name)
+    child(made, "release", f"v{release}")
+    child(made, "type", "application")
+
+
+def _core(parent: ET.Element, given: Certificate) -> None:
+    child(parent, "countryCodeISO3166_1", given.laboratory.country)
+    child(parent, "usedLangCodeISO639_1", ENGLISH)
+    child(parent, "mandatoryLangCodeISO639_1", ENGLISH)
+    child(parent, "uniqueIdentifier", given.number)
+    identifications = child(parent, "identifications")
+    _identification(identifications, "calibrationLaboratory", given.calibration.hash, "SHA-256 of the calibration")
+    _identification(identifications, "calibrationLaboratory", given.calibration.address, "Address of the calibration")
+    if given.customer.order:
+        _identification(identifications, "customer", given.customer.order, "Order")
+    if given.item.received is not None:
+        child(parent, "receiptDate", given.item.received.isoformat())
+    child(parent, "beginPerformanceDate", given.performed_from.isoformat())
+    child(parent, "endPerformanceDate", given.performed_until.isoformat())
+    child(parent, "performanceLocation", given.laboratory.place)
+    child(parent, "issueDate", given.issued_on.isoformat())
+    if given.replaces is not None:
+        changed = child(parent, "reportAmendedSubstituted")
+        child(changed, "typeOfChange", "amended")
+        child(changed, "replacedUniqueIdentifier", given.replaces.number)
+        before = child(parent, "previousReport")
+        texts(before, "referral", "Certificate that this one replaces")
+        child(before, "referralID", given.replaces.number)
+        child(before, "procedure", "SHA-256 of its JSON")
+        child(before, "value", given.replaces.hash)
+        texts(before, "description", f"Reason: {given.replaces.reason}")
+
+
+def _identification(parent: ET.Element, issuer: str, value: str, name: str) -> None:
+    made = child(parent, "identification")
+    child(made, "issuer", issuer)
+    child(made, "value", value)
+    texts(made, "name", name)
+
+
+def _item(parent: ET.Element, given: Certificate) -> None:
+    made = child(parent, "item")
+    item = given.item
+    texts(made, "name", item.description)
+    texts(made, "description", f"Axes: {', '.join(item.axes)}.", f"Condition on receipt: {item.condition}")
+    texts(child(made, "manufacturer"), "name", item.manufacturer)
+    child(made, "model", item.model)
+    identifications = child(made, "identifications")
+    _identification(identifications, "manufacturer", item.serial, "Serial number")
+    if item.identification:
+        _identification(identifications, "customer", item.identification, "Customer's number")
+
+
+def _person(parent: ET.Element, name: str, role: str, *, signs: bool) -> None:
+    made = child(parent, "respPerson")
+    texts(child(made, "person"), "name", name)
+    child(made, "role", role)
+    child(made, "mainSigner", "true" if signs else "false")
+
+
+def _statements(parent: ET.Element, given: Certificate) -> None:
+    for text in given.statements:
+        _statement(parent, "Statement", text)
+    _statement(parent, "Adjustment", given.adjustment)
+    _statement(parent, "Results of external providers", given.external)
+    _statement(parent, "Authorisation", f"{given.authorised.name}, {given.authorised.at:%Y-%m-%d %H:%M} UTC: "
+               f"{given.authorised.reason}")  # fmt: skip
+    if given.due is not None:
+        made = _statement(parent, "Next calibration", "Agreed with the customer.")
+        child(made, "date", given.due.isoformat())
+    found = given.conformity
+    if found is None:
+        return
+    made = _statement(parent, "Conformity", found.statement, norm=("ILAC-G8:09/2019",), reference=found.specification)
+    child(made, "conformity", "pass" if found.passed else "fail")
+    data = child(made, "data")
+    quantity(data, "Limit of the error", [found.limit_dps], "deg/s")
+    quantity(data, "Guard band", [found.guard_band_dps], "deg/s")
+    quantity(data, "Largest error of the corrected rate", [found.largest_error_dps], "deg/s",
+             expanded=[found.expanded_dps], k=[max(each.k for each in given.results)])  # fmt: skip
+
+
+def _statement(
+    parent: ET.Element, name: str, text: str, *, norm: tuple[str, ...] = (), reference: str = ""
+) -> ET.Element:
+    made = child(parent, "statement")
+    texts(made, "name", name)
+    for each in norm:
+        child(made, "norm", each)
+    optional(made, "reference", reference)
+    texts(made, "declaration", text)
+    return made
+
+
+def _measured(parent: ET.Element, given: Certificate) -> None:
+    made = child(parent, "measurementResult")
+    texts(made, "name", f"Calibration of {given.item.serial}, version {given.calibration.version}")
+    _method(child(child(made, "usedMethods"), "usedMethod"), given)
+    _software(child(made, "usedSoftware"), given.method.software)
+    equipment = child(made, "measuringEquipments")
+    for each in given.standards:
+        _standard(equipment, each)
+    conditions = child(made, "influenceConditions")
+    for condition in given.environment:
+        one = child(conditions, "influenceCondition")
+        texts(one, "name", condition.name)
+        data = child(one, "data")
+        quantity(data, "Least and largest mean of a data set", [condition.low, condition.high], condition.unit)
+    _results(child(made, "results"), given)
+
+
+def _method(made: ET.Element, given: Certificate) -> None:
+    method = given.method
+    texts(made, "name", method.name)
+    texts(
+        made,
+        "description",
+        f"Error model {method.model}: {', '.join(method.effects)}.",
+        f"Recordings: {', '.join(map(str, method.recordings))}.",
+        f"Additions to, deviations or exclusions from the method: {method.deviations}",
+    )
+    optional(made, "reference", method.procedure)
+    if method.plan_hash:
+        child(made, "reference", f"plan SHA-256 {method.plan_hash}")
+
+
+def _standard(parent: ET.Element, given: StandardUsed) -> None:
+    made = child(parent, "measuringEquipment")
+    texts(made, "name", given.name or given.quantity)
+    said = [f"Reference standard of {given.quantity}."]
+    said += [f"Calibrated {given.calibrated}."] if given.calibrated else []
+    said += [f"Due {given.due}."] if given.due else []
+    said += [f"Traceability: {given.traceability}."] if given.traceability else []
+    texts(made, "description", *said)
+    if given.certificate:
+        identification = child(made, "identifications")
+        _identification(identification, "calibrationLaboratory", given.certificate,
+                        f"Certificate of {given.issued_by or 'its calibration'}")  # fmt: skip
+    stated = child(made, "measuringEquipmentQuantities")
+    quantity(stated, "Standard uncertainty", [given.u], given.unit, element="measuringEquipmentQuantity")
+
+
+def _results(parent: ET.Element, given: Certificate) -> None:
+    probability = given.uncertainty.coverage_probability
+    for axis, of_axis in groupby(given.results, key=lambda point: point.axis):
+        points = list(of_axis)
+        made = _result(parent, f"Error of indication of axis {axis}", "Output by its nominal scale minus true rate.")
+        table = child(made, "list")
+        quantity(table, "True rate", [each.rate_dps for each in points], "deg/s")
+        warm = [each.temperature_c for each in points if each.temperature_c is not None]
+        if len(warm) == len(points):
+            quantity(table, "Temperature of the item", warm, "deg C")
+        quantity(
+            table, "Error of indication", [each.error_dps for each in points], "deg/s",
+            expanded=[each.expanded_dps for each in points], k=[each.k for each in points], probability=probability,
+        )  # fmt: skip
+    _state(parent, "Errors as found, before adjustment", given.as_found)
+    _state(parent, "Errors as left, after adjustment", given.as_left)
+    made = _result(
+        parent,
+        "Coefficients of the correction",
+        "Of the error model that the method names; standard uncertainties are those of the fit alone.",
+    )
+    for each in given.coefficients:
+        where = "" if each.temperature_c is None else f" at {each.temperature_c:g} °C"
+        name = f"Axis {each.axis}: {each.name}{where}"
+        quantity(made, name, [each.value], each.unit, u=each.u)
+    _budget(parent, given)
+
+
+def _budget(parent: ET.Element, given: Certificate) -> None:
+    found = given.uncertainty
+    warm = "" if found.temperature_c is None else f" and {found.temperature_c:g} °C"
+    where = f"Of axis {found.axis} at {found.rate_dps:g} °/s{warm}, where U is largest."
+    made = _result(parent, "Contributions to the standard uncertainty", where)
+    for each in found.budget:
+        quantity(made, f"{each.source}, type {each.type}", [each.contribution_dps], "deg/s")
+
+
+def _result(parent: ET.Element, name: str, description: str) -> ET.Element:
+    made = child(parent, "result")
+    texts(made, "name", name)
+    texts(made, "description", description)
+    return child(made, "data")
+
+
+def _state(parent: ET.Element, name: str, state: StateOfItem) -> None:
+    made = _result(parent, name, f"Corrected by {state.basis}; over {state.datasets} data sets.")
+    for each in state.axes:
+        for what, value in (("RMS error", each.rms_dps), ("Largest error", each.max_dps)):
+            quantity(made, f"{what} of axis {each.axis}, {readable('deg/s')}", [value], "deg/s")

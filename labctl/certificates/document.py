@@ -1,0 +1,219 @@
+"""The certificate as data: every fact once. XML and PDF are made from it, and its JSON is stored.
+
+Facts are those of ISO/IEC 17025:2017, 7.8.2.1 and 7.8.4.1; docs/reference/certificate.md has where each one is.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from datetime import date, datetime
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from instruments.laboratory import Contact, Laboratory
+from labctl.calibration import canonical
+
+SCHEMA = "labctl-certificate/1"
+TITLE = "Calibration certificate"
+#: Of ILAC-G8:09/2019: 4.2.1 simple acceptance; 4.2.2 a guard band as wide as the expanded uncertainty.
+DecisionRule = Literal["simple", "guard-band"]
+
+
+class Part(BaseModel):
+    """A part of the certificate; it is written once and not changed."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class Customer(Contact):
+    """Who ordered the calibration."""
+
+    contact: str = Field(default="", description="Person to ask.")
+    order: str = Field(default="", description="The customer's number of the order.")
+
+
+class Item(Part):
+    """What was calibrated, and how it came."""
+
+    description: str
+    manufacturer: str
+    model: str
+    serial: str
+    identification: str = ""  #: the customer's own, where there is one
+    axes: tuple[str, ...]
+    condition: str
+    received: date | None  #: None: not critical to the validity of the results
+
+
+class Method(Part):
+    """How it was calibrated."""
+
+    name: str
+    procedure: str  #: number of the laboratory's written procedure; empty: none
+    plan_hash: str | None  #: of the steps that were run; None: the recording was imported
+    model: str  #: error model that was fitted
+    effects: tuple[str, ...]
+    recordings: tuple[int, ...]
+    software: str
+    deviations: str
+
+
+class StandardUsed(Part):
+    """A reference standard with the certificate that its traceability rests on."""
+
+    quantity: str
+    name: str
+    u: float
+    unit: str
+    certificate: str
+    issued_by: str
+    calibrated: date | None
+    due: date | None
+    traceability: str
+
+
+class Condition(Part):
+    """An environmental condition as it was measured: least and largest mean of a data set."""
+
+    name: str
+    unit: str
+    low: float
+    high: float
+
+
+class Contribution(Part):
+    """A line of the budget: what a source adds to the standard uncertainty of a corrected rate."""
+
+    source: str
+    type: Literal["A", "B"]
+    contribution_dps: float
+    freedom: float | None  #: degrees of freedom; None: infinite
+
+
+class Uncertainty(Part):
+    """How the expanded uncertainties are to be read, and the budget of the largest of them."""
+
+    coverage_probability: float
+    axis: str
+    rate_dps: float
+    temperature_c: float | None
+    budget: tuple[Contribution, ...]
+
+
+class ResultPoint(Part):
+    """Error of indication at one rate and temperature: output by its nominal scale minus true rate."""
+
+    axis: str
+    temperature_c: float | None  #: None: the calibration knows no temperature
+    rate_dps: float
+    error_dps: float
+    expanded_dps: float
+    k: float  #: coverage factor
+
+
+class CoefficientResult(Part):
+    """A coefficient of the model, by which the output is corrected."""
+
+    axis: str
+    name: str
+    temperature_c: float | None  #: of a node of a temperature table
+    value: float
+    u: float | None  #: standard uncertainty of the fit alone; None: not known
+    unit: str
+
+
+class AxisError(Part):
+    """Errors of one axis over all data sets, deg/s."""
+
+    axis: str
+    rms_dps: float
+    max_dps: float
+
+
+class StateOfItem(Part):
+    """Errors before or after the adjustment."""
+
+    basis: str  #: what the output was corrected by
+    datasets: int
+    axes: tuple[AxisError, ...]
+
+
+class Conformity(Part):
+    """A statement of conformity with the rule that it was decided by."""
+
+    specification: str
+    limit_dps: float
+    rule: DecisionRule
+    guard_band_dps: float
+    acceptance_dps: float
+    largest_error_dps: float
+    expanded_dps: float
+    passed: bool
+    statement: str
+
+
+class Authorisation(Part):
+    """Who authorised the results: the act of certification."""
+
+    name: str
+    at: datetime
+    reason: str
+
+
+class Replaced(Part):
+    """The certificate that this one replaces."""
+
+    number: str
+    hash: str
+    reason: str
+
+
+class CalibrationFacts(Part):
+    """The calibration that is certified, and where it is found."""
+
+    version: int
+    hash: str
+    address: str
+
+
+class Certificate(Part):
+    """All of it."""
+
+    schema_: str = Field(default=SCHEMA, alias="schema")
+    title: str = TITLE
+    number: str
+    issued_on: date
+    issued_by: str
+    replaces: Replaced | None
+    laboratory: Laboratory
+    customer: Customer
+    item: Item
+    method: Method
+    performed_from: date
+    performed_until: date
+    environment: tuple[Condition, ...]
+    standards: tuple[StandardUsed, ...]
+    uncertainty: Uncertainty
+    results: tuple[ResultPoint, ...]
+    coefficients: tuple[CoefficientResult, ...]
+    as_found: StateOfItem
+    as_left: StateOfItem
+    adjustment: str
+    conformity: Conformity | None  #: None: none was ordered
+    due: date | None  #: of the next calibration; None: not agreed with the customer
+    external: str  #: results of external providers
+    authorised: Authorisation
+    calibration: CalibrationFacts
+    statements: tuple[str, ...]
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, populate_by_name=True)
+
+    def to_bytes(self) -> bytes:
+        """Return its JSON, always the same bytes."""
+        return canonical(self.model_dump(mode="json", by_alias=True)) + b"\n"
+
+
+def hash_of_certificate(content: bytes) -> str:
+    """Return the SHA-256 of a certificate's JSON."""
+    return hashlib.sha256(content).hexdigest()

@@ -1,0 +1,36 @@
+"""Units of a certificate: as a person reads them, and in the D-SI (siunitx) form of a DCC."""
+
+from __future__ import annotations
+
+import re
+
+#: labctl's word -> what a person reads.
+READ = {"deg/s": "°/s", "deg C": "°C", "deg": "°", "pct": "%"}
+#: What a person reads -> D-SI (SI brochure, 9th edition; D-SI 2.2.1).
+SYMBOLS = {
+    "deg": r"\degree", "°": r"\degree", "s": r"\second", "h": r"\hour", "min": r"\minute", "K": r"\kelvin",
+    "°C": r"\degreecelsius", "deg C": r"\degreecelsius", "V": r"\volt", "%": r"\percent", "ppm": r"\ppm", "1": r"\one",
+}  # fmt: skip
+_POWER = re.compile(r"([^\^]+)(?:\^(\d+))?")
+
+
+def readable(unit: str) -> str:
+    """Return a unit as a person reads it: deg as the sign of degrees."""
+    return READ.get(unit, unit.replace("deg C", "°C").replace("deg", "°"))
+
+
+def dsi(unit: str) -> str | None:
+    """Return a unit in D-SI form; None for one that D-SI has no word for, as a share of standard gravity."""
+    above, *below = re.sub(r"/\(([^()/]+)/([^()/]+)\)", r"/\1*\2", unit).split("/")
+    found = ""
+    for text, sign in [(above, 1), *((part, -1) for part in below)]:
+        first, *inverted = text.split("*")
+        for name, side in [(first, sign), *((each, -sign) for each in inverted)]:
+            parts = _POWER.fullmatch(name.strip())
+            symbol = SYMBOLS.get(parts[1]) if parts else None
+            if parts is None or symbol is None:
+                return None
+            power = side * int(parts[2] or 1)
+            if symbol != r"\one" or unit == "1":
+                found += symbol + ("" if power == 1 else rf"\tothe{{{power}}}")
+    return found

@@ -1,0 +1,100 @@
+"""Elements of a Digital Calibration Certificate (PTB, schema 3.3.0) that occur in several places of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from xml.etree import ElementTree as ET
+
+from instruments.laboratory import Contact
+from labctl.certificates.units import dsi, readable
+
+DCC, SI = "https://ptb.de/dcc", "https://ptb.de/si"
+ENGLISH = "en"
+#: Digits of a number: more than any certificate states.
+DIGITS = 9
+
+
+def child(parent: ET.Element, name: str, text: str | None = None, **attributes: str) -> ET.Element:
+    """Add an element of the DCC; white space of its text is made single, as the schema asks."""
+    made = ET.SubElement(parent, f"{{{DCC}}}{name}", attributes)
+    if text is not None:
+        made.text = " ".join(text.split())
+    return made
+
+
+def texts(parent: ET.Element, name: str, *said: str, **attributes: str) -> ET.Element:
+    """Add an element with a text in English: one of each language, as PTB's rules ask."""
+    made = child(parent, name, **attributes)
+    child(made, "content", " ".join(said), lang=ENGLISH)
+    return made
+
+
+def optional(parent: ET.Element, name: str, text: str) -> None:
+    """Add an element with a text, unless it is empty."""
+    if text.strip():
+        child(parent, name, text)
+
+
+def contact(parent: ET.Element, name: str, given: Contact, further: str = "") -> None:
+    """Add the address of an organisation."""
+    made = child(parent, name)
+    texts(made, "name", given.name)
+    optional(made, "eMail", given.email)
+    optional(made, "phone", given.phone)
+    place = child(made, "location")
+    for tag, text in (
+        ("city", given.city), ("countryCode", given.country), ("postCode", given.post_code), ("street", given.street),
+    ):  # fmt: skip
+        optional(place, tag, text)
+    if further:
+        texts(place, "further", further)
+
+
+def quantity(
+    parent: ET.Element,
+    name: str,
+    values: Sequence[float],
+    unit: str,
+    *,
+    expanded: Sequence[float] = (),
+    k: Sequence[float] = (),
+    probability: float = 0.9545,
+    u: float | None = None,
+    element: str = "quantity",
+    ref_type: str = "",
+) -> ET.Element:
+    """Add a quantity: one number, or a list of them, with their expanded uncertainties or one standard uncertainty.
+
+    Where D-SI has no word for the unit the numbers are a text.
+    """
+    made = child(parent, element, **({"refType": ref_type} if ref_type else {}))
+    texts(made, "name", name)
+    symbol = dsi(unit)
+    if symbol is None:
+        said = "; ".join(f"{value:.{DIGITS}g}" for value in values) + ("" if u is None else f", u = {u:.{DIGITS}g}")
+        texts(made, "noQuantity", f"{said} {readable(unit)}")
+        return made
+    several = len(values) > 1
+    tail = "XMLList" if several else ""
+    real = ET.SubElement(made, f"{{{SI}}}{'realListXMLList' if several else 'real'}")
+    _si(real, f"value{tail}", _listed(values))
+    _si(real, f"unit{tail}", symbol)
+    if u is not None:
+        standard = _si(_si(real, "measurementUncertaintyUnivariate"), "standardMU")
+        _si(standard, "valueStandardMU", _listed([u]))
+    elif expanded:
+        uncertainty = _si(_si(real, f"measurementUncertaintyUnivariate{tail}"), f"expandedMU{tail}")
+        _si(uncertainty, f"valueExpandedMU{tail}", _listed(expanded))
+        _si(uncertainty, f"coverageFactor{tail}", _listed(k))
+        _si(uncertainty, f"coverageProbability{tail}", _listed([probability]))
+    return made
+
+
+def _si(parent: ET.Element, name: str, text: str | None = None) -> ET.Element:
+    made = ET.SubElement(parent, f"{{{SI}}}{name}")
+    made.text = text
+    return made
+
+
+def _listed(values: Sequence[float]) -> str:
+    return " ".join(f"{value:.{DIGITS}g}" for value in values)

@@ -1,0 +1,1 @@
+"""Registers of equipment that a calibration is entered in."""

@@ -1,0 +1,98 @@
+"""An uncertainty budget: its lines, and what they combine to (GUM, JCGM 100; EA-4/02)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from labctl.fitting.uncertainty.combination import combined_u, coverage_factor, effective_freedom
+from labctl.json_types.budget import BudgetJson, BudgetLineJson
+
+
+@dataclass(frozen=True)
+class BudgetLine:
+    """One source of uncertainty. None is unknown, never 0; `why` says why."""
+
+    source: str  #: "coefficients", "model", "repeatability" or the quantity of a standard
+    name: str  #: of the standard, with its certificate
+    kind: Literal["A", "B"]  #: evaluated by statistics, or otherwise (GUM 2.3.2, 2.3.3)
+    distribution: str
+    u: float | None  #: standard uncertainty of the input, in `unit`
+    unit: str
+    sensitivity: float | None  #: d result / d input, in the unit of the result per `unit`
+    contribution: float | None  #: |sensitivity| u, in the unit of the result
+    freedom: float | None = None  #: degrees of freedom; None: infinite
+    uncorrected: float = 0.0  #: sensitivity times a known error that nothing corrects for, in the unit of the result
+    is_common: bool = False  #: whether it is the same at all rates: it adds linearly over them, no mean reduces it
+    is_stated: bool = True  #: False: a standard that the bench does not state
+    is_overdue: bool = False  #: whether the standard was past its due date when it was used
+    due: str | None = None
+    why: str = ""
+
+    def to_json(self) -> BudgetLineJson:
+        """Return this line as JSON."""
+        return {
+            "source": self.source, "name": self.name, "type": self.kind, "distribution": self.distribution,
+            "u": self.u, "unit": self.unit, "sensitivity": self.sensitivity, "contribution": self.contribution,
+            "degrees_of_freedom": self.freedom, "uncorrected": self.uncorrected, "common_to_all_rates": self.is_common,
+            "stated": self.is_stated, "overdue": self.is_overdue, "due": self.due, "why": self.why,
+        }  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Budget:
+    """A result with its lines and the combined and expanded uncertainties, all in `unit`."""
+
+    result: str  #: "corrected_rate", or the name of a coefficient
+    unit: str
+    value: float | None  #: of a coefficient
+    lines: tuple[BudgetLine, ...]
+    combined: float | None  #: standard; None where a line of type A is unknown
+    freedom: float | None  #: effective degrees of freedom; None: infinite
+    k: float | None  #: coverage factor for 95.45 %
+    expanded: float | None  #: k times combined, and the size of the known errors that nothing corrects for
+
+    @property
+    def not_stated(self) -> tuple[str, ...]:
+        """Standards that the bench does not state, and that are therefore not in U."""
+        return tuple(dict.fromkeys(line.source for line in self.lines if not line.is_stated))
+
+    @property
+    def is_overdue(self) -> bool:
+        """Whether a standard was past its due date."""
+        return any(line.is_overdue for line in self.lines)
+
+    def to_json(self) -> BudgetJson:
+        """Return this budget as JSON."""
+        return {
+            "result": self.result, "unit": self.unit, "value": self.value,
+            "lines": [line.to_json() for line in self.lines], "combined": self.combined,
+            "effective_degrees_of_freedom": self.freedom, "k": self.k, "expanded": self.expanded,
+            "not_stated": list(self.not_stated), "overdue": self.is_overdue,
+        }  # fmt: skip
+
+
+def budget_of(result: str, unit: str, lines: Sequence[BudgetLine], value: float | None = None) -> Budget:
+    """Return a budget of independent lines.
+
+    Each line is one source at this place; what its inputs have in common is inside of it. A line of type A that is
+    unknown leaves the result unknown; a standard that is not stated is listed and not in U.
+    """
+    known = [line for line in lines if line.contribution is not None]
+    if any(line.contribution is None and line.kind == "A" for line in lines):
+        return Budget(result, unit, value, tuple(lines), None, None, None, None)
+    sizes = [line.contribution or 0.0 for line in known]
+    combined = combined_u(np.array(sizes))
+    freedom = effective_freedom(sizes, [line.freedom for line in known])
+    k = coverage_factor(sizes, [line.distribution for line in known], freedom)
+    left = abs(sum(line.uncorrected for line in known))
+    return Budget(result, unit, value, tuple(lines), combined, freedom, k, k * combined + left)
+
+
+def without_repeatability(lines: Sequence[BudgetLine]) -> float | None:
+    """Return the combined standard uncertainty within the power-on of the calibration; None where a part is unknown."""
+    others = [line for line in lines if line.source != "repeatability"]
+    return budget_of("same_run", "deg/s", others).combined

@@ -1,0 +1,72 @@
+"""Budgets of the coefficients: bias, scale factor and misalignments of each axis at one temperature."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from labctl.fitting.models.fitted_model import FittedModel
+from labctl.fitting.uncertainty.budget import Budget, BudgetLine, budget_of
+from labctl.fitting.uncertainty.conditions import BenchConditions
+from labctl.fitting.uncertainty.evaluated_lines import coefficient_line, model_line, repeatability_line
+from labctl.fitting.uncertainty.rate import require_law_of_rate_and_temperature
+from labctl.fitting.uncertainty.sensitivity import coefficients_of
+from labctl.fitting.uncertainty.standard_lines import Sensitivities, no_conditions, standard_lines
+from labctl.fitting.uncertainty.use import AxisEvidence
+
+
+def coefficient_budgets(
+    fitted: FittedModel,
+    temperature_c: float,
+    *,
+    evidence: Mapping[str, AxisEvidence],
+    name: str,
+    bench: BenchConditions | None = None,
+) -> dict[str, dict[str, Budget]]:
+    """Return axis -> name -> budget of `bias` (deg/s), `scale_factor` and `misalignment_<axis>` (shares of the rate).
+
+    Only what the model has is there. The bias holds for later days; a scale factor and a misalignment are taken to
+    repeat. Raises what `rate_uncertainty` raises.
+    """
+    require_law_of_rate_and_temperature(fitted, name)
+    return {axis: _of_axis(fitted, axis, temperature_c, evidence.get(axis), bench) for axis in fitted.axes}
+
+
+def _of_axis(
+    fitted: FittedModel, axis: str, temperature_c: float, evidence: AxisEvidence | None, bench: BenchConditions | None
+) -> dict[str, Budget]:
+    known = {
+        name: (unit, law)
+        for name, (unit, law) in coefficients_of(axis).items()
+        if np.any(law.gradient(fitted, temperature_c))
+    }
+    values = {name: law.value(fitted, temperature_c) for name, (_, law) in known.items()}
+    found = {}
+    for name, (unit, law) in known.items():
+        lines: list[BudgetLine] = [coefficient_line(fitted, law, temperature_c, evidence, unit)]
+        if name == "bias":
+            lines += [model_line(fitted, evidence, 0.0, temperature_c), repeatability_line(fitted, evidence)]
+        sensitivities = _sensitivities(name, values, law.temperature_slope(fitted, temperature_c), bench)
+        lines += standard_lines(bench, sensitivities) if bench is not None else [no_conditions()]
+        found[name] = budget_of(name, unit, lines, values[name])
+    return found
+
+
+def _sensitivities(
+    name: str, values: Mapping[str, float], temperature: float, bench: BenchConditions | None
+) -> Sensitivities:
+    """Return how a coefficient follows errors of the bench.
+
+    One error of the time base is the same at all rates, so it is in the scale factor in full; a tilt of a mounting is a
+    misalignment, and in a scale factor by the misalignments of the unit and by its cosine.
+    """
+    if name == "bias":
+        return Sensitivities(0.0, 0.0, temperature, 0.0, 0.0, 1.0)
+    gain = 1.0 + values.get("scale_factor", 0.0)
+    if name != "scale_factor":
+        return Sensitivities(values[name], 0.0, temperature, gain, 0.0, 0.0)
+    across = math.hypot(*(value for other, value in values.items() if other.startswith("misalignment")))
+    fastest = bench.max_rate_dps if bench is not None else None
+    return Sensitivities(gain, 1.0 / fastest if fastest else 0.0, temperature, across, gain / 2, 0.0)

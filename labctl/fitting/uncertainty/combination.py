@@ -1,0 +1,98 @@
+"""Combining contributions to an uncertainty (GUM, JCGM 100: 5.1, 5.2, G.4), also of those that are not normal."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.special import j0, ndtri, stdtrit
+
+from labctl.fitting.numeric.arrays import Array
+
+#: Probability of an interval of two standard uncertainties of a normal distribution.
+LEVEL = 0.9545
+#: Degrees of freedom beyond which a t-distribution is a normal one, and below which its factor has no meaning.
+MOST_FREEDOM, LEAST_FREEDOM = 1e6, 1.0
+#: Share of the variance that is not normal below which the factor is that of a normal distribution.
+LEAST_SHARE = 0.1
+#: A standard uncertainty of this share of the whole is added to what is not normal, so that its integral converges.
+SMOOTHING = 0.02
+#: Nodes of that integral, and how far it goes in units of one over the normal part.
+NODES, REACH = 6000, 5.0
+#: Where the factor is looked for, and how often the interval is halved.
+LEAST_K, MOST_K, HALVINGS = 0.5, 6.0, 24
+
+
+def combined_u(contributions: Array, correlation: Array | None = None) -> float:
+    """Return the combined standard uncertainty of signed contributions c_i u_i, (n,), in their unit (GUM eq. 13).
+
+    `correlation` (n, n) holds the correlation coefficients; without it the inputs are independent.
+    """
+    if correlation is None:
+        return math.sqrt(float(contributions @ contributions))
+    return math.sqrt(max(float(contributions @ correlation @ contributions), 0.0))
+
+
+def effective_freedom(contributions: Sequence[float], freedom: Sequence[float | None]) -> float | None:
+    """Return the effective degrees of freedom of independent contributions (Welch-Satterthwaite, GUM eq. G.2b).
+
+    `freedom` is None for a contribution that is exactly known; None is returned where all are.
+    """
+    total = sum(one**2 for one in contributions) ** 2
+    estimated = sum(one**4 / nu for one, nu in zip(contributions, freedom, strict=True) if nu is not None)
+    return total / estimated if estimated > 0 and total > 0 else None
+
+
+def student_factor(freedom: float | None, level: float = LEVEL) -> float:
+    """Return the factor of Student's t for a coverage probability (GUM table G.2); of a normal one without freedom."""
+    if freedom is None:
+        return float(ndtri((1 + level) / 2))
+    return float(stdtrit(min(max(freedom, LEAST_FREEDOM), MOST_FREEDOM), (1 + level) / 2))
+
+
+def coverage_factor(
+    contributions: Sequence[float], distributions: Sequence[str], freedom: float | None, level: float = LEVEL
+) -> float:
+    """Return k of an interval k u_c that covers with a probability of `level`.
+
+    Contributions that are not normal count by their own distribution (JCGM 101, here by the product of the
+    characteristic functions instead of by trials): where a rectangular one dominates, k is nearer 1.65 than 2. Few
+    degrees of freedom widen by Student's t.
+    """
+    size = np.abs(np.asarray(contributions, dtype=np.float64))
+    total = float(np.sqrt(size @ size))
+    normal = np.array([name not in _CHARACTERISTIC for name in distributions])
+    widening = student_factor(freedom, level) / student_factor(None, level)
+    if total == 0 or float(size[~normal] @ size[~normal]) < LEAST_SHARE * total**2:
+        return student_factor(None, level) * widening
+    shares = size / total
+    spread = math.hypot(float(np.sqrt(shares[normal] @ shares[normal])), SMOOTHING)
+    t = np.linspace(0.0, REACH / spread, NODES)[1:]
+    phi = np.exp(-0.5 * (spread * t) ** 2)
+    for share, name in zip(shares, distributions, strict=True):
+        if name in _CHARACTERISTIC:
+            phi = phi * _CHARACTERISTIC[name](share * t)
+    low, high = LEAST_K, MOST_K
+    for _ in range(HALVINGS):
+        k = (low + high) / 2
+        # (2/pi) times the integral of phi(t) sin(k t) / t, by the trapezoidal rule
+        inside = 2 / math.pi * float(np.sum(phi * np.sin(k * t) / t) + 0.5 * k) * float(t[0])
+        low, high = (k, high) if inside < level else (low, k)
+    return (low + high) / 2 * widening
+
+
+def _rectangular(t: Array) -> Array:
+    return np.asarray(np.sinc(math.sqrt(3.0) * t / math.pi))
+
+
+def _triangular(t: Array) -> Array:
+    return np.asarray(np.sinc(math.sqrt(6.0) * t / 2 / math.pi) ** 2)
+
+
+def _u_shaped(t: Array) -> Array:
+    return np.asarray(j0(math.sqrt(2.0) * t))
+
+
+#: Characteristic functions of distributions of unit variance at t, (n,).
+_CHARACTERISTIC = {"rectangular": _rectangular, "triangular": _triangular, "u-shaped": _u_shaped}

@@ -1,0 +1,59 @@
+"""What a budget knows of the bench: its reference standards, and what their sensitivities depend on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from datetime import date
+from typing import Literal
+
+from labctl.json_types.budget import BenchConditionsJson
+from labctl.json_types.models import FitEnvironment
+from labctl.recording import RecordingInfo, Standard
+
+Thermometer = Literal["unit", "chamber", "reference"]
+
+
+@dataclass(frozen=True)
+class BenchConditions:
+    """Standards and circumstances of the recordings that a calibration was fitted to."""
+
+    used_on: date  #: day of the newest recording
+    motion: str = "rates"
+    thermometer: Thermometer = "unit"
+    latitude_deg: float | None = None
+    turn_common_u: float | None = None  #: of turns, in the coefficients already
+    max_rate_dps: float | None = None
+    standards: tuple[Standard, ...] = field(default_factory=tuple)
+
+    def of(self, quantity: str) -> tuple[Standard, ...]:
+        """Return the standards of a quantity."""
+        return tuple(each for each in self.standards if each.quantity == quantity)
+
+    def to_json(self) -> BenchConditionsJson:
+        """Return this as JSON."""
+        return {
+            "used_on": self.used_on.isoformat(), "motion": self.motion, "thermometer": self.thermometer,
+            "latitude_deg": self.latitude_deg, "turn_common_u": self.turn_common_u, "max_rate_dps": self.max_rate_dps,
+            "stated": [each.model_dump(mode="json") for each in self.standards],  # type: ignore[misc]
+        }  # fmt: skip
+
+    @staticmethod
+    def from_json(record: BenchConditionsJson) -> BenchConditions:
+        """Return what `to_json` described."""
+        return BenchConditions(
+            date.fromisoformat(record["used_on"]), record["motion"], record["thermometer"], record["latitude_deg"],
+            record["turn_common_u"], record["max_rate_dps"],
+            tuple(Standard.model_validate(each) for each in record["stated"]),
+        )  # fmt: skip
+
+
+def conditions_of(info: RecordingInfo, environment: FitEnvironment, used_on: Sequence[date] = ()) -> BenchConditions:
+    """Return the conditions of a fit: head of its recording, which thermometer it went by, and the recordings' days."""
+    thermometer: Thermometer = (
+        "reference" if info.thermometer else "chamber" if "temperature" in environment else "unit"
+    )
+    return BenchConditions(
+        max(used_on, default=info.started_at.date()), info.motion, thermometer, info.latitude_deg, info.turn_common_u,
+        info.max_rate_dps, info.standards,
+    )  # fmt: skip

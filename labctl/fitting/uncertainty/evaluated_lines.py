@@ -1,0 +1,60 @@
+"""Lines of a budget that are evaluated from the recording: coefficients, model and repeatability."""
+
+from __future__ import annotations
+
+from labctl.fitting.models.fitted_model import FittedModel
+from labctl.fitting.models.presets import POSES
+from labctl.fitting.uncertainty.budget import BudgetLine
+from labctl.fitting.uncertainty.sensitivity import LawFunction
+from labctl.fitting.uncertainty.use import AxisEvidence
+
+#: Why a part is unknown.
+PUBLISHED = "published coefficients come without uncertainties"
+NO_DATA_SETS = "published coefficients have no data sets from which it could be estimated"
+NOT_KEPT = "the version was made by an older labctl, which did not store it: fit it again"
+BY_HAND = (
+    "the rate during turns between rests is not known, so it cannot be estimated; measure the unit on a table as well"
+)
+NO_POWER_ON = "only one power-on was recorded, and neither a data sheet nor a static record gives the repeatability"
+BY_COVARIANCE = "by the covariance matrix of the fit: correlations of the coefficients are included"
+BY_HELD_OUT = "by temperatures and rates left out of the fit in turn; the drift of the campaign is included"
+
+
+def coefficient_line(
+    fitted: FittedModel, law: LawFunction, temperature_c: float, evidence: AxisEvidence | None, unit: str
+) -> BudgetLine:
+    """Return the line of the fitted coefficients, of what the law gives in `unit`."""
+    u = law.u(fitted, temperature_c)
+    why = PUBLISHED if u is None else BY_COVARIANCE
+    count = fitted.axes[law.axis].values.size
+    freedom = max(len(evidence.model_error.rate_dps) - count, 1) if evidence else None
+    return BudgetLine("coefficients", "fit", "A", "normal", u, unit, 1.0, u, freedom, why=why)
+
+
+def model_line(fitted: FittedModel, evidence: AxisEvidence | None, rate_dps: float, temperature_c: float) -> BudgetLine:
+    """Return the line of what the model leaves near a place, deg/s.
+
+    Its degrees of freedom are taken as infinite: the estimate has a floor that covers its own scatter.
+    """
+    u = evidence.model_error.at(rate_dps, temperature_c) if evidence else None
+    why = evidence.model_error.unknown_at(rate_dps, temperature_c) if evidence else _lacking(fitted)
+    return BudgetLine("model", "held-out data sets", "A", "normal", u, "deg/s", 1.0, u, why=why or BY_HELD_OUT)
+
+
+def repeatability_line(fitted: FittedModel, evidence: AxisEvidence | None) -> BudgetLine:
+    """Return the line of a later power-on, deg/s."""
+    if evidence is None or evidence.repeatability is None:
+        why = NO_POWER_ON if evidence else _lacking(fitted)
+        return BudgetLine("repeatability", "none", "A", "normal", None, "deg/s", 1.0, None, why=why)
+    known = evidence.repeatability
+    return BudgetLine(
+        "repeatability", known.source, "B" if known.source == "data sheet" else "A", "normal", known.u_dps, "deg/s",
+        1.0, known.u_dps, known.freedom,
+    )  # fmt: skip
+
+
+def _lacking(fitted: FittedModel) -> str:
+    """Return why a version has no evidence."""
+    if any(fit.covariance.any() for fit in fitted.axes.values()):
+        return BY_HAND if fitted.model.name == POSES else NOT_KEPT
+    return NO_DATA_SETS

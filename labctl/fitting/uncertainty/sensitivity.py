@@ -1,0 +1,97 @@
+"""Linear functions of a fitted error law at one temperature: its error at a rate, a bias, a scale factor, a tilt.
+
+Each has a value, a gradient along the coefficients (for their covariance) and a slope over temperature.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from labctl.fitting.data.channels import BODY_AXES, Channels
+from labctl.fitting.models.fitted_model import FittedModel
+from labctl.fitting.numeric.arrays import Array
+
+#: Steps of numerical derivatives: along the rate for an inversion and for a coefficient, deg/s; over temperature, K.
+STEP_DPS, COEFFICIENT_STEP_DPS, STEP_K = 0.01, 1.0, 0.05
+
+
+@dataclass(frozen=True)
+class LawFunction:
+    """A weighted sum of the modelled error of one output axis at rates about the body axes, divided by `divisor`."""
+
+    axis: str  #: of the output
+    rates: dict[str, Array]  #: body axis -> (n,) deg/s
+    weights: Array  #: (n,)
+    divisor: float = 1.0
+
+    def value(self, fitted: FittedModel, temperature_c: float) -> float:
+        """Return the sum at a temperature."""
+        return float(self.weights @ fitted.error_dps(self._channels(temperature_c), self.axis)) / self.divisor
+
+    def temperature_slope(self, fitted: FittedModel, temperature_c: float) -> float:
+        """Return its derivative over temperature, per K."""
+        warm, cold = (self.value(fitted, temperature_c + sign * STEP_K) for sign in (1, -1))
+        return (warm - cold) / (2 * STEP_K)
+
+    def gradient(self, fitted: FittedModel, temperature_c: float) -> Array:
+        """Return its derivative along the coefficients of the axis, (k*m,), temperature functions running fastest."""
+        here, fit = self._channels(temperature_c), fitted.axes[self.axis]
+        n = len(self.weights)
+        basis = fitted.model.temperature.basis(np.array([temperature_c]))[0]
+        columns = {column.name: column for _, column in fitted.model.columns(here, self.axis)}
+        slopes = [
+            float(self.weights @ columns[name].slope(np.full(n, at @ basis))) if name in columns else 0.0
+            for name, at in zip(fit.names, fit.values, strict=True)
+        ]
+        return np.outer(slopes, basis).ravel() / self.divisor
+
+    def u(self, fitted: FittedModel, temperature_c: float) -> float | None:
+        """Return its standard uncertainty by the covariance of the coefficients (GUM eq. 13); None: not stated."""
+        covariance = fitted.axes[self.axis].covariance
+        if not np.any(covariance):
+            return None
+        gradient = self.gradient(fitted, temperature_c)
+        return math.sqrt(max(float(gradient @ covariance @ gradient), 0.0))
+
+    def _channels(self, temperature_c: float) -> Channels:
+        return channels_at(self.axis, self.rates, len(self.weights), temperature_c)
+
+
+def channels_at(axis: str, rates: dict[str, Array], n: int, temperature_c: float) -> Channels:
+    """Return n rows at rates about body axes, (n,) deg/s, and one temperature."""
+    columns = {
+        "temperature_c": np.full(n, temperature_c),
+        "table_rate_dps": rates.get(axis, np.zeros(n)),
+        "position": np.full(n, axis),
+    }
+    return Channels(columns, {name: rates.get(name, np.zeros(n)) for name in BODY_AXES})
+
+
+def corrected_rate(fitted: FittedModel, axis: str, rate_dps: float, temperature_c: float) -> LawFunction:
+    """Return the error of a rate about an axis, the others at rest, as it appears in the corrected rate, deg/s.
+
+    A law in the true rate is inverted: its error counts by one over one plus its slope (GUM 5.1.3).
+    """
+    slope = 0.0
+    if fitted.model.argument == "rate":
+        here = channels_at(axis, {axis: np.array([rate_dps, rate_dps + STEP_DPS])}, 2, temperature_c)
+        slope = float(np.diff(fitted.error_dps(here, axis))[0] / STEP_DPS)
+    return LawFunction(axis, {axis: np.array([rate_dps])}, np.ones(1), abs(1.0 + slope))
+
+
+def coefficients_of(axis: str) -> dict[str, tuple[str, LawFunction]]:
+    """Return name -> unit and function of what is a coefficient in every model: error at rest, and slopes about rest.
+
+    The bias is in deg/s; `scale_factor` and `misalignment_<axis>` are errors as shares of the rate, so that they mean
+    the same whatever terms a model is made of.
+    """
+    ends, weights = np.array([1.0, -1.0]) * COEFFICIENT_STEP_DPS, np.array([0.5, -0.5]) / COEFFICIENT_STEP_DPS
+    others = {f"misalignment_{name}": name for name in BODY_AXES if name != axis}
+    return {
+        "bias": ("deg/s", LawFunction(axis, {}, np.ones(1))),
+        "scale_factor": ("1", LawFunction(axis, {axis: ends}, weights)),
+        **{name: ("1", LawFunction(axis, {other: ends}, weights)) for name, other in others.items()},
+    }

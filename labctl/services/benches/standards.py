@@ -1,0 +1,70 @@
+"""Reference standards of a bench: those that its file states, and those that its instruments' settings say."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import date
+
+from instruments.bench_config import BenchFile
+from instruments.standards import Standard
+from procedures.contracts.journal import Event
+
+#: Names of what settings of the bench file say; a standard of the same quantity in `[[standards]]` replaces the first.
+CLOCK_SETTING = "clock_u_ppm of [table]"
+MEASURED_CLOCK = "step clock as each campaign measures it: reply_u_s and clock_run_s of [table]"
+DEMANDED_RATE = "rate_u_ppm of [table]"
+
+
+def standards_of(bench: BenchFile) -> tuple[Standard, ...]:
+    """Return the reference standards of a bench whose sections are by the models of their drivers."""
+    stated = {each.quantity for each in bench.standards}
+    derived = [each for each in _of_table(bench) if each.name == MEASURED_CLOCK or each.quantity not in stated]
+    if "thermometer" not in stated:
+        derived += _of_references(bench)
+    return (*bench.standards, *derived)
+
+
+def _of_table(bench: BenchFile) -> list[Standard]:
+    """Return what the settings of the table say of its rate, ppm."""
+    clock_u_ppm, clock_run_s = _setting(bench, "clock_u_ppm"), _setting(bench, "clock_run_s")
+    rate_u_ppm = _setting(bench, "rate_u_ppm")
+    if clock_run_s:  # two runs between whose four replies the time is taken: then the computer's clock is the time base
+        u_ppm = 1e6 * 2 * (_setting(bench, "reply_u_s") or 0.0) / clock_run_s
+        return [Standard(quantity="table_rate", unit="ppm", name=MEASURED_CLOCK, u=u_ppm)]
+    if clock_u_ppm is not None:
+        return [Standard(quantity="clock", name=CLOCK_SETTING, u=clock_u_ppm)]
+    if rate_u_ppm is not None and getattr(bench.table, "reference", "") == "demanded":
+        return [Standard(quantity="table_rate", unit="ppm", name=DEMANDED_RATE, u=rate_u_ppm)]
+    return []
+
+
+def _of_references(bench: BenchFile) -> list[Standard]:
+    """Return the reference thermometer by which the units are fitted, where its uncertainty is stated."""
+    return [
+        Standard(quantity="thermometer", name=each.name, u=each.u_c, certificate=each.certificate)
+        for each in bench.references
+        if each.is_temperature and each.u_c is not None
+    ]
+
+
+def _setting(bench: BenchFile, name: str) -> float | None:
+    value = getattr(bench.table, name, None)
+    return float(value) if isinstance(value, int | float) else None
+
+
+def overdue_events(standards: Sequence[Standard], on: date) -> tuple[Event, ...]:
+    """Return a warning for each standard whose due date is before a day."""
+    return tuple(
+        Event(
+            "standard_overdue",
+            f"standard {each.label} was due on {each.due}, {(on - each.due).days} days ago; have it calibrated: a "
+            "certificate of what is measured now is refused",
+            level="warning",
+            device=each.quantity,
+            value=float((on - each.due).days),
+            limit=0.0,
+            unit="d",
+        )
+        for each in standards
+        if each.due is not None and each.is_overdue(on)
+    )

@@ -1,0 +1,132 @@
+"""A certificate, put together from facts that were found to be whole."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from importlib.metadata import version as package_version
+
+from instruments.standards import Standard
+from labctl.calibration import read_calibration
+from labctl.certificates.document import (
+    Authorisation,
+    CalibrationFacts,
+    Certificate,
+    Item,
+    Method,
+    Replaced,
+    StandardUsed,
+    StateOfItem,
+)
+from labctl.errors import BadInput, NotEnoughData
+from labctl.services.certificates import measured
+from labctl.services.certificates.address import address_of
+from labctl.services.certificates.conformity import conformity
+from labctl.services.certificates.facts import Facts
+from labctl.services.certificates.found import Found
+from labctl.services.certificates.missing import MissingFacts
+from labctl.services.certificates.statements import statements
+from labctl.services.criticism.measurements import Measurements
+from labctl.services.schemas.documents.certificates import CertificateRequest
+from labctl.store import CertificateRow, Store
+
+NONE = "None."
+
+
+def assembled(
+    store: Store, facts: Facts, found: Found, request: CertificateRequest, at: datetime, kept: CertificateRow | None
+) -> Certificate:
+    """Return the certificate with the next number of the laboratory. Raises MissingFacts, BadInput, NotEnoughData."""
+    first, last, act = facts.performed_from, facts.performed_until, facts.authorised
+    measurements, uncertainty = found.measurements, found.results.uncertainty
+    if first is None or last is None or act is None or measurements is None or uncertainty is None:
+        raise MissingFacts(facts.what, [])  # refused before
+    before, left, adjustment = _states(store, facts, measurements)
+    order, number = facts.order, _number(store, facts, at)
+    return Certificate(
+        number=number,
+        issued_on=at.date(),
+        issued_by=request.by,
+        replaces=Replaced(number=kept.number, hash=kept.hash, reason=request.amend or "") if kept else None,
+        laboratory=facts.laboratory,
+        customer=order.customer,
+        item=_item(facts),
+        method=_method(facts),
+        performed_from=first,
+        performed_until=last,
+        environment=found.conditions,
+        standards=tuple(_standard(each) for each in facts.standards),
+        uncertainty=uncertainty,
+        results=found.results.points,
+        coefficients=measured.coefficients(facts.calibration),
+        as_found=before,
+        as_left=left,
+        adjustment=adjustment,
+        conformity=conformity(order.conformity, left, found.results.points) if order.conformity else None,
+        due=act.due_at.date() if order.state_due and act.due_at else None,
+        external=order.external or NONE,
+        authorised=Authorisation(name=act.by, at=act.at, reason=act.reason),
+        calibration=CalibrationFacts(
+            version=facts.row.version, hash=facts.row.hash, address=address_of(facts.laboratory.url, facts.row)
+        ),
+        statements=(*statements(facts), *found.results.left_out),
+    )  # fmt: skip
+
+
+def _number(store: Store, facts: Facts, at: datetime) -> str:
+    """Return the next number of the laboratory and year."""
+    prefix = facts.laboratory.number_prefix
+    return f"{prefix}{at.year:04d}-{store.certificates.count_of_year(at.year, prefix) + 1:04d}"
+
+
+def _item(facts: Facts) -> Item:
+    given = facts.order.item
+    return Item(
+        description=given.description, manufacturer=given.manufacturer, serial=facts.row.serial,
+        model=facts.calibration.document["unit"]["model"], identification=given.identification,
+        axes=facts.calibration.axes, condition=given.condition, received=given.received,
+    )  # fmt: skip
+
+
+def _method(facts: Facts) -> Method:
+    return Method(
+        name=facts.method,
+        procedure=facts.laboratory.procedure,
+        plan_hash=None if facts.campaign is None else facts.campaign.schedule_hash,
+        model=facts.row.model,
+        effects=tuple(facts.row.answer["model"]["effects"]),
+        recordings=facts.row.recordings,
+        software=f"labctl {package_version('labctl')}",
+        deviations=facts.order.method.deviations or NONE,
+    )
+
+
+def _standard(given: Standard) -> StandardUsed:
+    return StandardUsed(
+        quantity=given.quantity, name=given.name, u=given.standard_u, unit=given.unit_name,
+        certificate=given.certificate, issued_by=given.issued_by, calibrated=given.calibrated, due=given.due,
+        traceability=given.traceability,
+    )  # fmt: skip
+
+
+def _states(store: Store, facts: Facts, found: Measurements) -> tuple[StateOfItem, StateOfItem, str]:
+    """Return the errors as found and as left, and what was adjusted between."""
+    row, calibration = facts.row, facts.calibration
+    left = measured.corrected(found, calibration, f"the calibration that is certified, version {row.version}")
+    before = _version_before(store, facts)
+    new = f"The coefficients of the correction were determined anew: version {row.version}."
+    said = f"{new} {facts.order.adjustment or 'Nothing else was adjusted or repaired.'}"
+    if before is not None:
+        document, _ = store.calibrations.document(row.serial, before)
+        try:
+            basis = f"the calibration in force before, version {before}"
+            return measured.corrected(found, read_calibration(document), basis), left, said
+        except (BadInput, NotEnoughData):  # its model needs what was not recorded this time
+            pass
+    return measured.uncorrected(found, calibration.axes), left, said
+
+
+def _version_before(store: Store, facts: Facts) -> int | None:
+    """Return the version that was in force when this one was certified first; None: none was."""
+    acts = store.calibrations.history(facts.row.serial)[::-1]
+    first = next((i for i, act in enumerate(acts) if act.version == facts.row.version), 0)
+    return acts[first - 1].version if first and acts[first - 1].act == "certify" else None

@@ -1,0 +1,122 @@
+"""The facts of a certificate, from the store and from the order; what is missing is named all at once."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import date
+
+from instruments.bench_config import BenchFile
+from instruments.laboratory import Laboratory
+from instruments.standards import Standard
+from labctl.calibration import Calibration, read_calibration
+from labctl.recording import RecordingInfo
+from labctl.services.certificates.measured import performed
+from labctl.services.certificates.missing import of_contact
+from labctl.services.schemas.documents.certificates import CertificateOrder
+from labctl.store import CalibrationRecord, CampaignRow, CertificationRow, RecordingRow, Store
+
+BENCH = "[laboratory] of the bench file of the campaign, or [laboratory] of the order"
+STANDARDS = "[[standards]] of the bench file before the campaign, or of recording.toml"
+#: Traceability of the standards of a simulated bench, also where its recording was exported and imported.
+SIMULATED = "none: simulated"
+#: Quantities that a rate, or an angle over a time, is known from.
+RATE = frozenset({"clock", "table_rate", "turn_angle"})
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What a certificate is made from, as it was found; None or empty: not stated."""
+
+    row: CalibrationRecord
+    calibration: Calibration
+    recordings: tuple[RecordingRow, ...]
+    campaign: CampaignRow | None  #: of the newest recording
+    order: CertificateOrder
+    laboratory: Laboratory
+    standards: tuple[Standard, ...]
+    authorised: CertificationRow | None
+    performed_from: date | None
+    performed_until: date | None
+    simulated: bool
+
+    @property
+    def what(self) -> str:
+        """Unit and version."""
+        return f"{self.row.serial} version {self.row.version}"
+
+    @property
+    def method(self) -> str:
+        """The recipe of the campaign, or what the order says."""
+        return self.order.method.name if self.campaign is None else f"recipe {self.campaign.recipe_name}"
+
+    @property
+    def manufacturer(self) -> str:
+        """Of the item, by the order."""
+        return self.order.item.manufacturer
+
+    def missing(self) -> Iterator[tuple[str, str]]:
+        """Yield each mandatory fact that is not stated, and where to state it."""
+        yield from of_contact(self.laboratory, "laboratory", BENCH)
+        yield from of_contact(self.order.customer, "customer", "[customer] of the order")
+        if not self.manufacturer:
+            yield "item's manufacturer", "[item] of the order"
+        if not self.order.item.condition.strip():
+            yield "item's condition", "[item] of the order"
+        if not self.calibration.document["unit"]["model"]:
+            yield "item's model", "model of [[gyros]] of the bench file, or of recording.toml"
+        if not self.recordings:
+            yield "measured recording", f"`labctl fit {self.row.serial}` on one"
+        if not self.method:
+            yield "name of the method", "[method] of the order"
+        for day, name in ((self.performed_from, "performed_from"), (self.performed_until, "performed_until")):
+            if day is None:
+                yield name, "[method] of the order"
+        if self.authorised is None:
+            yield "authorisation", f"`labctl certify {self.row.serial} {self.row.version} --by NAME --reason TEXT`"
+        yield from self._traceability()
+
+    def _traceability(self) -> Iterator[tuple[str, str]]:
+        if self.standards and not {each.quantity for each in self.standards} & RATE:
+            yield "standard of the rate", STANDARDS
+        if not self.standards:
+            yield "reference standards", STANDARDS
+        measured = any(each.quantity in RATE and each.certificate for each in self.standards)
+        for each in self.standards:
+            if each.quantity in RATE and measured and not each.certificate:
+                continue  # follows from the time base that has one
+            lacking = [name for name in ("certificate", "issued_by", "due") if not getattr(each, name)]
+            if lacking and not each.traceability:
+                yield f"{', '.join(lacking)} (or traceability) of standard {each.label}", STANDARDS
+
+
+def facts_of(store: Store, serial: str, version: int, order: CertificateOrder) -> Facts:
+    """Return the facts of a version. Raises NotFound."""
+    row = store.calibrations.get(store.units.get(serial).serial, version)
+    rows = tuple(store.recordings.get(number) for number in row.recordings)
+    measured = tuple(each for each in rows if each.kind != "coefficients")
+    campaign = store.campaigns.get(measured[-1].campaign) if measured and measured[-1].campaign is not None else None
+    bench = None if campaign is None else BenchFile.model_validate(campaign.bench)
+    spans = [performed(store, each) for each in measured]
+    until = [last for _, last in spans if last is not None]
+    method = order.method
+    return Facts(
+        row=row,
+        calibration=read_calibration(row.document),
+        recordings=measured,
+        campaign=campaign,
+        order=order,
+        laboratory=(bench.laboratory if bench else None) or order.laboratory or Laboratory(),
+        standards=_standards(measured),
+        authorised=next((act for act in store.calibrations.history(serial) if act.version == version), None),
+        performed_from=min((first for first, _ in spans), default=None) if campaign else method.performed_from
+        or min((first for first, _ in spans), default=None),
+        performed_until=max(until, default=None) if campaign else method.performed_until or max(until, default=None),
+        simulated=(bench is not None and bench.has_simulated)
+        or any(each.traceability == SIMULATED for each in _standards(measured)),
+    )  # fmt: skip
+
+
+def _standards(rows: tuple[RecordingRow, ...]) -> tuple[Standard, ...]:
+    """Return the standards that the recordings were made with, each once: those whose uncertainties are in U."""
+    return tuple(dict.fromkeys(each for row in rows for each in RecordingInfo.model_validate(row.info).standards))

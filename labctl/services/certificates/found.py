@@ -1,0 +1,36 @@
+"""What the recordings of a version show, as its certificate needs it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from labctl.certificates.document import Condition
+from labctl.services.certificates import measured
+from labctl.services.certificates.facts import Facts
+from labctl.services.criticism.measurements import Measurements
+from labctl.store import Store
+
+
+@dataclass(frozen=True)
+class Found:
+    """What the recordings of a version show."""
+
+    measurements: Measurements | None = None  #: None: there are none
+    results: measured.Results = field(default_factory=measured.Results)
+    conditions: tuple[Condition, ...] = ()
+
+    @staticmethod
+    def of(store: Store, facts: Facts) -> Found:
+        """Return it for a version; nothing where no recording holds measurements."""
+        if not facts.recordings:
+            return Found()
+        measurements = Measurements(store, facts.recordings)
+        results = measured.results(store, facts.row, facts.calibration)
+        return Found(measurements, results, measured.environment(measurements.points))
+
+    def missing(self) -> Iterator[tuple[str, str]]:
+        """Yield what is not known of the results, and what makes it known."""
+        yield from self.results.missing()
+        if self.measurements is not None and not any(each.unit == "°C" for each in self.conditions):
+            yield "temperature of the item or of the chamber", "a recording with temperature_c or chamber_c"

@@ -1,0 +1,108 @@
+"""Issue of a certificate: refused, or made in its three forms and recorded; the same request gives the same bytes."""
+
+from __future__ import annotations
+
+from datetime import date, datetime
+
+from instruments.standards import Standard
+from labctl.certificates.dcc import dcc_of
+from labctl.certificates.document import hash_of_certificate
+from labctl.certificates.pdf import pdf_of
+from labctl.errors import Conflict
+from labctl.services.certificates.assembly import assembled
+from labctl.services.certificates.facts import Facts, facts_of
+from labctl.services.certificates.found import Found
+from labctl.services.certificates.missing import MissingFacts
+from labctl.services.schemas.documents.certificates import CertificateOrder, CertificateRequest, CertificateResponse
+from labctl.store import CertificateForms, CertificateRow, Store
+
+
+class CertificateRefused(Conflict):
+    """A certificate may not be issued; the text says why, and what to do."""
+
+    slug = "certificate-refused"
+
+
+def issue(store: Store, serial: str, version: int, request: CertificateRequest, at: datetime) -> CertificateResponse:
+    """Issue the certificate of a version at an aware time; one that was issued is answered as it is.
+
+    Raises NotFound, MissingFacts, CertificateRefused, Conflict where other facts are given for one that was issued.
+    """
+    kept = store.certificates.newest(store.units.get(serial).serial, version)
+    if kept is not None and request.amend is None:
+        return response(_unchanged(kept, request))
+    if kept is None and request.amend is not None:
+        raise CertificateRefused(f"{serial} version {version} has no certificate to amend; issue one without --amend")
+    order = CertificateOrder.model_validate(kept.order) if kept and not _given(request) else request.order
+    facts = facts_of(store, serial, version, order)
+    found = Found.of(store, facts)
+    refuse(facts, found)
+    certificate = assembled(store, facts, found, request, at, kept)
+    document = certificate.to_bytes()
+    xml = dcc_of(certificate)
+    forms = CertificateForms(document, xml, pdf_of(certificate, xml))
+    row = CertificateRow(
+        certificate.number, serial, version, kept.number if kept else None, request.amend or "", request.by, at,
+        hash_of_certificate(document), order.model_dump(mode="json", exclude_defaults=True),
+    )  # fmt: skip
+    return response(store.certificates.add(row, forms))
+
+
+def _given(request: CertificateRequest) -> dict[str, object]:
+    """Return the facts that a request states."""
+    return request.order.model_dump(mode="json", exclude_defaults=True)
+
+
+def _unchanged(kept: CertificateRow, request: CertificateRequest) -> CertificateRow:
+    """Return what was issued; raises Conflict where the request states other facts of the order."""
+    given = _given(request)
+    if given and given != kept.order:
+        other = ", ".join(sorted(name for name in {*given, *kept.order} if given.get(name) != kept.order.get(name)))
+        raise CertificateRefused(
+            f"certificate {kept.number} of {kept.serial} version {kept.version} was issued with another {other}; "
+            "to replace it: --amend REASON (amend)"
+        )
+    return kept
+
+
+def refuse(facts: Facts, found: Found) -> None:
+    """Raise MissingFacts, or CertificateRefused for a revoked version and a standard outside its dates."""
+    if missing := [*facts.missing(), *found.missing()]:
+        raise MissingFacts(facts.what, missing)
+    act = facts.authorised
+    if act is not None and act.act == "revoke":
+        raise CertificateRefused(
+            f"{facts.what} was revoked at {act.at:%Y-%m-%d %H:%M} UTC by {act.by} ({act.reason}); certify a version "
+            "that holds, and issue its certificate"
+        )
+    _refuse_dates(facts)
+
+
+def _refuse_dates(facts: Facts) -> None:
+    """Raise CertificateRefused for an item that came late, and for a standard that was not calibrated then."""
+    first, last, received = facts.performed_from, facts.performed_until, facts.order.item.received
+    if first is None or last is None:
+        return
+    if received is not None and received > first:
+        raise CertificateRefused(
+            f"[item] of the order: received = {received} is after the calibration of {facts.what} began, {first}; "
+            "correct the date"
+        )
+    if bad := [each for each in facts.standards if _off(each, first, last)]:
+        said = "; ".join(f"{each.label}: calibrated {each.calibrated or 'not stated'}, due {each.due}" for each in bad)
+        raise CertificateRefused(
+            f"no certificate of {facts.what}: measured from {first} to {last} with a reference standard outside its "
+            f"dates. {said}. Have it calibrated and measure again"
+        )
+
+
+def _off(standard: Standard, first: date, last: date) -> bool:
+    return standard.is_overdue(last) or (standard.calibrated is not None and standard.calibrated > first)
+
+
+def response(row: CertificateRow, replaced_by: str | None = None) -> CertificateResponse:
+    """Return a certificate as an answer."""
+    return CertificateResponse(
+        serial=row.serial, version=row.version, number=row.number, issued_at=row.at, by=row.by, hash=row.hash,
+        replaces=row.replaces, reason=row.reason, replaced_by=replaced_by,
+    )  # fmt: skip

@@ -1,0 +1,179 @@
+"""What was measured, as a certificate states it: dates, environment, results with U, errors before and after."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from datetime import date, timedelta
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.calibration import Calibration
+from labctl.certificates.document import (
+    AxisError,
+    CoefficientResult,
+    Condition,
+    Contribution,
+    ResultPoint,
+    StateOfItem,
+    Uncertainty,
+)
+from labctl.fitting.data.fit_data import fit_data_of
+from labctl.fitting.uncertainty.budget import Budget
+from labctl.fitting.uncertainty.combination import LEVEL
+from labctl.json_types.models import Coefficients
+from labctl.recording import Recording, RecordingInfo
+from labctl.services.calibrations.surface import errors_on_grid
+from labctl.services.calibrations.uncertainty import places_of, uncertainty_of
+from labctl.services.criticism.measurements import Measurements
+from labctl.services.criticism.verification.of_version import applied_errors
+from labctl.store import CalibrationRecord, RecordingRow, Store
+
+Array = NDArray[np.float64]
+#: Columns of a recording that are conditions, as a certificate names them, and their units.
+CONDITIONS: Mapping[str, tuple[str, str]] = {
+    "chamber_c": ("Temperature of the chamber air", "°C"),
+    "reference_c": ("Temperature by the reference thermometer", "°C"),
+    "temperature_c": ("Temperature of the item", "°C"),
+    "own_temperature_c": ("Temperature by the item's own thermometer", "°C"),
+    "humidity_pct": ("Relative humidity of the air", "%"),
+    "supply_v": ("Supply voltage of the item", "V"),
+}
+
+
+@dataclass(frozen=True)
+class Results:
+    """Error and U where U is known, and how many places there are where it is not, by part of U and reason."""
+
+    points: tuple[ResultPoint, ...] = ()
+    uncertainty: Uncertainty | None = None  #: where U is largest; None: there is no result
+    unknown: Mapping[tuple[str, str], int] = field(default_factory=dict)
+    axes_without: frozenset[str] = frozenset()
+
+    def missing(self) -> Iterator[tuple[str, str]]:
+        """Yield the parts of U that are not known, where an axis has no result without them."""
+        if self.axes_without:
+            for part, why in self.unknown:
+                yield f"uncertainty of the {part}", why
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """The sentences that name the places without a result."""
+        return tuple(
+            f"At {places} further rates and temperatures of the calibrated range no result is stated: the uncertainty "
+            f"of the {part} is not known there ({why})."
+            for (part, why), places in self.unknown.items()
+        )
+
+
+def performed(store: Store, row: RecordingRow) -> tuple[date, date | None]:
+    """Return the first and the last day of a campaign, or of an imported recording as far as it tells. UTC."""
+    if row.campaign is not None:
+        campaign = store.campaigns.get(row.campaign)
+        begun = campaign.started_at or campaign.created_at
+        return begun.date(), None if campaign.ended_at is None else campaign.ended_at.date()
+    begun = RecordingInfo.model_validate(row.info).started_at
+    ends = [each.t_until_s for each in store.recordings.data_sets(row.id) if each.t_until_s is not None]
+    return begun.date(), (begun + timedelta(seconds=max(ends))).date() if ends else None
+
+
+def environment(points: Recording) -> tuple[Condition, ...]:
+    """Return the least and the largest mean of each condition that was logged."""
+    found = []
+    for column, (name, unit) in CONDITIONS.items():
+        values = np.asarray(points.columns.get(column, []), dtype=np.float64)
+        if (values := values[np.isfinite(values)]).size:
+            found.append(Condition(name=name, unit=unit, low=float(values.min()), high=float(values.max())))
+    return tuple(found)
+
+
+def results(store: Store, row: CalibrationRecord, calibration: Calibration) -> Results:
+    """Return error and U over the calibrated range, at those places where U is known.
+
+    Raises BadInput, NotEnoughData, NotConverged.
+    """
+    rates, temperatures = places_of(calibration)
+    errors = errors_on_grid(store, row, rates, temperatures)
+    has_temperature = bool(np.isfinite(calibration.temperature_c).all())
+    found, unknown = list[tuple[ResultPoint, Budget]](), dict[tuple[str, str], int]()
+    for i, temperature in enumerate(temperatures):
+        for j, rate in enumerate(rates):
+            for axis, u in uncertainty_of(calibration, rate, temperature).items():
+                expanded, k = u.budget.expanded, u.budget.k
+                if expanded is None or k is None:
+                    for part in u.unknown.items():
+                        unknown[part] = unknown.get(part, 0) + 1
+                    continue
+                point = ResultPoint(
+                    axis=axis, temperature_c=temperature if has_temperature else None, rate_dps=rate,
+                    error_dps=errors[axis][i][j], expanded_dps=expanded, k=k,
+                )  # fmt: skip
+                found.append((point, u.budget))
+    found.sort(key=lambda each: calibration.axes.index(each[0].axis))
+    points = tuple(point for point, _ in found)
+    largest = max(found, key=lambda each: each[0].expanded_dps, default=None)
+    without = frozenset(calibration.axes) - {point.axis for point in points}
+    return Results(points, None if largest is None else _largest(*largest), unknown, without)
+
+
+def _largest(point: ResultPoint, budget: Budget) -> Uncertainty:
+    """Return the budget of a place, without the lines that add nothing."""
+    lines = tuple(
+        Contribution(
+            source=line.source, type=line.kind, contribution_dps=abs(line.contribution) + abs(line.uncorrected),
+            freedom=line.freedom,
+        )
+        for line in budget.lines
+        if line.contribution
+    )  # fmt: skip
+    return Uncertainty(
+        coverage_probability=LEVEL, axis=point.axis, rate_dps=point.rate_dps, temperature_c=point.temperature_c,
+        budget=lines,
+    )  # fmt: skip
+
+
+def coefficients(calibration: Calibration) -> tuple[CoefficientResult, ...]:
+    """Return each coefficient with its standard uncertainty by the fit; of a temperature table at each of its nodes."""
+    tables: Mapping[str, Coefficients] = calibration.document["coefficients"]
+    found: list[CoefficientResult] = []
+    for axis, table in tables.items():
+        nodes = table.get("temperature_c")
+        at = nodes if isinstance(nodes, list) else [None]
+        for name, entry in table.items():
+            if isinstance(entry, list):
+                continue
+            values, u = entry["value"], entry["u"]
+            listed = values if isinstance(values, list) else [values]
+            u_listed = u if isinstance(u, list) else [u]
+            found += [
+                CoefficientResult(
+                    axis=axis, name=name, temperature_c=where, value=value, unit=entry["unit"],
+                    u=one,
+                )
+                for where, value, one in zip(at, listed, u_listed, strict=True)
+            ]  # fmt: skip
+    return tuple(found)
+
+
+def uncorrected(measured: Measurements, axes: tuple[str, ...]) -> StateOfItem:
+    """Return the errors of the output by its nominal scale, nothing subtracted."""
+    data = fit_data_of(measured.points)
+    errors = {axis: np.asarray(data.outputs[axis] - data.true_rate_dps(axis), dtype=np.float64) for axis in axes}
+    return _state("the output by its nominal scale, without correction", errors)
+
+
+def corrected(measured: Measurements, calibration: Calibration, basis: str) -> StateOfItem:
+    """Return the errors of the rate corrected by a version; nothing is fitted. Raises BadInput, NotEnoughData."""
+    return _state(basis, applied_errors(calibration, measured.points)[0])
+
+
+def _state(basis: str, errors: Mapping[str, Array]) -> StateOfItem:
+    return StateOfItem(
+        basis=basis,
+        datasets=max(len(values) for values in errors.values()),
+        axes=tuple(
+            AxisError(axis=axis, rms_dps=float(np.sqrt(np.mean(values**2))), max_dps=float(np.max(np.abs(values))))
+            for axis, values in errors.items()
+        ),
+    )

@@ -1,0 +1,121 @@
+// The budget of an uncertainty: its lines at one place, and a picture of the contributions.
+
+import { h } from "../core/elements.js";
+import { chip, notice, table } from "../core/components.js";
+import { colour, figure } from "../core/figure.js";
+import { number } from "../core/format.js";
+import { contributionTraces } from "./contribution_lines.js";
+
+/** @import { BudgetLine, ContributionsOver, Uncertainty } from "../../../types/api.js" */
+/** @import { PlotTrace } from "../../../types/pages.js" */
+
+/**
+ * The lines of each axis, and which standards are not in them.
+ * @param {Uncertainty} answer
+ */
+export function budgetLines(answer) {
+  const several = Object.keys(answer.budget).length > 1;
+  return h(
+    "div",
+    { class: "stack" },
+    answer.not_stated.length
+      ? notice(
+          "warn",
+          h("strong", {}, "Not stated for the bench, and not in U: "),
+          `${answer.not_stated.join(", ")}. Add them to [[standards]] of the bench file.`,
+        )
+      : null,
+    Object.entries(answer.budget).map(([axis, budget]) =>
+      h(
+        "details",
+        {},
+        h("summary", {}, several ? `Budget of axis ${axis}, line by line` : "Budget, line by line"),
+        table(
+          [
+            { title: "Source", cell: nameOf },
+            { title: "Type", cell: (line) => line.type },
+            { title: "Distribution", cell: (line) => line.distribution },
+            { title: "u", number: true, cell: (line) => (line.u === null ? "" : `${number(line.u, 3)} ${line.unit}`) },
+            { title: "c", number: true, cell: (line) => number(line.sensitivity, 3) },
+            { title: "|c| u, deg/s", number: true, cell: contributionOf },
+            {
+              title: "Degrees of freedom",
+              number: true,
+              cell: (line) => (line.degrees_of_freedom === null ? "∞" : number(line.degrees_of_freedom, 3)),
+            },
+            { title: "Note", prose: true, cell: (line) => line.why },
+          ],
+          [...budget.lines],
+          { dense: true, label: `Budget of axis ${axis}` },
+        ),
+        h(
+          "p",
+          { class: "muted small" },
+          budget.expanded === null
+            ? "U is unknown."
+            : `u = ${number(budget.combined, 2)} deg/s, effective degrees of freedom ${budget.effective_degrees_of_freedom === null ? "∞" : number(budget.effective_degrees_of_freedom, 3)}, k = ${number(budget.k, 3)}, U = ${number(budget.expanded, 2)} deg/s.`,
+        ),
+      ),
+    ),
+  );
+}
+
+/** @param {BudgetLine} line */
+function nameOf(line) {
+  const name = ["coefficients", "model", "repeatability"].includes(line.source)
+    ? `${line.source} (${line.name})`
+    : line.name;
+  return line.overdue ? [name, " ", chip(`overdue since ${line.due}`, "bad")] : name;
+}
+
+/** @param {BudgetLine} line */
+function contributionOf(line) {
+  if (!line.stated) return h("span", { class: "warn-text" }, "not stated");
+  return line.contribution === null ? h("span", { class: "warn-text" }, "unknown") : number(line.contribution, 2);
+}
+
+/**
+ * Two figures for each axis: contributions over the rate, and over the temperature.
+ * @param {{ readonly [axis: string]: ContributionsOver }} contributions
+ */
+export function contributionFigures(contributions) {
+  return h(
+    "div",
+    { class: "columns", style: "--column-min: 24rem" },
+    Object.entries(contributions).flatMap(([axis, over]) => [
+      one(`Contributions, axis ${axis}, over rate`, over.over_rate, "rate, deg/s", `${number(over.temperature_c, 3)} deg C`),
+      one(
+        `Contributions, axis ${axis}, over temperature`,
+        over.over_temperature,
+        "temperature, deg C",
+        `${number(over.rate_dps, 4)} deg/s`,
+      ),
+    ]),
+  );
+}
+
+/**
+ * @param {string} name
+ * @param {ContributionsOver["over_rate"]} lines
+ * @param {string} along
+ * @param {string} at
+ */
+function one(name, lines, along, at) {
+  /** @returns {{ data: PlotTrace[], layout: object }} */
+  const draw = () => ({
+    data: contributionTraces(lines, colour("text")),
+    layout: {
+      xaxis: { title: { text: along } },
+      yaxis: { title: { text: "standard uncertainty, deg/s" }, rangemode: "tozero" },
+      showlegend: true,
+      legend: { orientation: "h", y: -0.25, yanchor: "top", x: 0 },
+      margin: { l: 58, r: 16, t: 12, b: 130 },
+    },
+  });
+  return figure(
+    name,
+    `Standard uncertainties that the budget combines, at ${at}; dashed the expanded uncertainty U. What is not stated has no line.`,
+    draw,
+    { height: "26rem" },
+  );
+}

@@ -1,0 +1,114 @@
+// The certificate of a version: the form that asks for the facts of the order, and the files that were issued.
+
+import { download, post } from "../core/http/api.js";
+import { h } from "../core/elements.js";
+import { button } from "../core/components.js";
+import { dialog } from "../core/dialog.js";
+import { show } from "../core/router.js";
+
+/** @import { Certificate } from "../../../types/api.js" */
+/** @import { Answers, Field } from "../../../types/pages.js" */
+
+/** @type {readonly ["pdf" | "xml" | "json", string][]} */
+const FORMATS = [
+  ["pdf", "PDF/A-3"],
+  ["xml", "DCC (XML)"],
+  ["json", "JSON"],
+];
+
+/** @type {readonly Field[]} */
+const FIELDS = [
+  { name: "by", label: "Issued by" },
+  { name: "name", label: "Customer" },
+  { name: "street", label: "Street and number" },
+  { name: "post_code", label: "Post code" },
+  { name: "city", label: "City" },
+  { name: "country", label: "Country", hint: "Two letters, as DE (ISO 3166-1)." },
+  { name: "email", label: "E-mail", type: "email" },
+  { name: "contact", label: "Contact person", required: false },
+  { name: "order", label: "Number of the order", required: false },
+  { name: "manufacturer", label: "Manufacturer of the item" },
+  { name: "condition", label: "Condition of the item on receipt" },
+  { name: "received", label: "Received on", type: "date", required: false },
+  { name: "deviations", label: "Deviations from the method", hint: "Empty: none.", required: false },
+  { name: "specification", label: "Conformity to the specification", hint: "Empty: no statement.", required: false },
+  { name: "limit_dps", label: "Its limit of the error, deg/s", required: false },
+  {
+    name: "guard_band",
+    label: "With a guard band as wide as the uncertainty",
+    type: "checkbox",
+    required: false,
+  },
+];
+
+/**
+ * The files of the valid certificate of a version, or the button that issues one.
+ * @param {string} serial
+ * @param {number} version
+ * @param {readonly Certificate[]} issued newest first
+ */
+export function certificateFiles(serial, version, issued) {
+  const valid = issued.find((each) => each.version === version);
+  if (!valid) return button("Issue certificate", () => askCertificate(serial, version), { kind: "tiny" });
+  return h(
+    "div",
+    { class: "stack", role: "group", "aria-label": `Certificate ${valid.number}` },
+    h("span", { class: "muted small" }, `Certificate ${valid.number}`),
+    h(
+      "div",
+      { class: "row tight" },
+      FORMATS.map(([format, title]) =>
+        button(
+          title,
+          async () => {
+            const path = "/api/units/{serial}/calibrations/{version}/certificate";
+            await download(path, `${valid.number}.${format}`, { path: { serial, version }, query: { format } });
+          },
+          { kind: "tiny" },
+        ),
+      ),
+    ),
+    button("Amend", () => askCertificate(serial, version, valid), { kind: "tiny quiet" }),
+  );
+}
+
+/**
+ * Ask for the facts of the order; what the service finds missing beside them it names.
+ * @param {string} serial
+ * @param {number} version
+ * @param {Certificate} [replaced]
+ */
+async function askCertificate(serial, version, replaced) {
+  const why = replaced ? [{ name: "amend", label: `Why certificate ${replaced.number} is replaced` }] : [];
+  const answers = await dialog(`Certificate of version ${version}`, [...why, ...FIELDS], {
+    text: "Laboratory and reference standards come from the bench file of the campaign. The certificate is written to the audit trail.",
+    confirm: "Issue",
+  });
+  if (!answers) return;
+  const body = { by: answers.by, order: orderOf(answers), ...(replaced ? { amend: answers.amend } : {}) };
+  await post("/api/units/{serial}/calibrations/{version}/certificate", { path: { serial, version }, body });
+  await show();
+}
+
+/** @param {Answers} given */
+function orderOf(given) {
+  const { name, street, post_code, city, country, email, contact, order } = given;
+  return {
+    customer: { name, street, post_code, city, country, email, contact, order },
+    item: {
+      manufacturer: given.manufacturer,
+      condition: given.condition,
+      ...(given.received ? { received: given.received } : {}),
+    },
+    method: { deviations: given.deviations },
+    ...(given.specification
+      ? {
+          conformity: {
+            specification: given.specification,
+            limit_dps: Number(given.limit_dps),
+            rule: given.guard_band ? /** @type {const} */ ("guard-band") : /** @type {const} */ ("simple"),
+          },
+        }
+      : {}),
+  };
+}
