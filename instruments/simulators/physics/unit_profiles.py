@@ -67,13 +67,14 @@ def mems_triaxial(axes: tuple[str, ...], rng: np.random.Generator) -> UnitTruth:
 
     return UnitTruth(axes, gain, offset, None, 0.01, 0.0015)
 
+
 #: Yang et al. 2018, Table 2 and +-350 deg/s: the rates that their printed errors belong to (RMS 210.6 deg/s).
 YANG_RATES_DPS = np.array(
     [0.0, *(sign * rate for rate in (0.1, 1, 10, 50, 100, 150, 200, 250, 300, 350, 400) for sign in (1, -1))]
 )
 #: Their K at 25 deg C, [output, input], and B, deg/s; signs reconstructed. What K and B leave of their own axes, deg/s
 #: RMS: Table 4 (proposed) for x and y, Table 3 (after) for z.
-YANG_K = np.array([[1.0005, 0.0188, 7.5133e-4], [-0.0187, 1.0005, 0.0011], [0.0012, 5.2027e-4, 1.0017]])
+YANG_K = np.array([[1.0005, 0.0188, 0.0012], [-0.0187, 1.0005, 5.2027e-4], [0.0011, 7.5133e-4, 1.0017]])
 YANG_B_DPS = np.array([-0.0303, -0.0435, -0.0261])
 YANG_LEFT_DPS = np.array([0.0931, 0.0957, 0.0263])
 

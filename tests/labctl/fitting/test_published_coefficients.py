@@ -24,7 +24,7 @@ started_at = "2018-01-01T00:00:00Z"
 """
 AXES = 'axes = ["x", "y", "z"]\n'
 #: Yang et al. 2018 at 25 deg C; signs reconstructed: K[output][input].
-K = np.array([[1.0005, 0.0188, 7.5133e-4], [-0.0187, 1.0005, 0.0011], [0.0012, 5.2027e-4, 1.0017]])
+K = np.array([[1.0005, 0.0188, 0.0012], [-0.0187, 1.0005, 5.2027e-4], [0.0011, 7.5133e-4, 1.0017]])
 B = np.array([-0.0303, -0.0435, -0.0261])
 #: Their rates with +-350 deg/s, which the printed RMS values are of.
 RATES = np.array([0, *(s * r for r in (0.1, 1, 10, 50, 100, 150, 200, 250, 300, 350, 400) for s in (1, -1))])
