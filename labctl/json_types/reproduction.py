@@ -10,10 +10,10 @@ from labctl.json_types.views import Numbers
 
 
 class PaperTrace(TypedDict):
-    """Points or a line; `colour` is a number for each point, on the colour scale of its panel."""
+    """Points, a line, or cells of a modelled map; `colour` is a number for each, on the colour scale of its panel."""
 
     name: str
-    kind: Literal["points", "line", "dashes"]
+    kind: Literal["points", "line", "dashes", "cells"]
     x: Numbers
     y: Numbers
     colour: NotRequired[list[float]]

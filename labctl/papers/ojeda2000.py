@@ -31,8 +31,8 @@ _PRINTED = (
 _CONTRADICTIONS = (
     Contradiction(
         "Eqs. 7 to 11",
-        "p and q are the orders 3 and 2, and then the numbers of rates and temperatures, 11 and 11; every 10 deg/s over "
-        "+-100 deg/s are 21 rates, and 11 x 11 = 121 means are those of every 20 deg/s.",
+        "p and q are the orders 3 and 2, and then the numbers of rates and temperatures, 11 and 11; every 10 deg/s "
+        "over +-100 deg/s are 21 rates, and 11 x 11 = 121 means are those of every 20 deg/s.",
         "Recipe ojeda2000 has 21 rates, ojeda2000-121 has 11; orders and counts have names of their own.",
     ),
     Contradiction(
@@ -52,14 +52,14 @@ _CONTRADICTIONS = (
     ),
     Contradiction(
         "Results",
-        "One order of magnitude for the error in deg/s stands beside less than 2 % of a turn, but the raw error is itself "
-        "2 deg/s on 100 deg/s, which is 2 %.",
+        "One order of magnitude for the error in deg/s stands beside less than 2 % of a turn, but the raw error is "
+        "itself 2 deg/s on 100 deg/s, which is 2 %.",
         "Both are given: the ratio of the RMS errors, and the largest error per turn as a share of 360 deg.",
     ),
     Contradiction(
         "Eq. 10",
-        "The raw Vandermonde matrix of the 11 x 11 points has a condition number of some 10^10, its normal equations of "
-        "some 10^21, beyond double precision.",
+        "The raw Vandermonde matrix of the 11 x 11 points has a condition number of some 10^10, its normal equations "
+        "of some 10^21, beyond double precision.",
         "Rate and temperature are scaled and the fit is by QR; C is given in the paper's own powers.",
     ),
     Contradiction(

@@ -61,8 +61,8 @@ def _contradictions() -> Iterator[Contradiction]:
     yield Contradiction(
         "Offsets at rest",
         f"About 0.5 (deg/s)/K is claimed; the table has {steep:.2f} between 16 and 23 deg C by least squares "
-        f"({ends:.2f} from end to end) and {flat:.2f} between 23 and 45 deg C: a curve, or a lag behind the thermometer. "
-        "Six points cannot tell.",
+        f"({ends:.2f} from end to end) and {flat:.2f} between 23 and 45 deg C: a curve, or a lag behind the "
+        "thermometer. Six points cannot tell.",
         "Recipe gyrostar fills the gap between 23 and 45 deg C.",
     )
     limit = OFFSET_SHARE_PER_K * FULL_DPS

@@ -105,9 +105,10 @@ def _contradictions() -> Iterator[Contradiction]:
         "Table 2 against the equations",
         f"Table 2 prints {len(RATES_DPS)} rates, the equations have 69 = 3 x {len(full)} rows. The cross-axis RMS "
         f"before compensation of Table 4 over Kxy and Kyx is the RMS of the rates: {printed[0]:.1f} and "
-        f"{printed[1]:.1f} deg/s. {len(full)} rates with +-350 deg/s have {rms_of(full):.1f} deg/s, the {len(RATES_DPS)} "
-        f"printed ones {rms_of(RATES_DPS):.1f} deg/s; Table 3 gives {third[0]:.1f} and {third[1]:.1f} deg/s, neither.",
-        "Recipe table1-x-table2 has the rates as printed, yang-23-rates has +-350 deg/s too; this page uses the latter.",
+        f"{printed[1]:.1f} deg/s. {len(full)} rates with +-350 deg/s have {rms_of(full):.1f} deg/s, the "
+        f"{len(RATES_DPS)} printed ones {rms_of(RATES_DPS):.1f} deg/s; Table 3 "
+        f"gives {third[0]:.1f} and {third[1]:.1f} deg/s, neither.",
+        "Recipe table1-x-table2 has the rates as printed, yang-23-rates has +-350 deg/s too; which this page uses.",
     )
     below = [
         f"{turned} to {output}" for turned, outputs in TABLE_3.items()
@@ -137,8 +138,8 @@ def _contradictions() -> Iterator[Contradiction]:
     )
     yield Contradiction(
         "Table 3 against Table 4",
-        f"After compensation output y has {TABLE_3['x']['y'][3]:g} deg/s RMS in Table 3 and {TABLE_4['x']['y'][2]:g} in "
-        f"Table 4 (turning about x); before, output x has {TABLE_3['x']['x'][1]:g} and {TABLE_4['x']['x'][0]:g} deg/s.",
+        f"After compensation output y has {TABLE_3['x']['y'][3]:g} deg/s RMS in Table 3 and {TABLE_4['x']['y'][2]:g} "
+        f"in Table 4 (turning about x); before it, x has {TABLE_3['x']['x'][1]:g} and {TABLE_4['x']['x'][0]:g} deg/s.",
         "Neither is a target; temperature and data are named beside each number.",
     )
     rest = {axis: unexplained_dps(axis) for axis in "xy"}
@@ -155,20 +156,20 @@ def _contradictions() -> Iterator[Contradiction]:
     )
     yield Contradiction(
         "K_g",
-        "Signs are lost in print. Means of about -0.03, -0.04 and -0.03 deg/s in Table 3 make B negative; of Kxy and Kyx "
-        "one is negative, since small rotations have opposite signs.",
+        "Signs are lost in print. Means of about -0.03, -0.04 and -0.03 deg/s in Table 3 make B negative; of Kxy and "
+        "Kyx one is negative, since small rotations have opposite signs.",
         "Bx, By, Bz and Kxy are taken as negative; the sizes are compared.",
     )
     rates = rms_of(full)
     pairs = ", ".join(
-        f"{name} {abs(PROPOSED[NAMES.index(name)]) * rates:.2f} deg/s where output {name[2]} turning about {name[1]} has "
+        f"{name} {abs(PROPOSED[NAMES.index(name)]) * rates:.2f} deg/s, output {name[2]} turning about {name[1]} at "
         f"{TABLE_3[name[1]][name[2]][1]:.2f}"
         for name in ("Kzx", "Kzy", "Kxz", "Kyz")
     )
     yield Contradiction(
         "Eq. of K_g",
-        f"Kyx multiplies the rate about y in output x: the first index is the input, against use. Table 3 confirms it by "
-        f"the coefficient times the RMS of the rates: {pairs}.",
+        "Kyx multiplies the rate about y in output x: the first index is the input, against use. Table 3 "
+        f"confirms it by the coefficient times the RMS of the rates: {pairs}.",
         "labctl names coefficients by output and input and converts at the border.",
     )
     yield Contradiction(
@@ -179,14 +180,15 @@ def _contradictions() -> Iterator[Contradiction]:
     )
     yield Contradiction(
         "Traditional method",
-        "Least squares at one temperature cannot lose to an interpolation on its own data; Table 4 has it lose in every "
-        "row that shows a difference, so the data of fit and test are mixed.",
+        "Least squares at one temperature cannot lose to an interpolation on its own data; Table 4 has it lose in "
+        "every row that shows a difference, so the data of fit and test are mixed.",
         "All methods are compared at temperatures that no fit has seen.",
     )
     most = max(PROPOSED[9:])
     yield Contradiction(
         "Earth's rate",
-        f"The Earth's rate (0.0042 deg/s) is ignored; it is a tenth of the largest bias ({most:g} deg/s) and shifts a mean.",
+        f"The Earth's rate (0.0042 deg/s) is ignored; it is a tenth of the largest bias ({most:g} deg/s) and "
+        "shifts a mean.",
         "It is subtracted where the latitude of the bench is known.",
     )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from html import escape
 
 from plotly.offline import get_plotlyjs
@@ -18,7 +18,8 @@ h1 { font-size: 1.5rem; } h2 { font-size: 1.15rem; margin: 2.5rem 0 .3rem; }
 .verdict { font-size: 1.25rem; font-weight: 600; } .soft, figcaption { color: var(--soft); }
 figure { margin: 0; } figcaption { max-width: 60rem; font-size: .92rem; }
 table { border-collapse: collapse; font-size: .92rem; } th, td { padding: .2rem .8rem; text-align: right;
-        border-bottom: 1px solid var(--line); } th:first-child, td:first-child { text-align: left; }
+        border-bottom: 1px solid var(--line); vertical-align: top; }
+th:first-child, td:first-child, .words { text-align: left; }
 """
 DRAW = """
 for (const place of document.querySelectorAll("div[data-figure]")) {
@@ -53,10 +54,15 @@ def figure_part(picture: Picture) -> str:
     )
 
 
-def table_part(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return a table; empty without rows."""
+def table_part(head: Sequence[str], rows: Sequence[Sequence[str]], words: Collection[int] = ()) -> str:
+    """Return a table; empty without rows. The columns `words` hold words, aligned left as the first is."""
 
     def line(cells: Sequence[str], tag: str) -> str:
-        return "<tr>" + "".join(f"<{tag}>{escape(cell)}</{tag}>" for cell in cells) + "</tr>"
+        marks = [' class="words"' if column in words else "" for column in range(len(cells))]
+        return (
+            "<tr>"
+            + "".join(f"<{tag}{m}>{escape(cell)}</{tag}>" for cell, m in zip(cells, marks, strict=True))
+            + "</tr>"
+        )
 
     return f"<table>{line(head, 'th')}{''.join(line(row, 'td') for row in rows)}</table>" if rows else ""

@@ -15,6 +15,10 @@ from labctl.plots.theme import ACCENT, INK, SCALE, WARM, grid_of, place
 
 COLOURS = (ACCENT, WARM, "#3a9d6e", "#8a63c7", INK, "#b3242f")
 NONE = "–"
+#: Room for the names of the lines, above the panels.
+LEGEND_PX = 30
+#: Sizes of a measured point, of one in a map, and of a cell of a modelled map.
+POINT_PX, MAP_PX, CELL_PX = 5, 6, 12
 
 
 def paper_html(page: PaperPage) -> str:
@@ -27,9 +31,9 @@ def paper_html(page: PaperPage) -> str:
         *(f"<p>{escape(line)}</p>" for line in page["story"]),
         *_numbers(page["numbers"]),
         "<h2>Where the paper contradicts itself or leaves a choice</h2>" if page["contradictions"] else "",
-        table_part(("place", "what the numbers say", "what is done here"), page["contradictions"]),
+        table_part(("place", "what the numbers say", "what is done here"), page["contradictions"], (1, 2)),
         "<h2>What could not be made</h2>" if page["missing"] else "",
-        table_part(("what", "why", "what to record"), page["missing"]),
+        table_part(("what", "why", "what to record"), page["missing"], (1, 2)),
         *map(figure_part, pictures),
     ]
     return whole_page(page["title"], parts, drawn=bool(pictures))
@@ -46,7 +50,9 @@ def _numbers(numbers: Sequence[PaperNumber]) -> Iterator[str]:
             for n in numbers if n["place"] == at
         ]  # fmt: skip
         yield f"<h2>{escape(at)}</h2>"
-        yield table_part(("quantity", "unit", "printed", "made from", "reproduced", "difference", "why"), rows)
+        yield table_part(
+            ("quantity", "unit", "printed", "made from", "reproduced", "difference", "why"), rows, (1, 3, 6)
+        )
 
 
 def _said(number: PaperNumber) -> str:
@@ -61,16 +67,23 @@ def _number(value: float | None) -> str:
 def paper_figure(figure: PaperFigure) -> go.Figure:
     """Return a figure as a plot: every point of its numbers is drawn."""
     panels, columns = figure["panels"], figure["columns"]
-    drawn = grid_of([panel["title"] for panel in panels], columns, horizontal_spacing=0.22 / columns)
+    drawn = grid_of([panel["title"] for panel in panels], columns, horizontal_spacing=0.27 / columns)
+    shown: set[str] = set()
     for index, panel in enumerate(panels):
         where = place(index, columns)
         for number, trace in enumerate(panel["traces"]):
-            drawn.add_trace(_trace(panel, trace, COLOURS[number % len(COLOURS)], f"coloraxis{index + 1}"), **where)
+            made = _trace(panel, trace, COLOURS[number % len(COLOURS)], f"coloraxis{index + 1}")
+            made.showlegend = _named(panel) and trace["name"] not in shown
+            shown.add(trace["name"])
+            drawn.add_trace(made, **where)
         drawn.update_xaxes(title=panel["x_title"], **where)
         drawn.update_yaxes(title=panel["y_title"], **where)
         if panel["colour_title"]:
             drawn.update_layout({f"coloraxis{index + 1}": _scale(panel, drawn, where)})
-    drawn.update_layout(showlegend=any(_named(panel) for panel in panels))
+    if any(map(_named, panels)):
+        legend = {"orientation": "h", "yref": "container", "y": 0.99, "yanchor": "top", "x": 0.0, "xanchor": "left"}
+        height = drawn.layout.height + LEGEND_PX
+        drawn.update_layout(showlegend=True, legend=legend, height=height, margin={"t": 50 + LEGEND_PX})
     return drawn
 
 
@@ -82,20 +95,19 @@ def _trace(panel: PaperPanel, trace: PaperTrace, colour: str, scale: str) -> go.
     hover = f"%{{x:.5g}}, %{{y:.5g}}<br>{trace['name']}<extra></extra>"
     shared = {
         "x": trace["x"], "y": trace["y"], "name": trace["name"], "hovertemplate": hover, "legendgroup": trace["name"],
-        "showlegend": _named(panel),
     }  # fmt: skip
-    if trace["kind"] != "points":
+    if trace["kind"] in {"line", "dashes"}:
         line = {
             "color": INK if panel["colour_title"] else colour,
             "dash": "dash" if trace["kind"] == "dashes" else None,
         }
         return go.Scatter(mode="lines", line=line, **shared)
     values = trace.get("colour")
-    marker: dict[str, object] = {"size": 5, "color": colour}
+    marker: dict[str, object] = {"size": POINT_PX, "color": colour}
     if values is not None:
-        marker = {"size": 5, "color": values, "coloraxis": scale}
+        marker = {"size": POINT_PX, "color": values, "coloraxis": scale}
         if panel["scale"] == "error":
-            marker |= {"symbol": "square", "size": 6}
+            marker |= {"symbol": "square", "size": CELL_PX if trace["kind"] == "cells" else MAP_PX}
     return go.Scatter(mode="markers", marker=marker, **shared)
 
 

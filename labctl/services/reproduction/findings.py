@@ -57,7 +57,7 @@ def numbers(values: ArrayLike) -> Numbers:
 
 
 def trace(
-    name: str, x: ArrayLike, y: ArrayLike, kind: Literal["points", "line", "dashes"] = "points",
+    name: str, x: ArrayLike, y: ArrayLike, kind: Literal["points", "line", "dashes", "cells"] = "points",
     colour: ArrayLike | None = None,
 ) -> PaperTrace:  # fmt: skip
     """Return points or a line of (n,) numbers."""

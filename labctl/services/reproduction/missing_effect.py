@@ -18,9 +18,11 @@ from labctl.store import Store, open_store
 
 def demonstrate(readings: Recording, of: str) -> Findings:
     """Fit yang2018 to readings, ask what is missing, add it, and ask again."""
-    with tempfile.TemporaryDirectory(prefix="labctl-reproduce-") as folder:
-        with open_store(str(Path(folder) / "paper.sqlite"), write=True) as store:
-            return _in(store, readings, of)
+    with (
+        tempfile.TemporaryDirectory(prefix="labctl-reproduce-") as folder,
+        open_store(str(Path(folder) / "paper.sqlite"), write=True) as store,
+    ):
+        return _in(store, readings, of)
 
 
 def _in(store: Store, readings: Recording, of: str) -> Findings:
@@ -30,12 +32,12 @@ def _in(store: Store, readings: Recording, of: str) -> Findings:
     report_stage("criticise yang2018: which effect is missing")
     answer = criticise_unit(store, serial, None, None)
     error = fitted.error
+    stalled = (
+        f"The missing effect: yang2018 leaves {_said(error.rms_dps)} deg/s RMS of {_said(error.raw_rms_dps)}, but the "
+        f"noise floor is {_said(error.noise_floor_dps)} deg/s. The criticism of it: {' '.join(answer.text)}"
+    )
     found = Findings(
-        story=[
-            f"The missing effect: yang2018 leaves {error.rms_dps:.4f} deg/s RMS of {error.raw_rms_dps:.4f}, and the noise "
-            f"floor is {error.noise_floor_dps:.4f}: it stalls. Asked what is missing, criticism answers: "
-            f"{' '.join(answer.text)}"
-        ],
+        story=[stalled],
         values=[
             Value("stalled", of, error.rms_dps, "bias, scale factor and misalignment cannot follow the curve"),
             Value("floor", of, error.noise_floor_dps, error.noise_floor_source),
@@ -49,11 +51,15 @@ def _in(store: Store, readings: Recording, of: str) -> Findings:
     after = better.error
     again = criticise_unit(store, serial, None, None)
     found.story.append(
-        f"With {added}: {after.rms_dps:.4f} deg/s RMS, {after.heldout_rms_dps:.4f} at temperatures left out of the fit. "
-        f"Asked again: {' '.join(again.text)}"
+        f"With {added} the model leaves {_said(after.rms_dps)} deg/s RMS, and {_said(after.heldout_rms_dps)} deg/s at "
+        f"temperatures left out of the fit. The criticism of that: {' '.join(again.text)}"
     )
     found.values += [
         Value("improved", of, after.rms_dps, f"{added}, as criticism named it"),
         Value("improved_heldout", of, after.heldout_rms_dps, "each inner temperature by a fit without it"),
     ]
     return found
+
+
+def _said(value: float | None) -> str:
+    return "an unknown" if value is None else f"{value:.4f}"

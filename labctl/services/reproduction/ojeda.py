@@ -21,9 +21,9 @@ OSU = (
     "with labctl as dwell means, so without readings at rest."
 )
 RD2100 = (
-    "RD2100 is a simulated unit like the paper's, read at 10 Hz by recipe ojeda2000: 21 rates, 25 to 45 deg C. Its error "
-    "is nearly a polynomial of the surface's own orders, so its ratios say how low the noise is; those of the real gyro "
-    "say what the method does."
+    "RD2100 is a simulated unit like the paper's, read at 10 Hz by recipe ojeda2000: 21 rates, 25 to 45 deg C. Its "
+    "error is nearly a polynomial of the surface's own orders, so its ratios say how low the noise is; those of the "
+    "real gyro say what the method does."
 )
 RECORD = "labctl campaign start ojeda2000: the rates +-100 deg/s every 10 at 25 to 45 deg C every 2"
 
@@ -134,8 +134,7 @@ def _of_surface(surface: Surface) -> list[Value]:
         "raw_max": (_most(surface.raw_dps), f"another unit than the paper's: {rates}, {warm}"),
         "left_max": (_most(surface.left_dps), "the paper gives a figure only"),
         "ratio": (_over(_rms(surface.raw_dps), _rms(surface.left_dps)),
-                  "the larger the error that the surface can follow, the larger the ratio; "
-                  f"{_rms(surface.left_dps):.4f} deg/s RMS are left"),
+                  f"larger where more of the error is smooth; {_rms(surface.left_dps):.4f} deg/s RMS are left"),
         "heldout_ratio": (_over(error.raw_rms_dps, error.heldout_rms_dps),
                           "the paper judges the data of its fit; here each temperature is predicted by the others"),
         "turn_before": (_most(before), "static bias at each temperature from the data sets at rest"),
@@ -163,7 +162,7 @@ def _of_data_sheet() -> list[Value]:
 def _of_rest(found: Findings, measured: Measured, rest: Rest, axis: str, surface: Surface | None) -> None:
     begun = rest.t_s < paper.STATIC_S
     readings = rest.rate_dps[axis][begun]
-    found.figures.append(figures.at_rest(measured.name, rest.t_s[begun], readings))
+    found.figures.insert(0, figures.at_rest(measured.name, rest.t_s[begun], readings))
     try:
         bias = static_bias(readings)
     except LabctlError as error:
@@ -172,6 +171,12 @@ def _of_rest(found: Findings, measured: Measured, rest: Rest, axis: str, surface
     at_rest = "contains the Earth's rate about the axis; another unit than the paper's"
     found.values += [
         Value("readings", measured.name, float(bias.readings), "readings in the first 10 s"),
+        Value(
+            "arw_rate",
+            measured.name,
+            float(bias.u_dps * np.sqrt(rest.t_s[begun][-1]) * 3600.0),
+            "white noise of the first 10 s; the data sheet gives a typical value",
+        ),
         Value("bias_before", measured.name, bias.bias_dps, at_rest),
         Value("u_bias", measured.name, bias.u_dps, "scatter of these readings over the root of their number"),
     ]

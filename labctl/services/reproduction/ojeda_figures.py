@@ -31,8 +31,8 @@ def at_rest(name: str, t_s: Array, rate_dps: Array) -> PaperFigure:
     """Return figure 1: the readings at rest."""
     return {
         "id": f"figure-1-{_slug(name)}", "title": f"Figure 1: output at rest, {name}", "columns": 1,
-        "caption": f"{len(t_s)} readings of the first {paper.STATIC_S:g} s at rest, all drawn. The line is their mean, the "
-        "static bias of eq. 1.",
+        "caption": f"{len(t_s)} readings of the first {paper.STATIC_S:g} s at rest, all drawn. The line is their mean, "
+        "the static bias of eq. 1.",
         "panels": [panel("", "time, s", "output, deg/s", [
             trace("readings", t_s, rate_dps),
             trace("mean", t_s[[0, -1]], np.full(2, rate_dps.mean()), "dashes"),
@@ -47,7 +47,8 @@ def of_surface(surface: Surface) -> tuple[list[PaperFigure], list[Missing]]:
     turning = int(np.isfinite(surface.turn_before_deg).sum())
     turned = f"{turning} of {n} data sets, those from 5 deg/s on; below, the error per turn grows without bound."
     made = [
-        _pair(surface, 3, "error against rate", surface.raw_dps, f"All {n} data sets, output less table rate.", one=True),
+        _pair(surface, 3, "error against rate", surface.raw_dps, f"All {n} data sets: output less table rate.",
+              one=True),
         *fourth,
         _pair(surface, 5, "measured error surface", surface.raw_dps,
               f"All {n} data sets, over rate and over rate and temperature."),
@@ -89,9 +90,10 @@ def _modelled(surface: Surface, output_dps: Array, temperature_c: Array) -> Arra
 
 def _fitted(surface: Surface) -> PaperFigure:
     outputs = np.linspace(surface.output_dps.min(), surface.output_dps.max(), ALONG)
-    lines: list[PaperTrace] = []
-    for warm in np.linspace(surface.temperature_c.min(), surface.temperature_c.max(), LINES):
-        lines.append(trace(f"{warm:.1f} deg C", outputs, _modelled(surface, outputs, np.full(ALONG, warm)), "line"))
+    lines = [
+        trace(f"{warm:.1f} deg C", outputs, _modelled(surface, outputs, np.full(ALONG, warm)), "line")
+        for warm in np.linspace(surface.temperature_c.min(), surface.temperature_c.max(), LINES)
+    ]
     x, t = np.meshgrid(
         np.linspace(outputs[0], outputs[-1], CELLS),
         np.linspace(surface.temperature_c.min(), surface.temperature_c.max(), CELLS),
@@ -99,11 +101,11 @@ def _fitted(surface: Surface) -> PaperFigure:
     cells = _modelled(surface, x.ravel(), t.ravel())
     return {
         "id": "figure-6", "title": "Figure 6: fitted error surface", "columns": 2,
-        "caption": f"Left: the fitted error at {LINES} temperatures over the measured range. Right: the same on a grid of "
-        f"{CELLS} x {CELLS} points.",
+        "caption": f"Left: the fitted error at {LINES} temperatures over the measured range. Right: the same on a grid "
+        f"of {CELLS} x {CELLS} points.",
         "panels": [
             panel("", "output, deg/s", ERROR, lines),
-            panel("", "output, deg/s", WARM, [trace("model", x.ravel(), t.ravel(), colour=cells)], ERROR, "error"),
+            panel("", "output, deg/s", WARM, [trace("model", x.ravel(), t.ravel(), "cells", cells)], ERROR, "error"),
         ],
     }  # fmt: skip
 
@@ -115,20 +117,22 @@ def _over_temperature(surface: Surface) -> tuple[list[PaperFigure], list[Missing
     absent: list[str] = []
     for size in paper.FIGURE_4_RATES_DPS:
         traces: list[PaperTrace] = []
+        found: list[str] = []
         for wanted in (size, -size):
             nearest = float(centre[int(np.argmin(np.abs(centre - wanted)))])
             if abs(nearest - wanted) > NEAR_DPS:
                 absent.append(f"{wanted:+g}")
                 continue
-            here = centre == nearest
+            here, sign = centre == nearest, "+" if wanted > 0 else "-"
+            found.append(f"{nearest:+.1f}")
             warm, output = surface.temperature_c[here], float(surface.output_dps[here].mean())
             grid = np.linspace(warm.min(), warm.max(), ALONG)
             traces += [
-                trace(f"{nearest:+.1f} deg/s", warm, surface.raw_dps[here]),
-                trace(f"model, {nearest:+.1f} deg/s", grid, _modelled(surface, np.full(ALONG, output), grid), "line"),
+                trace(f"measured, {sign} deg/s", warm, surface.raw_dps[here]),
+                trace(f"model, {sign} deg/s", grid, _modelled(surface, np.full(ALONG, output), grid), "line"),
             ]
         if traces:
-            panels.append(panel(f"near +-{size:g} deg/s", WARM, ERROR, traces))
+            panels.append(panel(f"{' and '.join(found)} deg/s", WARM, ERROR, traces))
     drawn = sum(len(t["x"]) for p in panels for t in p["traces"] if t["kind"] == "points")
     missing = []
     if absent:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -69,7 +68,7 @@ def reproduce_unit(
 
 
 def _rows(printed: Printed, found: Findings) -> list[NumberResponse]:
-    """Return a row for each thing that a printed number was reproduced from, one without a number where there is none."""
+    """Return a row for each source that a printed number was reproduced from; one without a number where none is."""
 
     def row(of: str, value: float | None, why: str) -> NumberResponse:
         known = value is not None and printed.value is not None
@@ -132,5 +131,5 @@ def _written(
             (Path(made) / name).write_text(text, encoding="utf-8")
         folder.mkdir(exist_ok=True)
         for name in content:
-            os.replace(Path(made) / name, folder / name)
+            (Path(made) / name).replace(folder / name)
     return answer

@@ -18,7 +18,7 @@ from labctl.services.reproduction.sources import Measured, measured_from, shippe
 from labctl.services.schemas.recordings import OrientationResponse
 
 BENCH = "gyrostar-sim"
-TABLE = "WEISS-ENV05S is the report's own table, shipped with labctl and taken in as coefficients: no readings were published."
+TABLE = "WEISS-ENV05S is the report's own table, shipped with labctl as coefficients: no readings were published."
 SIMULATED = (
     "ENV-05S is a simulated unit like the report's, measured at 13 rates; its lot, its curve of the offset and its "
     "self-heating by 3 K are labctl's choice. Chamber temperatures are 3 K lower, so that the unit has the report's."
@@ -92,7 +92,7 @@ def _tables(measured: Measured, axis: str) -> Findings:
                     measured.name,
                     value,
                     said if inside else f"measured from {nodes[0]:.1f} to {nodes[-1]:.1f} deg C only",
-                )  # fmt: skip
+                )
             )
     found.values += _claims(measured.name, nodes, scale, offset)
     if not own:
@@ -102,7 +102,7 @@ def _tables(measured: Measured, axis: str) -> Findings:
 
 
 def _in_report_units(result: FitResult, recording: Recording, axis: str) -> tuple[Array, Array]:
-    """Return scale factors, mV per deg/s, and offsets, V, at the nodes: by the unit's own conversion, else the report's."""
+    """Return scale factors, mV per deg/s, and offsets, V, at the nodes; the report's unit unless volts."""
     axis_fit = result.fitted.axes[axis]
     unit = recording.info.output.get(axis, OutputUnit())  # type: ignore[call-overload]
     volts = unit.scale if unit.unit == "V" else paper.NOMINAL_MV / 1000.0
@@ -166,8 +166,8 @@ def _drift_figure(name: str, renewed: OrientationResponse, once: OrientationResp
     ]
     return {
         "id": "drift", "title": f"Angle at rest after 10 min, {name}", "columns": 1,
-        "caption": f"The angle that a vehicle at rest seems to turn by. {len(renewed.drift_between_stops_deg_per_min)} legs "
-        "between declared stops of 10 s.",
+        "caption": f"The angle that a vehicle at rest seems to turn by. {len(renewed.drift_between_stops_deg_per_min)} "
+        "legs between declared stops of 10 s.",
         "panels": [panel("", "time after the warm-up, min", "angle, deg", traces)],
     }  # fmt: skip
 
@@ -176,7 +176,8 @@ def _figure(name: str, nodes: Array, scale: Array, offset: Array) -> PaperFigure
     printed = (np.array(paper.TEMPERATURES_C), np.array(paper.SCALE_MV), np.array(paper.OFFSET_V))
     panels = [
         panel(title, "temperature, deg C", y, [
-            trace(name, nodes, values), trace("printed", printed[0], theirs), trace(f"{name}: lines", nodes, values, "line"),
+            trace(name, nodes, values), trace("printed", printed[0], theirs),
+            trace(f"{name}: lines", nodes, values, "line"),
         ])
         for title, y, values, theirs in (
             ("scale factor", "mV/(deg/s)", scale, printed[1]), ("offset at rest", "V", offset, printed[2])

@@ -15,7 +15,7 @@ from labctl.papers import yang2018 as paper
 from labctl.services.reproduction.findings import panel, trace
 
 if TYPE_CHECKING:
-    from labctl.services.reproduction.yang import Judged
+    from labctl.services.reproduction.yang_errors import Judged
 
 RATE, WARM, ERROR = "table rate, deg/s", "temperature, deg C", "error, deg/s"
 #: Points along an interpolated coefficient.
@@ -56,8 +56,8 @@ def _against_temperature(
                 panels.append(panel(label, WARM, y, traces))
     return {
         "id": f"figure-{number}", "title": f"Figure {number}: {title} against temperature, {name}", "columns": 3,
-        "caption": f"Dots are the coefficients at the {len(table.nodes_c)} measured temperatures, all drawn; lines are the "
-        "three-point Lagrange interpolation. Kij multiplies the rate about i in output j.",
+        "caption": f"Dots are the coefficients at the {len(table.nodes_c)} measured temperatures, all drawn; lines are "
+        "the three-point Lagrange interpolation. Kij multiplies the rate about i in output j.",
         "panels": panels,
     }  # fmt: skip
 
@@ -102,11 +102,12 @@ def _surface(data: FitData, by_axis: Mapping[str, Array], number: str, title: st
     rate, warm = data.channels.table_rate_dps(), data.temperature_c
     panels: list[PaperPanel] = []
     for turned, out, rows in _panels(data):
-        rows = rows & np.isfinite(by_axis[out])
-        traces = [trace("data sets", rate[rows], by_axis[out][rows], colour=warm[rows])]
+        known = rows & np.isfinite(by_axis[out])
+        traces = [trace("data sets", rate[known], by_axis[out][known], colour=warm[known])]
         panels.append(panel(f"turning {turned}, output {out}", RATE, ERROR, traces, "deg C"))
     return {
-        "id": f"figure-{number}-{title.split()[0]}", "title": f"Figure {number}: error {title}", "caption": caption,
+        "id": f"figure-{number}-{title.split(maxsplit=1)[0]}", "title": f"Figure {number}: error {title}",
+        "caption": caption,
         "columns": len(data.outputs), "panels": panels,
     }  # fmt: skip
 
