@@ -15,6 +15,7 @@ from labctl.plots.theme import ACCENT, INK, SCALE, WARM, grid_of, place
 
 COLOURS = (ACCENT, WARM, "#3a9d6e", "#8a63c7", INK, "#b3242f")
 NONE = "–"
+HEAD = ("quantity", "unit", "printed", "made from", "reproduced", "difference", "why")
 #: Room for the names of the lines, above the panels.
 LEGEND_PX = 30
 #: Sizes of a measured point, of one in a map, and of a cell of a modelled map.
@@ -69,17 +70,23 @@ def paper_figure(figure: PaperFigure) -> go.Figure:
     panels, columns = figure["panels"], figure["columns"]
     drawn = grid_of([panel["title"] for panel in panels], columns, horizontal_spacing=0.27 / columns)
     shown: set[str] = set()
+    one_scale = len({panel["colour_title"] for panel in panels}) == 1
     for index, panel in enumerate(panels):
-        where = place(index, columns)
+        where, scale = place(index, columns), "coloraxis" if one_scale else f"coloraxis{index + 1}"
         for number, trace in enumerate(panel["traces"]):
-            made = _trace(panel, trace, COLOURS[number % len(COLOURS)], f"coloraxis{index + 1}")
+            made = _trace(panel, trace, COLOURS[number % len(COLOURS)], scale)
             made.showlegend = _named(panel) and trace["name"] not in shown
             shown.add(trace["name"])
             drawn.add_trace(made, **where)
-        drawn.update_xaxes(title=panel["x_title"], **where)
+        below = panels[index + columns : index + columns + 1]
+        if not below or below[0]["x_title"] != panel["x_title"]:
+            drawn.update_xaxes(title=panel["x_title"], **where)
         drawn.update_yaxes(title=panel["y_title"], **where)
-        if panel["colour_title"]:
-            drawn.update_layout({f"coloraxis{index + 1}": _scale(panel, drawn, where)})
+        if panel["colour_title"] and not one_scale:
+            subplot = drawn.get_subplot(**where)
+            drawn.update_layout({scale: _scale([panel], subplot.xaxis.domain[1], subplot.yaxis.domain)})
+    if one_scale and panels[0]["colour_title"]:
+        drawn.update_layout(coloraxis=_scale(panels, 1.0, (0.0, 1.0)))
     if any(map(_named, panels)):
         legend = {"orientation": "h", "yref": "container", "y": 0.99, "yanchor": "top", "x": 0.0, "xanchor": "left"}
         height = drawn.layout.height + LEGEND_PX
@@ -111,16 +118,15 @@ def _trace(panel: PaperPanel, trace: PaperTrace, colour: str, scale: str) -> go.
     return go.Scatter(mode="markers", marker=marker, **shared)
 
 
-def _scale(panel: PaperPanel, drawn: go.Figure, where: dict[str, int]) -> dict[str, object]:
-    """Return a colour axis whose bar stands beside its own panel."""
-    values = [value for trace in panel["traces"] for value in trace.get("colour", ())]
-    subplot = drawn.get_subplot(**where)
-    right, (low, high) = subplot.xaxis.domain[1], subplot.yaxis.domain
+def _scale(panels: Sequence[PaperPanel], right: float, span: tuple[float, float]) -> dict[str, object]:
+    """Return the colour axis of panels; its bar stands at their right end, over a span of the figure's height."""
+    values = [value for panel in panels for trace in panel["traces"] for value in trace.get("colour", ())]
+    low, high = span
     bar = {
-        "title": {"text": panel["colour_title"], "side": "right"}, "x": right, "xanchor": "left", "thickness": 10,
+        "title": {"text": panels[0]["colour_title"], "side": "right"}, "x": right, "xanchor": "left", "thickness": 10,
         "y": (low + high) / 2, "len": high - low,
     }  # fmt: skip
-    if panel["scale"] == "temperature":
+    if panels[0]["scale"] == "temperature":
         return {"colorscale": TEMPERATURE_SCALE, "colorbar": bar}
     most = max((abs(value) for value in values), default=1.0)
     return {"colorscale": SCALE, "cmin": -most, "cmax": most, "colorbar": bar}

@@ -167,7 +167,7 @@ def _drift_figure(name: str, renewed: OrientationResponse, once: OrientationResp
     return {
         "id": "drift", "title": f"Angle at rest after 10 min, {name}", "columns": 1,
         "caption": f"The angle that a vehicle at rest seems to turn by. {len(renewed.drift_between_stops_deg_per_min)} "
-        "legs between declared stops of 10 s.",
+        "legs between declared stops of 10 s. In the first 2 s the offset is not known; then the angle is put back.",
         "panels": [panel("", "time after the warm-up, min", "angle, deg", traces)],
     }  # fmt: skip
 
@@ -180,7 +180,7 @@ def _figure(name: str, nodes: Array, scale: Array, offset: Array) -> PaperFigure
             trace(f"{name}: lines", nodes, values, "line"),
         ])
         for title, y, values, theirs in (
-            ("scale factor", "mV/(deg/s)", scale, printed[1]), ("offset at rest", "V", offset, printed[2])
+            ("scale factor", "scale factor, mV/(deg/s)", scale, printed[1]), ("offset at rest", "offset, V", offset, printed[2])
         )
     ]  # fmt: skip
     return {
