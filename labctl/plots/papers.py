@@ -19,7 +19,7 @@ HEAD = ("quantity", "unit", "printed", "made from", "reproduced", "difference", 
 #: Room for the names of the lines, above the panels.
 LEGEND_PX = 30
 #: Sizes of a measured point, of one in a map, and of a cell of a modelled map.
-POINT_PX, MAP_PX, CELL_PX = 5, 6, 12
+POINT_PX, MAP_PX, CELL_PX = 5, 6, 17
 
 
 def paper_html(page: PaperPage) -> str:

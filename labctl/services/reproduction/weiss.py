@@ -180,7 +180,8 @@ def _figure(name: str, nodes: Array, scale: Array, offset: Array) -> PaperFigure
             trace(f"{name}: lines", nodes, values, "line"),
         ])
         for title, y, values, theirs in (
-            ("scale factor", "scale factor, mV/(deg/s)", scale, printed[1]), ("offset at rest", "offset, V", offset, printed[2])
+            ("scale factor", "scale factor, mV/(deg/s)", scale, printed[1]),
+            ("offset at rest", "offset, V", offset, printed[2]),
         )
     ]  # fmt: skip
     return {

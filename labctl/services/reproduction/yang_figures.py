@@ -50,8 +50,8 @@ def _against_temperature(
             if wanted(coefficient):
                 label, shift = _paper_name(coefficient, out), 1.0 if coefficient == "scale_factor" else 0.0
                 traces = [
-                    trace(f"{label} at the nodes", table.nodes_c, values + shift),
-                    trace(f"{label} between", grid, basis @ values + shift, "line"),
+                    trace("at the measured temperatures", table.nodes_c, values + shift),
+                    trace("interpolated", grid, basis @ values + shift, "line"),
                 ]
                 panels.append(panel(label, WARM, y, traces))
     return {
