@@ -111,12 +111,17 @@ def test_what_one_axis_cannot_give_is_named_with_what_to_record(fog: Recording) 
     assert "table1-x-table2" in missing.record
 
 
-def test_the_model_of_yang_2018_stalls_and_the_nonlinearity_is_suspected(triaxial: Recording) -> None:
-    result = fit(to_points(triaxial), "yang2018")
+def test_the_model_of_yang_2018_stalls_and_criticism_names_the_nonlinearity() -> None:
+    campaign = simulated_readings("yang-23-rates", "yang-paper-sim", sample_rate_hz=1.0)
+    result = fit(to_points(campaign), "yang2018")
     assert result.error.rms_dps is not None
     assert result.error.noise_floor_dps is not None
-    assert result.error.rms_dps > 8 * result.error.noise_floor_dps
-    assert "scale_factor_odd" in {suspect.effect for suspect in held(triaxial, "yang2018").suspects[:3]}
+    assert result.error.rms_dps > 20 * result.error.noise_floor_dps
+    verdict = held(campaign, "yang2018").verdict
+    assert (verdict.form, verdict.groups) == ("missing", (("scale_factor_odd",),))
+    better = fit(to_points(campaign), "yang2018", ["scale_factor_odd:3"])
+    assert better.error.rms_dps is not None
+    assert better.error.rms_dps < 1.1 * result.error.noise_floor_dps
 
 
 @pytest.fixture(scope="module")
