@@ -83,11 +83,13 @@ def _longest_rest(store: Store, recording: int) -> int | None:
 
 def rest_in(columns: Columns, recording: Recording) -> Rest | None:
     """Return the valid readings of a data set if the table is at rest in it, else None."""
-    if "t_s" not in columns or "table_rate_dps" not in columns:
+    still = recording.info.motion == "rest"  # which has no table
+    if "t_s" not in columns or not (still or "table_rate_dps" in columns):
         return None
     good = np.asarray(columns["valid"]) != 0 if "valid" in columns else np.ones(len(columns["t_s"]), dtype=bool)
-    rates = np.asarray(columns["table_rate_dps"], dtype=np.float64)[good]
-    if len(rates) < 2 or np.abs(rates).max() > AT_REST_DPS:
+    if np.count_nonzero(good) < 2:
+        return None
+    if not still and np.abs(np.asarray(columns["table_rate_dps"], dtype=np.float64)[good]).max() > AT_REST_DPS:
         return None
     t_s = np.asarray(columns["t_s"], dtype=np.float64)[good]
     found = {}
@@ -101,7 +103,8 @@ def _rest_of(recording: Recording) -> Rest | None:
     if recording.info.kind != "samples":
         return None
     dataset = np.asarray(recording.columns["dataset"])
-    rates = np.asarray(recording.columns.get("table_rate_dps", np.ones(len(dataset))), dtype=np.float64)
+    usual = np.full(len(dataset), 0.0 if recording.info.motion == "rest" else np.inf)
+    rates = np.asarray(recording.columns.get("table_rate_dps", usual), dtype=np.float64)
     for number in np.unique(dataset[np.abs(rates) <= AT_REST_DPS]):
         rows = dataset == number
         if (rest := rest_in({name: v[rows] for name, v in recording.columns.items()}, recording)) is not None:

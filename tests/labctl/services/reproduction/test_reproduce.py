@@ -220,3 +220,12 @@ def test_an_interrupted_write_leaves_nothing(lab: Lab, monkeypatch: pytest.Monke
     monkeypatch.undo()
     assert not (lab.folder / "full").exists()
     assert not [p.name for p in lab.folder.iterdir() if p.name.startswith(".full")]
+
+
+@pytest.mark.parametrize("name", ["osu-fog", "freeimu-warmup", "imucal-turns", "weiss-gyrostar"])
+def test_every_paper_says_of_every_kind_of_recording_what_it_lacks(lab: Lab, name: str) -> None:
+    serial = lab.json("import", str(EXAMPLES / name))["serial"]
+    for paper in ("ojeda2000", "yang2018", "weiss1995"):
+        answer = lab.json("reproduce", paper, serial, "--out", str(lab.folder / "each"))
+        assert all(missing["why"] and missing["record"] for missing in answer["missing"])
+        assert answer["missing"]
