@@ -127,7 +127,7 @@ def _contradictions() -> Iterator[Contradiction]:
         + ", ".join(f"{values[0]:g}" for values in TABLE_4[MEANS].values())
         + " and so on, stand under RMS but three are negative before compensation: they are means, and the stated "
         "reductions by 55.50, 75.36 and 48.33 % are those of the size of a mean.",
-        "They are held against means; mean, SD, RMS and maximum have names of their own.",
+        "They are compared with means; mean, SD, RMS and maximum have names of their own.",
     )
     gains = [1 - TABLE_4["x"][o][2] / TABLE_4["x"][o][1] for o in ("y", "z")]
     yield Contradiction(
