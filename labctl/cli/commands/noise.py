@@ -16,6 +16,19 @@ if TYPE_CHECKING:
     from labctl.services.schemas.recordings import OrientationResponse
 
 
+WarmUp = Annotated[
+    float, typer.Option("--warm-up-s", metavar="S", min=0, help="Leave the readings of the first S seconds out.")
+]
+StopEvery = Annotated[
+    float | None,
+    typer.Option(
+        "--stop-every-s",
+        metavar="S",
+        help="Of a record at rest: declare a stop of 10 s every S seconds and motion between, and print the drift.",
+    ),
+]
+
+
 def allan(
     source: Annotated[
         str,
@@ -64,17 +77,8 @@ def orientation(
     standstill: Annotated[
         bool, typer.Option("--standstill/--no-standstill", help="Hold the angle and learn the offset at standstill.")
     ] = True,
-    warm_up_s: Annotated[
-        float, typer.Option("--warm-up-s", metavar="S", min=0, help="Leave the readings of the first S seconds out.")
-    ] = 0.0,
-    stop_every_s: Annotated[
-        float | None,
-        typer.Option(
-            "--stop-every-s",
-            metavar="S",
-            help="Of a record at rest: declare a stop of 10 s every S seconds and motion between, and print the drift.",
-        ),
-    ] = None,
+    warm_up_s: WarmUp = 0.0,
+    stop_every_s: StopEvery = None,
     calibration: Annotated[
         Path | None, typer.Option("--calibration", metavar="FILE", help="Of a table: correct it by this calibration.")
     ] = None,

@@ -11,6 +11,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.csv as pacsv
 import pyarrow.parquet as pq
+from numpy.typing import NDArray
 
 from labctl.calibration import Calibration, CalibrationWarning, read_calibration
 from labctl.compensator import Compensator
@@ -126,25 +127,7 @@ def _follow(
     """Return the answer, and the angle at every row, NaN before the end of the rest and where a row is left out."""
     axis = _axis(source, options.axis)
     t_s, (rate, warning) = _column(source, "t_s"), _rate_dps(source, axis, calibration)
-    good = np.isfinite(rate) & np.isfinite(t_s)
-    if "valid" in source.columns:
-        good &= _column(source, "valid") != 0
-    rows = np.flatnonzero(good)
-    if len(rows) == 0:
-        raise NotEnoughData(f"{source.what}: gyro_{axis} has no valid reading; check the column")
-    if len(back := np.flatnonzero(np.diff(t_s[rows]) <= 0)):
-        row = int(rows[back[0] + 1])
-        raise BadRecording(
-            f"{source.what}: column 't_s', row {row + 1}: {t_s[row]:g} s is not after the reading before it; sort the "
-            "rows by time"
-        )
-    warm = rows[t_s[rows] - t_s[rows[0]] >= options.warm_up_s]
-    if len(warm) == 0:
-        raise NotEnoughData(
-            f"{source.what}: its readings last {t_s[rows[-1]] - t_s[rows[0]]:.0f} s, and the warm-up is "
-            f"{options.warm_up_s:g} s; give a shorter one, or record for longer"
-        )
-    left_out, rows = len(t_s) - len(rows), warm
+    rows, left_out = _rows(source, axis, t_s, rate, options.warm_up_s)
     resting = t_s[rows] - t_s[rows[0]] < options.rest_s
     bias = static_bias(rate[rows][resting], options.instability_dps) if options.rest_s > 0 else None
     moving = rows[~resting]
@@ -174,6 +157,29 @@ def _follow(
         course_deg=angle[shown].tolist(), warning=warning,
     )  # fmt: skip
     return answer, angle
+
+
+def _rows(source: _Source, axis: str, t_s: Array, rate: Array, warm_up_s: float) -> tuple[NDArray[np.int64], int]:
+    """Return the valid rows after the warm-up, and how many were not valid. Raises NotEnoughData, BadRecording."""
+    good = np.isfinite(rate) & np.isfinite(t_s)
+    if "valid" in source.columns:
+        good &= _column(source, "valid") != 0
+    rows = np.flatnonzero(good)
+    if len(rows) == 0:
+        raise NotEnoughData(f"{source.what}: gyro_{axis} has no valid reading; check the column")
+    if len(back := np.flatnonzero(np.diff(t_s[rows]) <= 0)):
+        row = int(rows[back[0] + 1])
+        raise BadRecording(
+            f"{source.what}: column 't_s', row {row + 1}: {t_s[row]:g} s is not after the reading before it; sort the "
+            "rows by time"
+        )
+    warm = rows[t_s[rows] - t_s[rows[0]] >= warm_up_s]
+    if len(warm) == 0:
+        raise NotEnoughData(
+            f"{source.what}: its readings last {t_s[rows[-1]] - t_s[rows[0]]:.0f} s, and the warm-up is "
+            f"{warm_up_s:g} s; give a shorter one, or record for longer"
+        )
+    return warm, len(t_s) - len(rows)
 
 
 def _declared(t_s: Array, options: OrientationOptions) -> list[bool | None]:

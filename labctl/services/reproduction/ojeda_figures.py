@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from labctl.fitting import Channels
@@ -12,9 +10,7 @@ from labctl.fitting.numeric.arrays import Array
 from labctl.json_types.reproduction import PaperFigure, PaperPanel, PaperTrace
 from labctl.papers import ojeda2000 as paper
 from labctl.services.reproduction.findings import Missing, panel, trace
-
-if TYPE_CHECKING:
-    from labctl.services.reproduction.ojeda import Surface
+from labctl.services.reproduction.ojeda_surface import Surface
 
 RATE, WARM, ERROR, TURN = "table rate, deg/s", "temperature, deg C", "error, deg/s", "error per turn, deg"
 #: A measured rate stands for one of Fig. 4 within this many deg/s.

@@ -14,14 +14,14 @@ from labctl.plots import paper_html
 from labctl.progress import report_stage
 from labctl.services.reproduction import ojeda, weiss, yang
 from labctl.services.reproduction.findings import Findings, points_in
-from labctl.services.reproduction.sources import of_unit
-from labctl.services.schemas.reproduction import (
+from labctl.services.reproduction.response import (
     ContradictionResponse,
     FigureResponse,
     MissingResponse,
     NumberResponse,
     ReproductionResponse,
 )
+from labctl.services.reproduction.sources import of_unit
 from labctl.store import Store
 
 OWN: dict[str, Callable[[], Findings]] = {

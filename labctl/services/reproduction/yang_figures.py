@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,9 +12,7 @@ from labctl.fitting.numeric.arrays import Array
 from labctl.json_types.reproduction import PaperFigure, PaperPanel, PaperTrace
 from labctl.papers import yang2018 as paper
 from labctl.services.reproduction.findings import panel, trace
-
-if TYPE_CHECKING:
-    from labctl.services.reproduction.yang_errors import Judged
+from labctl.services.reproduction.yang_errors import Judged
 
 RATE, WARM, ERROR = "table rate, deg/s", "temperature, deg C", "error, deg/s"
 #: Points along an interpolated coefficient.
