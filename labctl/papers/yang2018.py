@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from math import sqrt
 
 import numpy as np
@@ -70,20 +70,13 @@ def _printed() -> Iterator[Printed]:
         yield Printed(f"temperature_{node}", "Table 1", f"temperature {node + 1}", "deg C", temperature)
     for row, rate in enumerate(RATES_DPS):
         yield Printed(f"rate_{row}", "Table 2", f"rate {row + 1}", "deg/s", rate)
-    for kind, values in (("proposed", PROPOSED), ("traditional", TRADITIONAL)):
-        for name, value in zip(NAMES, values, strict=True):
+    for kind, coefficients in (("proposed", PROPOSED), ("traditional", TRADITIONAL)):
+        for name, value in zip(NAMES, coefficients, strict=True):
             unit = "deg/s" if name[0] == "B" else "1"
             yield Printed(f"{kind}_{name}", "K_g at 25 deg C", f"{name}, {kind}", unit, value)
     yield Printed("cross_max", "Text", "largest cross-axis error before, at 400 deg/s", "deg/s", CROSS_DPS)
-    for number, table, columns in ((3, TABLE_3, TABLE_3_COLUMNS), (4, TABLE_4, TABLE_4_COLUMNS)):
-        for turned, outputs in table.items():
-            for output, values in outputs.items():
-                for column, value in zip(columns, values, strict=True):
-                    means = " (a mean)" if number == 4 and turned == MEANS else ""
-                    yield Printed(
-                        f"table{number}_{turned}_{output}_{column}", f"Table {number}",
-                        f"turning about {turned}, output {output}: {column}{means}", "deg/s", value,
-                    )  # fmt: skip
+    yield from _cells(3, TABLE_3, TABLE_3_COLUMNS)
+    yield from _cells(4, TABLE_4, TABLE_4_COLUMNS)
     for axis in AXES:
         after = TABLE_3[axis][axis][3] if axis == MEANS else TABLE_4[axis][axis][2]
         where = "Table 3" if axis == MEANS else "Table 4"
@@ -95,6 +88,17 @@ def _printed() -> Iterator[Printed]:
     yield Printed("improved", "The missing effect", "with the named effect: RMS error", "deg/s", None)
     yield Printed("improved_heldout", "The missing effect", "the same, temperatures left out", "deg/s", None)
     yield Printed("floor", "The missing effect", "noise floor of a data set", "deg/s", None)
+
+
+def _cells(
+    number: int, table: Mapping[str, Mapping[str, Sequence[float]]], columns: tuple[str, ...]
+) -> Iterator[Printed]:
+    for turned, outputs in table.items():
+        means = " (a mean)" if number == 4 and turned == MEANS else ""
+        for output, values in outputs.items():
+            for column, value in zip(columns, values, strict=True):
+                quantity = f"turning about {turned}, output {output}: {column}{means}"
+                yield Printed(f"table{number}_{turned}_{output}_{column}", f"Table {number}", quantity, "deg/s", value)
 
 
 def _of_the_tables() -> Iterator[Contradiction]:

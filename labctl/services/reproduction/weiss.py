@@ -104,7 +104,7 @@ def _tables(measured: Measured, axis: str) -> Findings:
 def _in_report_units(result: FitResult, recording: Recording, axis: str) -> tuple[Array, Array]:
     """Return scale factors, mV per deg/s, and offsets, V, at the nodes; the report's unit unless volts."""
     axis_fit = result.fitted.axes[axis]
-    unit = recording.info.output.get(axis, OutputUnit())  # type: ignore[call-overload]
+    unit = next((unit for name, unit in recording.info.output.items() if name == axis), OutputUnit())
     volts = unit.scale if unit.unit == "V" else paper.NOMINAL_MV / 1000.0
     rest = unit.offset if unit.unit == "V" else paper.REST_V
     rows = dict(zip(axis_fit.names, axis_fit.values, strict=True))
@@ -136,7 +136,7 @@ def _nonlinearity(measured: Measured, result: FitResult, axis: str) -> list[Valu
 
 
 def _drift(readings: Recording, name: str, axis: str) -> Findings:
-    columns = {"t_s": readings.columns["t_s"], f"gyro_{axis}": readings.gyro_dps(axis)}
+    columns = {"t_s": np.asarray(readings.columns["t_s"], dtype=np.float64), f"gyro_{axis}": readings.gyro_dps(axis)}
     return _drift_in(columns, name, axis)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from labctl.fitting import FitData, FittedModel
 from labctl.fitting.models.temperature import LagrangeTable
@@ -65,7 +66,7 @@ def _paper_name(coefficient: str, out: str) -> str:
     return f"K{out}{out}" if coefficient == "scale_factor" else f"K{coefficient[-1]}{out}"
 
 
-def errors(judged: Judged, shown: tuple[Array, float]) -> list[PaperFigure]:
+def errors(judged: Judged, shown: tuple[NDArray[np.bool_], float]) -> list[PaperFigure]:
     """Return figures 7 to 9: nine panels each, turning about x, y, z in rows and outputs x, y, z in columns."""
     here, at_c = shown
     data, n = judged.data, len(judged.data)
@@ -89,7 +90,7 @@ def _drawn(data: FitData, by_axis: Mapping[str, Array]) -> str:
     return f"{known} of {len(data)} data sets."
 
 
-def _panels(data: FitData) -> list[tuple[str, str, Array]]:
+def _panels(data: FitData) -> list[tuple[str, str, NDArray[np.bool_]]]:
     """Return axis that is turned, output, and the data sets (m,) of each panel."""
     turning = np.char.lstrip(np.asarray(data.channels["position"]).astype(np.str_), "-")
     return [(turned, out, turning == turned) for turned in paper.AXES if turned in turning for out in data.outputs]

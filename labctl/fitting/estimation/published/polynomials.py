@@ -28,19 +28,20 @@ def from_polynomials(recording: Recording, model: str) -> FitResult:
     axes = recording.info.axes
     cells = form_of(recording.columns).coefficients(recording.info, recording.columns)
     rows = [row_of(recording, axis) for axis in axes]
-    reference_c, valid_c = 0.0, (None, None)
-    if "reference_c" in recording.columns:
-        reference_c = common(recording, "reference_c", rows)
-        valid_c = (common(recording, "temperature_low_c", rows), common(recording, "temperature_high_c", rows))
+    reference_c, low_c, high_c = (
+        common(recording, name, rows) if name in recording.columns else None
+        for name in ("reference_c", "temperature_low_c", "temperature_high_c")
+    )
     fits: dict[str, AxisFit] = {axis: _axis(recording, axis, cells, row) for axis, row in zip(axes, rows, strict=True)}
-    law = ErrorModel(model, _terms(cells), "rate", reference=Reference(reference_c))
-    low_c, high_c = valid_c
-    centred = np.zeros(1) if low_c is None or high_c is None else np.linspace(low_c, high_c, SHOWN) - reference_c
+    law = ErrorModel(model, _terms(cells), "rate", reference=Reference(reference_c or 0.0))
+    centred = (
+        np.zeros(1) if low_c is None or high_c is None else np.linspace(low_c, high_c, SHOWN) - (reference_c or 0.0)
+    )
     biases = sum(cell.startswith("b") for cell in cells)
     at_rest = centred[:, None] ** np.arange(biases)
     raw: dict[str, Array] = {axis: at_rest @ fit.values[:biases, 0] for axis, fit in fits.items()}
     error = ErrorFigures(rms(raw), 0.0, None, None, "none")
-    return FitResult(FittedModel(law, fits), error, valid_c, rate_range_dps(recording))
+    return FitResult(FittedModel(law, fits), error, (low_c, high_c), rate_range_dps(recording))
 
 
 def _terms(cells: list[str]) -> tuple[Term, ...]:
