@@ -110,7 +110,11 @@ def _cells(of: str, turned: str, output: str, before: Spread, traditional: Sprea
     for column, (value, why) in third.items():
         yield _cell(f"table3_{turned}_{output}_{column}", of, value, why)
     whys = (
-        ("bias at this temperature, and its drift", "a mean, since the paper prints means here", "as beside it")
+        (
+            "bias at this temperature, and its drift",
+            "a mean, since the paper prints means here",
+            "a mean; drift of the bias between two campaigns",
+        )
         if mean
         else (
             _before(own=own, mean=False),
