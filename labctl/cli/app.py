@@ -66,6 +66,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "improve": criticism.improve,
     "ladder": criticism.ladder,
     "trend": trend.trend,
+    "reproduce": effects.reproduce,
     "units": trend.units,
     "certify": calibrations.certify,
     "revoke": calibrations.revoke,

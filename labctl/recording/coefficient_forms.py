@@ -19,6 +19,7 @@ from labctl.recording.info import RecordingInfo
 #: Highest power of temperature in a surface, and of the rate.
 TEMPERATURE_POWER, MOST_RATE_POWER = 2, 5
 SCALE_OFFSET, MATRIX, SURFACE = "scale factor and offset", "matrix K and bias B", "polynomial C"
+POLYNOMIALS = "polynomials in temperature"
 
 Needed = Callable[[RecordingInfo, Collection[str]], list[str]]
 
@@ -59,9 +60,25 @@ def _scale_offset(info: RecordingInfo, _: Collection[str]) -> list[str]:
     return [*axis, "temperature_c", "scale_factor", "offset"]
 
 
+def _polynomials(info: RecordingInfo, columns: Collection[str]) -> list[str]:
+    """Powers of the temperature less `reference_c`: b in output units, k in output units per deg/s, each per K^j."""
+    powers = {
+        letter: [int(found[2]) for found in map(_POWER.fullmatch, columns) if found is not None and found[1] == letter]
+        for letter in "bk"
+    }
+    cells = [f"b_t{j}" for j in range(min(max(powers["b"], default=0), TEMPERATURE_POWER) + 1)]
+    if powers["k"]:
+        cells += [f"k_t{j}" for j in range(min(max(powers["k"]), TEMPERATURE_POWER) + 1)]
+    axis = ["axis"] if len(info.axes) > 1 else []
+    span = ["reference_c", "temperature_low_c", "temperature_high_c"] if cells != ["b_t0"] else []
+    return [*axis, *cells, *span]
+
+
 _CELL = re.compile(r"c_r(\d)_t(\d)")
+_POWER = re.compile(r"([bk])_t(\d)")
 FORMS = (
     CoefficientForm(SURFACE, ("ojeda2000",), _CELL, _surface, frozenset({"axis"})),
+    CoefficientForm(POLYNOMIALS, ("bias_scale", "bias_temperature", "bias"), _POWER, _polynomials, frozenset({"axis"})),
     CoefficientForm(MATRIX, ("yang2018", "single_temperature"), re.compile(r"k_[xyz]{2}|b_[xyz]"), _matrix),
     CoefficientForm(
         SCALE_OFFSET, ("weiss1995",), re.compile(r"scale_factor|offset"), _scale_offset, frozenset({"axis"})

@@ -68,6 +68,55 @@ def mems_triaxial(axes: tuple[str, ...], rng: np.random.Generator) -> UnitTruth:
     return UnitTruth(axes, gain, offset, None, 0.01, 0.0015)
 
 
+#: Yang et al. 2018, Table 2 and +-350 deg/s: the rates that their printed errors belong to (RMS 210.6 deg/s).
+YANG_RATES_DPS = np.array(
+    [0.0, *(sign * rate for rate in (0.1, 1, 10, 50, 100, 150, 200, 250, 300, 350, 400) for sign in (1, -1))]
+)
+#: Their K at 25 deg C, [output, input], and B, deg/s; signs reconstructed. What K and B leave of their own axes, deg/s
+#: RMS: Table 4 (proposed) for x and y, Table 3 (after) for z.
+YANG_K = np.array([[1.0005, 0.0188, 0.0012], [-0.0187, 1.0005, 5.2027e-4], [0.0011, 7.5133e-4, 1.0017]])
+YANG_B_DPS = np.array([-0.0303, -0.0435, -0.0261])
+YANG_LEFT_DPS = np.array([0.0931, 0.0957, 0.0263])
+
+
+def yang_paper(axes: tuple[str, ...], _: np.random.Generator) -> UnitTruth:
+    """Make the unit of Yang et al. 2018: printed K and B, and a soft limit that leaves what they print after their fit.
+
+    How its scale factors and its bias change with temperature is not printed in numbers: lines and parabolas of a
+    usual size here.
+    """
+    rows = ["xyz".index(axis) for axis in axes]
+    slope, tilt = np.array([2e-5, -3e-5, 4e-5]), np.array([4e-4, -3e-4, 2e-4])
+    curve = np.array([5e-6, -4e-6, 3e-6])
+    cubes = YANG_RATES_DPS**3
+    bent = cubes - _line(cubes) * YANG_RATES_DPS
+    limit_dps = np.sqrt(np.sqrt(np.mean(bent**2)) / (3.0 * YANG_LEFT_DPS))[rows]  # tanh begins as x - x^3 / 3
+    soft = limit_dps[:, None] * np.tanh(YANG_RATES_DPS / limit_dps[:, None]) - YANG_RATES_DPS
+    line = np.array([_line(each) for each in soft])
+
+    def gain(temperature_c: Array) -> Array:
+        warm = temperature_c[:, None] - 25.0
+        k = np.broadcast_to(YANG_K, (len(temperature_c), 3, 3)).copy()
+        k[:, range(3), range(3)] += slope * warm
+        return k[:, rows]
+
+    def offset(temperature_c: Array) -> Array:
+        warm = temperature_c[:, None] - 25.0
+        return (YANG_B_DPS + tilt * warm + curve * warm * warm)[:, rows]
+
+    def bend(own_dps: Array, temperature_c: Array) -> Array:
+        """Return the soft limit less its straight line over the paper's rates, which the printed K contains."""
+        del temperature_c
+        return limit_dps * np.tanh(own_dps / limit_dps) - own_dps - line * own_dps
+
+    return UnitTruth(axes, gain, offset, bend, 0.01, 0.0015)
+
+
+def _line(values: Array) -> float:
+    """Return the least-squares slope of values (23,) over the paper's rates."""
+    return float(values @ YANG_RATES_DPS / (YANG_RATES_DPS @ YANG_RATES_DPS))
+
+
 def rd2100(axes: tuple[str, ...], rng: np.random.Generator) -> UnitTruth:
     """Make an E-Core RD2100 like that of Ojeda et al. 2000: about 2 deg/s off at 100 deg/s, and warm-sensitive."""
     lot = rng.normal(1.0, 0.1, 6)
@@ -119,6 +168,7 @@ def gyrostar(axes: tuple[str, ...], rng: np.random.Generator) -> UnitTruth:
 
 PROFILES: dict[str, Callable[[tuple[str, ...], np.random.Generator], UnitTruth]] = {
     "mems-triaxial": mems_triaxial,
+    "yang-paper": yang_paper,
     "rd2100": rd2100,
     "gyrostar": gyrostar,
 }

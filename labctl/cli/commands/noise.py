@@ -16,6 +16,19 @@ if TYPE_CHECKING:
     from labctl.services.schemas.recordings import OrientationResponse
 
 
+WarmUp = Annotated[
+    float, typer.Option("--warm-up-s", metavar="S", min=0, help="Leave the readings of the first S seconds out.")
+]
+StopEvery = Annotated[
+    float | None,
+    typer.Option(
+        "--stop-every-s",
+        metavar="S",
+        help="Of a record at rest: declare a stop of 10 s every S seconds and motion between, and print the drift.",
+    ),
+]
+
+
 def allan(
     source: Annotated[
         str,
@@ -64,6 +77,8 @@ def orientation(
     standstill: Annotated[
         bool, typer.Option("--standstill/--no-standstill", help="Hold the angle and learn the offset at standstill.")
     ] = True,
+    warm_up_s: WarmUp = 0.0,
+    stop_every_s: StopEvery = None,
     calibration: Annotated[
         Path | None, typer.Option("--calibration", metavar="FILE", help="Of a table: correct it by this calibration.")
     ] = None,
@@ -83,7 +98,7 @@ def orientation(
     from labctl.services.calibrations.orientation import OrientationOptions, orientation_of_file, orientation_of_unit
     from labctl.services.commands.open import open_readonly
 
-    options = OrientationOptions(axis, rest_s, instability_dps, standstill)
+    options = OrientationOptions(axis, rest_s, instability_dps, standstill, warm_up_s, stop_every_s)
     with one_clear_line():
         if Path(source).is_file():
             answer = orientation_of_file(Path(source), calibration, out, options)
@@ -108,6 +123,9 @@ def _print(answer: OrientationResponse) -> None:
     console.print(f"  angle        {answer.angle_deg:.3f} deg after {answer.seconds:.1f} s")
     if answer.drift_deg_per_min is not None:
         console.print(f"  per minute   {format_number(answer.drift_deg_per_min)} deg/min")
+    if legs := answer.drift_between_stops_deg_per_min:
+        drifts = ", ".join(format_number(leg, 2) for leg in legs)
+        console.print(f"  between stops {drifts} deg/min", markup=False)
     console.print(f"  standing     {answer.standing_s:.1f} s; offset {format_number(answer.offset_dps)} deg/s")
     if answer.gap_s:
         console.print(f"  without readings {answer.gap_s:.1f} s", style="yellow")

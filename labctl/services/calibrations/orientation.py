@@ -11,6 +11,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.csv as pacsv
 import pyarrow.parquet as pq
+from numpy.typing import NDArray
 
 from labctl.calibration import Calibration, CalibrationWarning, read_calibration
 from labctl.compensator import Compensator
@@ -30,6 +31,8 @@ from labctl.store import Store
 #: Points of a course that is sent.
 MOST_POINTS = 2000
 TABLES = frozenset({".csv", ".parquet"})
+#: A declared stop lasts so long, s: 2 s until the offset is learned, and as many readings as make its noise small.
+STOP_S = 10.0
 
 
 @dataclass(frozen=True)
@@ -40,6 +43,8 @@ class OrientationOptions:
     rest_s: float = 0.0  #: the unit is at rest for so long from the first reading on: its static bias is taken off
     instability_dps: float = 0.0  #: of the bias, deg/s: what a mean does not remove
     standstill: bool = True  #: hold the angle, and learn the offset, at standstill
+    warm_up_s: float = 0.0  #: readings of the first so long are left out
+    stop_every_s: float | None = None  #: a record at rest is taken as a journey with a declared stop so often
 
 
 @dataclass(frozen=True)
@@ -99,6 +104,14 @@ def orientation_of_file(
     return answer
 
 
+def orientation_of_readings(what: str, columns: Columns, options: OrientationOptions) -> OrientationResponse:
+    """Follow the angle in readings (n,): `t_s`, and `gyro_z` or another axis in deg/s. `what` names them in errors.
+
+    Raises BadInput, BadRecording, NotEnoughData.
+    """
+    return _follow(_Source(what, columns, {}), None, options)[0]
+
+
 def _version(store: Store, serial: str, version: int | None) -> Calibration | None:
     if version == 0:
         return None
@@ -114,6 +127,40 @@ def _follow(
     """Return the answer, and the angle at every row, NaN before the end of the rest and where a row is left out."""
     axis = _axis(source, options.axis)
     t_s, (rate, warning) = _column(source, "t_s"), _rate_dps(source, axis, calibration)
+    rows, left_out = _rows(source, axis, t_s, rate, options.warm_up_s)
+    resting = t_s[rows] - t_s[rows[0]] < options.rest_s
+    bias = static_bias(rate[rows][resting], options.instability_dps) if options.rest_s > 0 else None
+    moving = rows[~resting]
+    o = Orientation(offset_dps=bias.bias_dps if bias else 0.0)
+    angle = np.full(len(t_s), np.nan)
+    standing_s, before = 0.0, None
+    declared = _declared(t_s[moving], options)
+    for row, still in zip(moving.tolist(), declared, strict=True):
+        angle[row] = o.update(float(t_s[row]), float(rate[row]), still=still)
+        standing_s += float(t_s[row]) - before if o.standing and before is not None else 0.0
+        before = float(t_s[row])
+    seconds = float(t_s[moving[-1]] - t_s[moving[0]]) if len(moving) else 0.0
+    shown = (
+        moving[np.unique(np.linspace(0, len(moving) - 1, min(len(moving), MOST_POINTS)).astype(int))]
+        if len(moving)
+        else moving
+    )
+    answer = OrientationResponse(
+        axis=axis, version=calibration.version if calibration else None, readings=len(rows),
+        left_out=left_out, seconds=seconds,
+        static_bias=None if bias is None else StaticBiasResponse(
+            bias_dps=bias.bias_dps, u_dps=bias.u_dps, readings=bias.readings, seconds=options.rest_s
+        ),
+        angle_deg=o.angle_deg, drift_deg_per_min=60 * o.angle_deg / seconds if seconds > 0 else None,
+        drift_between_stops_deg_per_min=_between_stops(t_s[moving], angle[moving], declared, options),
+        offset_dps=o.offset_dps, standing_s=standing_s, gap_s=o.gap_s, t_s=t_s[shown].tolist(),
+        course_deg=angle[shown].tolist(), warning=warning,
+    )  # fmt: skip
+    return answer, angle
+
+
+def _rows(source: _Source, axis: str, t_s: Array, rate: Array, warm_up_s: float) -> tuple[NDArray[np.int64], int]:
+    """Return the valid rows after the warm-up, and how many were not valid. Raises NotEnoughData, BadRecording."""
     good = np.isfinite(rate) & np.isfinite(t_s)
     if "valid" in source.columns:
         good &= _column(source, "valid") != 0
@@ -126,33 +173,36 @@ def _follow(
             f"{source.what}: column 't_s', row {row + 1}: {t_s[row]:g} s is not after the reading before it; sort the "
             "rows by time"
         )
-    resting = t_s[rows] - t_s[rows[0]] < options.rest_s
-    bias = static_bias(rate[rows][resting], options.instability_dps) if options.rest_s > 0 else None
-    moving = rows[~resting]
-    o = Orientation(offset_dps=bias.bias_dps if bias else 0.0)
-    angle = np.full(len(t_s), np.nan)
-    standing_s, before = 0.0, None
-    for row in moving.tolist():
-        angle[row] = o.update(float(t_s[row]), float(rate[row]), still=None if options.standstill else False)
-        standing_s += float(t_s[row]) - before if o.standing and before is not None else 0.0
-        before = float(t_s[row])
-    seconds = float(t_s[moving[-1]] - t_s[moving[0]]) if len(moving) else 0.0
-    shown = (
-        moving[np.unique(np.linspace(0, len(moving) - 1, min(len(moving), MOST_POINTS)).astype(int))]
-        if len(moving)
-        else moving
-    )
-    answer = OrientationResponse(
-        axis=axis, version=calibration.version if calibration else None, readings=len(rows),
-        left_out=len(t_s) - len(rows), seconds=seconds,
-        static_bias=None if bias is None else StaticBiasResponse(
-            bias_dps=bias.bias_dps, u_dps=bias.u_dps, readings=bias.readings, seconds=options.rest_s
-        ),
-        angle_deg=o.angle_deg, drift_deg_per_min=60 * o.angle_deg / seconds if seconds > 0 else None,
-        offset_dps=o.offset_dps, standing_s=standing_s, gap_s=o.gap_s, t_s=t_s[shown].tolist(),
-        course_deg=angle[shown].tolist(), warning=warning,
-    )  # fmt: skip
-    return answer, angle
+    warm = rows[t_s[rows] - t_s[rows[0]] >= warm_up_s]
+    if len(warm) == 0:
+        raise NotEnoughData(
+            f"{source.what}: its readings last {t_s[rows[-1]] - t_s[rows[0]]:.0f} s, and the warm-up is "
+            f"{warm_up_s:g} s; give a shorter one, or record for longer"
+        )
+    return warm, len(t_s) - len(rows)
+
+
+def _declared(t_s: Array, options: OrientationOptions) -> list[bool | None]:
+    """Return what is declared of each reading (n,): True at a stop, False between stops, None where nothing is."""
+    if options.stop_every_s is None:
+        return [None if options.standstill else False] * len(t_s)
+    if not options.stop_every_s > 2 * STOP_S:
+        raise BadInput(
+            f"stops every {options.stop_every_s:g} s: a stop lasts {STOP_S:g} s; take more than {2 * STOP_S:g} s"
+        )
+    return [bool(since % options.stop_every_s < STOP_S) for since in (t_s - t_s[0]).tolist()] if len(t_s) else []
+
+
+def _between_stops(
+    t_s: Array, angle_deg: Array, declared: list[bool | None], options: OrientationOptions
+) -> list[float]:
+    """Return by how much the angle drifts between two stops, deg/min, one number for each whole leg."""
+    if options.stop_every_s is None:
+        return []
+    moves = np.array(declared) == False  # noqa: E712  None is neither
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], moves, [False]]).astype(int)))
+    legs = [(a, b - 1) for a, b in edges.reshape(-1, 2).tolist() if b < len(t_s)]  # the last may be broken off
+    return [60.0 * float(angle_deg[b] - angle_deg[a]) / float(t_s[b] - t_s[a]) for a, b in legs if b > a]
 
 
 def _axis(source: _Source, asked: str | None) -> str:

@@ -221,6 +221,7 @@ class OrientationResponse(ResponseModel):
     seconds: float
     static_bias: StaticBiasResponse | None = Field(description="Taken off; null: no rest was named.")
     angle_deg: float = Field(description="At the end; 0 at the end of the rest.")
+    drift_between_stops_deg_per_min: list[float] = Field(default_factory=list)  #: with declared stops, of each leg
     drift_deg_per_min: float | None = Field(
         description="Angle over time: the drift where the unit stood; null: no time."
     )

@@ -24,7 +24,7 @@ started_at = "2018-01-01T00:00:00Z"
 """
 AXES = 'axes = ["x", "y", "z"]\n'
 #: Yang et al. 2018 at 25 deg C; signs reconstructed: K[output][input].
-K = np.array([[1.0005, 0.0188, 7.5133e-4], [-0.0187, 1.0005, 0.0011], [0.0012, 5.2027e-4, 1.0017]])
+K = np.array([[1.0005, 0.0188, 0.0012], [-0.0187, 1.0005, 5.2027e-4], [0.0011, 7.5133e-4, 1.0017]])
 B = np.array([-0.0303, -0.0435, -0.0261])
 #: Their rates with +-350 deg/s, which the printed RMS values are of.
 RATES = np.array([0, *(s * r for r in (0.1, 1, 10, 50, 100, 150, 200, 250, 300, 350, 400) for s in (1, -1))])
@@ -97,6 +97,39 @@ def test_each_power_of_ojedas_matrix_stands_where_it_is_named(tmp_path: Path, i:
     corrected = result.fitted.compensate({"z": output}, Channels({"temperature_c": temperature_c}, {"z": output}))
     np.testing.assert_allclose(output - corrected["z"], 0.001 * output**i * (temperature_c - 35.0) ** j, atol=1e-12)
     assert result.temperature_c == (25.0, 45.0)
+
+
+def test_polynomials_in_temperature_are_the_simple_models(tmp_path: Path) -> None:
+    span: list[object] = [20.0, -10.0, 50.0]
+    columns = ["reference_c", "temperature_low_c", "temperature_high_c", "b_t0", "b_t1", "b_t2", "k_t0", "k_t1"]
+    volts = 'axes = ["z"]\n[output.z]\nunit = "V"\nscale = 0.02\noffset = 2.5\n'
+    folder = table(tmp_path / "t", volts, columns, [[*span, 2.51, 1e-3, -2e-5, 0.0202, 1e-5]])
+    result = fit(read_recording(folder), "bias_scale")
+    rate, warm = np.array([-40.0, 0.0, 60.0]), np.array([-5.0, 20.0, 45.0])
+    u = warm - 20.0
+    volt = 2.51 + 1e-3 * u - 2e-5 * u**2 + (0.0202 + 1e-5 * u) * rate
+    output = {"z": (volt - 2.5) / 0.02}
+    corrected = result.fitted.compensate(output, Channels({"temperature_c": warm}, output))
+    np.testing.assert_allclose(corrected["z"], rate, atol=1e-9)
+    assert result.temperature_c == (-10.0, 50.0)
+    result = fit(
+        read_recording(
+            table(tmp_path / "b", volts, [*columns[:5], "u_b_t0", "u_b_t1"], [[*span, 2.5, 1e-3, 0.01, 0.001]])
+        ),
+        "bias_temperature",
+    )
+    assert result.fitted.axes["z"].u == pytest.approx(np.array([[0.5], [0.05]]))
+    bias = fit(
+        read_recording(table(tmp_path / "c", 'axes = ["x", "y"]\n', ["axis", "b_t0"], [["x", 0.5], ["y", -0.25]])),
+        "bias",
+    )
+    assert [float(bias.fitted.axes[a].values[0, 0]) for a in "xy"] == [0.5, -0.25]
+    with pytest.raises(BadRecording, match="column 'reference_c' is missing; a table of the form 'polynomials in temp"):
+        read_recording(table(tmp_path / "d", volts, ["b_t0", "b_t1"], [[2.5, 1e-3]]))
+    with pytest.raises(BadRecording, match="'b_t3' is not known in a table of the form 'polynomials in temperature'"):
+        read_recording(
+            table(tmp_path / "e", volts, [*columns, "b_t3"], [[*span, 2.51, 1e-3, -2e-5, 0.0202, 1e-5, 0.1]])
+        )
 
 
 def test_an_unknown_column_is_refused_with_what_to_write_instead(tmp_path: Path) -> None:

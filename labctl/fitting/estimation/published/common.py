@@ -74,3 +74,26 @@ def _from_neighbours(nodes: Array, bias: Array) -> Array:
     pairs = np.column_stack([nodes[:-2], nodes[2:]])
     weights = lagrange_weights(pairs, nodes[1:-1])
     return weights[:, 0] * bias[:-2] + weights[:, 1] * bias[2:] - bias[1:-1]
+
+
+def row_of(recording: Recording, axis: str) -> int:
+    """Return the row of an axis in a table with one row per axis. Raises NotEnoughData for none or several."""
+    columns = recording.columns
+    rows = np.flatnonzero(np.asarray(columns["axis"]) == axis) if "axis" in columns else np.arange(len(recording))
+    if len(rows) != 1:
+        raise NotEnoughData(
+            f"{recording.info.serial}, axis {axis}: a polynomial needs exactly one row for each axis, found "
+            f"{len(rows)}; correct the column `axis` of the file"
+        )
+    return int(rows[0])
+
+
+def common(recording: Recording, name: str, rows: list[int]) -> float:
+    """Return the value of a column that all axes share. Raises NotEnoughData where they differ."""
+    values: Array = numbers(recording, name)[rows]
+    if np.any(values != values[0]):
+        listed = ", ".join(f"{value:g}" for value in values)
+        raise NotEnoughData(
+            f"{recording.info.serial}: column {name!r} differs between the axes ({listed}); give all axes the same"
+        )
+    return float(values[0])

@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from labctl.errors import NotEnoughData
 from labctl.fitting.effects import Reference, Term
 from labctl.fitting.effects.scale_factor import surface_unit
 from labctl.fitting.estimation.error_metrics import ErrorFigures, rms
-from labctl.fitting.estimation.published.common import axis_fit, numbers, rate_range_dps, uncertainty
+from labctl.fitting.estimation.published.common import axis_fit, common, numbers, rate_range_dps, row_of, uncertainty
 from labctl.fitting.estimation.result import FitResult
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.fitted_model import AxisFit, FittedModel
@@ -31,9 +30,9 @@ def from_surface(recording: Recording, model: str) -> FitResult:
     Raises NotEnoughData where an axis has no row of its own, or the rows differ in reference or range.
     """
     axes = recording.info.axes
-    rows = [_row_of(recording, axis) for axis in axes]
+    rows = [row_of(recording, axis) for axis in axes]
     reference_c, low_c, high_c = (
-        _common(recording, name, rows) for name in ("reference_c", "temperature_low_c", "temperature_high_c")
+        common(recording, name, rows) for name in ("reference_c", "temperature_low_c", "temperature_high_c")
     )
     cells = form_of(recording.columns).coefficients(recording.info, recording.columns)
     fits: dict[str, AxisFit] = {axis: _axis(recording, cells, row) for axis, row in zip(axes, rows, strict=True)}
@@ -51,24 +50,3 @@ def _axis(recording: Recording, cells: list[str], row: int) -> AxisFit:
     u = np.array([[uncertainty(recording, name)[row]] for name in cells])
     units = tuple(surface_unit(int(name[3]), int(name[6])) for name in cells)
     return axis_fit((EFFECT,) * len(cells), tuple(cells), units, values, u)
-
-
-def _row_of(recording: Recording, axis: str) -> int:
-    columns = recording.columns
-    rows = np.flatnonzero(np.asarray(columns["axis"]) == axis) if "axis" in columns else np.arange(len(recording))
-    if len(rows) != 1:
-        raise NotEnoughData(
-            f"{recording.info.serial}, axis {axis}: a polynomial needs exactly one row for each axis, found "
-            f"{len(rows)}; correct the column `axis` of the file"
-        )
-    return int(rows[0])
-
-
-def _common(recording: Recording, name: str, rows: list[int]) -> float:
-    values: Array = numbers(recording, name)[rows]
-    if np.any(values != values[0]):
-        listed = ", ".join(f"{value:g}" for value in values)
-        raise NotEnoughData(
-            f"{recording.info.serial}: column {name!r} differs between the axes ({listed}); give all axes the same"
-        )
-    return float(values[0])

@@ -6,22 +6,27 @@ from collections.abc import Callable
 
 from labctl.errors import BadInput
 from labctl.fitting.estimation.published.matrices import from_matrices
+from labctl.fitting.estimation.published.polynomials import from_polynomials
 from labctl.fitting.estimation.published.scale_offset import from_scale_offset
 from labctl.fitting.estimation.published.surface import from_surface
 from labctl.fitting.estimation.result import FitResult
 from labctl.recording import Recording
-from labctl.recording.coefficient_forms import MATRIX, SCALE_OFFSET, SURFACE, form_of
+from labctl.recording.coefficient_forms import MATRIX, POLYNOMIALS, SCALE_OFFSET, SURFACE, form_of
 
 _MAKERS: dict[str, Callable[[Recording, str], FitResult]] = {
     SCALE_OFFSET: from_scale_offset,
     MATRIX: from_matrices,
     SURFACE: from_surface,
+    POLYNOMIALS: from_polynomials,
 }
 
 
 def models_of(recording: Recording) -> tuple[str, ...]:
     """Return the names of the models that a table of coefficients makes, the one to propose first."""
     form = form_of(recording.columns)
+    if form.name == POLYNOMIALS:
+        cells = set(form.coefficients(recording.info, recording.columns))
+        return ("bias_scale",) if "k_t0" in cells else ("bias",) if cells == {"b_t0"} else ("bias_temperature",)
     several = len(recording) >= 3  # what yang2018 interpolates between
     return form.models if several or form.name != MATRIX else tuple(reversed(form.models))
 

@@ -1,0 +1,83 @@
+"""Ojeda, Chung, Borenstein 2000: a fibre-optic gyro with one axis, KVH E-Core RD2100."""
+
+from __future__ import annotations
+
+from labctl.papers.paper import Contradiction, Paper, Printed
+
+#: Rates of Fig. 4, deg/s; each with both signs.
+FIGURE_4_RATES_DPS = (60.0, 75.0, 90.0)
+#: Eq. 1: readings, and seconds, of a static bias.
+STATIC_READINGS, STATIC_S = 100, 10.0
+
+_PRINTED = (
+    Printed("arw_rate", "Table I", "angle random walk", "(deg/h)/sqrt(Hz)", 5.0),
+    Printed("arw_angle", "Table I", "the same angle random walk", "deg/sqrt(h)", 0.08),
+    Printed("readings", "Eq. 1", "readings of a static bias", "1", float(STATIC_READINGS)),
+    Printed("bias_before", "Eq. 1", "static bias, mean of the output at rest", "deg/s", None),
+    Printed("bias_after", "Eq. 15", "static bias after calibration", "deg/s", None),
+    Printed("u_bias", "Eq. 1", "standard uncertainty of a static bias by white noise", "deg/s", None),
+    Printed("coefficients", "Eqs. 9 to 11", "coefficients of the surface", "1", 12.0),
+    Printed("raw_max", "Figs. 3, 5", "largest error before compensation", "deg/s", 2.0, "about"),
+    Printed("left_max", "Fig. 7", "largest error after compensation", "deg/s", None),
+    Printed("ratio", "Fig. 7", "RMS error before over after compensation", "1", 10.0, "about"),
+    Printed("heldout_ratio", "Fig. 7", "the same, at temperatures left out of the fit", "1", None),
+    Printed("turn_before", "Fig. 8", "largest error per turn of 360 deg, static bias off only", "deg", 15.0, "about"),
+    Printed("turn_after", "Fig. 9", "largest error per turn, full compensation", "deg", None),
+    Printed("turn_after_share", "Fig. 9", "largest error per turn, share of the turn", "%", 2.0, "below"),
+    Printed("turn_ratio", "Figs. 8, 9", "RMS error per turn before over after", "1", 10.0, "about"),
+    Printed("turn_max_ratio", "Figs. 8, 9", "largest error per turn before over after", "1", 10.0, "about"),
+)
+
+_CONTRADICTIONS = (
+    Contradiction(
+        "Eqs. 7 to 11",
+        "p and q are the orders 3 and 2, and then the numbers of rates and temperatures, 11 and 11; every 10 deg/s "
+        "over +-100 deg/s are 21 rates, and 11 x 11 = 121 means are those of every 20 deg/s.",
+        "Recipe ojeda2000 has 21 rates, ojeda2000-121 has 11; orders and counts have names of their own.",
+    ),
+    Contradiction(
+        "Figs. 4 to 9",
+        "The text says 25 to 45 deg C, Fig. 4 shows 32.5 to 45, Figs. 5 to 9 show 35 to 41; there was no chamber.",
+        "The measured temperature of each data set is used, and the range of each figure is that of the recording.",
+    ),
+    Contradiction(
+        "Eq. 14",
+        "Error x sampling rate x time has the unit deg/s x Hz x s: it is an angle only for an error per sample.",
+        "Error per turn = error in deg/s x 360 / |rate|.",
+    ),
+    Contradiction(
+        "Eq. 14, Figs. 8, 9",
+        "The error per turn grows without bound towards rest.",
+        "It is given from 5 deg/s on, as in the paper; the error in deg/s stands beside it.",
+    ),
+    Contradiction(
+        "Results",
+        "One order of magnitude for the error in deg/s stands beside less than 2 % of a turn, but the raw error is "
+        "itself 2 deg/s on 100 deg/s, which is 2 %.",
+        "Both are given: the ratio of the RMS errors, and the largest error per turn as a share of 360 deg.",
+    ),
+    Contradiction(
+        "Eq. 10",
+        "The raw Vandermonde matrix of the 11 x 11 points has a condition number of some 10^10, its normal equations "
+        "of some 10^21, beyond double precision.",
+        "Rate and temperature are scaled and the fit is by QR; C is given in the paper's own powers.",
+    ),
+    Contradiction(
+        "Eqs. 2, 13, 15, 16",
+        "Minus signs are lost in print.",
+        "Corrected rate = output - error.",
+    ),
+    Contradiction(
+        "Results",
+        "Nothing was measured twice, so repeatability is unknown.",
+        "The noise floor comes from repeats where the recording has them.",
+    ),
+)  # fmt: skip
+
+PAPER = Paper(
+    "ojeda2000",
+    "Precision-calibration of fiber-optics gyroscopes for mobile robot navigation",
+    "L. Ojeda, H. Chung, J. Borenstein, Proc. IEEE ICRA 2000, pp. 2064-2069",
+    _PRINTED,
+    _CONTRADICTIONS,
+)

@@ -1,0 +1,83 @@
+"""What the reproduction of a paper has found, and the few ways to say it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from labctl.json_types.reproduction import PaperFigure, PaperPanel, PaperTrace
+from labctl.json_types.views import Numbers
+
+
+@dataclass(frozen=True)
+class Value:
+    """A reproduced number: of which printed one (`labctl.papers`), from what, and why it differs."""
+
+    id: str
+    of: str
+    value: float | None
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class Missing:
+    """A part of a paper that a recording does not give."""
+
+    what: str
+    why: str
+    record: str
+
+
+@dataclass
+class Findings:
+    """Everything that a page says beside the paper's own facts."""
+
+    sources: list[str] = field(default_factory=list)
+    story: list[str] = field(default_factory=list)
+    values: list[Value] = field(default_factory=list)
+    missing: list[Missing] = field(default_factory=list)
+    figures: list[PaperFigure] = field(default_factory=list)
+
+    def add(self, other: Findings) -> None:
+        """Take in what another recording gave."""
+        self.sources += other.sources
+        self.story += other.story
+        self.values += other.values
+        self.missing += other.missing
+        self.figures += other.figures
+
+
+def numbers(values: ArrayLike) -> Numbers:
+    """Return numbers (n,) as JSON: None for NaN."""
+    return [float(v) if np.isfinite(v) else None for v in np.asarray(values, dtype=np.float64)]
+
+
+def trace(
+    name: str, x: ArrayLike, y: ArrayLike, kind: Literal["points", "line", "dashes", "cells"] = "points",
+    colour: ArrayLike | None = None,
+) -> PaperTrace:  # fmt: skip
+    """Return points or a line of (n,) numbers."""
+    made: PaperTrace = {"name": name, "kind": kind, "x": numbers(x), "y": numbers(y)}
+    if colour is not None:
+        made["colour"] = np.asarray(colour, dtype=np.float64).tolist()
+    return made
+
+
+def panel(
+    title: str, x_title: str, y_title: str, traces: Iterable[PaperTrace], colour_title: str = "",
+    scale: Literal["temperature", "error"] = "temperature",
+) -> PaperPanel:  # fmt: skip
+    """Return a panel."""
+    return {
+        "title": title, "x_title": x_title, "y_title": y_title, "colour_title": colour_title, "scale": scale,
+        "traces": list(traces),
+    }  # fmt: skip
+
+
+def points_in(figure: PaperFigure) -> int:
+    """Return how many points a figure draws; lines are not counted."""
+    return sum(len(t["x"]) for p in figure["panels"] for t in p["traces"] if t["kind"] == "points")

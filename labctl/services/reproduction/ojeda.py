@@ -1,0 +1,154 @@
+"""Ojeda et al. 2000: the error surface of one axis, and the error per turn before and after compensation."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from labctl.error_per_turn import AT_REST_DPS, static_bias
+from labctl.errors import BadInput, LabctlError
+from labctl.fitting.numeric.arrays import Array
+from labctl.papers import ojeda2000 as paper
+from labctl.progress import report_stage
+from labctl.services.reproduction import ojeda_figures as figures
+from labctl.services.reproduction.findings import Findings, Missing, Value
+from labctl.services.reproduction.ojeda_surface import Surface, surface_of
+from labctl.services.reproduction.sources import Measured, Rest, shipped, simulated
+
+OSU = (
+    "OSU-FOG-2024 is a real fibre-optic gyro of another maker on a stepper table, heated from 37 to 49 deg C; shipped "
+    "with labctl as dwell means, so without readings at rest."
+)
+RD2100 = (
+    "RD2100 is a simulated unit like the paper's, read at 10 Hz by recipe ojeda2000: 21 rates, 25 to 45 deg C. Its "
+    "error is nearly a polynomial of the surface's own orders, so its ratios say how low the noise is; those of the "
+    "real gyro say what the method does."
+)
+RECORD = "labctl campaign start ojeda2000: the rates +-100 deg/s every 10 at 25 to 45 deg C every 2"
+
+
+def reproduce_own() -> Findings:
+    """Return the paper by the real gyro that comes with labctl and by the simulated unit of the paper."""
+    found = Findings(values=_of_data_sheet())
+    found.add(_of(shipped("osu-fog", OSU), None))
+    found.add(_of(simulated("ojeda2000", "single-axis-sim", "RD2100, simulated", RD2100), None))
+    return found
+
+
+def reproduce(measured: Measured, axis: str | None) -> Findings:
+    """Return what a unit's recording gives of the paper. Raises BadInput for an axis that it does not have."""
+    found = Findings(values=_of_data_sheet())
+    found.add(_of(measured, axis))
+    return found
+
+
+def _of(measured: Measured, axis: str | None) -> Findings:
+    found = Findings(sources=[measured.sentence])
+    axes: list[str] = list(measured.recording.info.axes)
+    if axis is not None and axis not in axes:
+        raise BadInput(f"--axis {axis!r}: the recording has axes {', '.join(axes)}; choose one of them")
+    axis = axis or axes[0]
+    surface = None
+    report_stage(f"fit ojeda2000 to {measured.name}")
+    try:
+        surface = surface_of(measured, axis)
+    except LabctlError as error:
+        found.missing.append(Missing("Figures 3 to 9, eqs. 9 to 14", str(error), RECORD))
+    if surface is not None:
+        found.values += _of_surface(surface)
+        made, lacking = figures.of_surface(surface)
+        found.figures += made
+        found.missing += lacking
+    if measured.rest is None:
+        found.missing.append(
+            Missing(
+                f"Figure 1 and eqs. 1 and 15 of {measured.name}",
+                "the recording holds means of data sets, or no readings at rest",
+                "readings of one data set at rate 0, 10 s or more",
+            )
+        )
+    else:
+        _of_rest(found, measured, measured.rest, axis, surface)
+    return found
+
+
+def _rms(values: Array) -> float | None:
+    known = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(known**2))) if len(known) else None
+
+
+def _most(values: Array) -> float | None:
+    known = values[np.isfinite(values)]
+    return float(np.abs(known).max()) if len(known) else None
+
+
+def _over(before: float | None, after: float | None) -> float | None:
+    return before / after if before is not None and after else None
+
+
+def _of_surface(surface: Surface) -> list[Value]:
+    error = surface.result.error
+    rates = f"{len(surface.rate_dps)} data sets up to {np.abs(surface.rate_dps).max():.0f} deg/s"
+    warm = f"{surface.temperature_c.min():.0f} to {surface.temperature_c.max():.0f} deg C"
+    coefficients = len(surface.result.fitted.axes[surface.axis].names)
+    before, after = surface.turn_before_deg, surface.turn_after_deg
+    largest_after = _most(after)
+    said = {
+        "coefficients": (coefficients, "cubic in rate, parabola in temperature"
+                         if coefficients == 12 else "with misalignment, since the unit has several axes"),
+        "raw_max": (_most(surface.raw_dps), f"another unit than the paper's: {rates}, {warm}"),
+        "left_max": (_most(surface.left_dps), "the paper gives a figure only"),
+        "ratio": (_over(_rms(surface.raw_dps), _rms(surface.left_dps)),
+                  f"larger where more of the error is smooth; {_rms(surface.left_dps):.4f} deg/s RMS are left"),
+        "heldout_ratio": (_over(error.raw_rms_dps, error.heldout_rms_dps),
+                          "the paper judges the data of its fit; here each temperature is predicted by the others"),
+        "turn_before": (_most(before), "static bias at each temperature from the data sets at rest"),
+        "turn_after": (largest_after, "the paper gives a share of the turn only"),
+        "turn_after_share": (None if largest_after is None else largest_after / 3.6, "share of 360 deg"),
+        "turn_ratio": (_over(_rms(before), _rms(after)), "RMS of all data sets from 5 deg/s on"),
+        "turn_max_ratio": (_over(_most(before), largest_after),
+                           "the largest errors are at the slowest rates, where a turn takes longest and drift counts"),
+    }  # fmt: skip
+    return [Value(name, surface.name, None if value is None else float(value), why)
+            for name, (value, why) in said.items()]  # fmt: skip
+
+
+def _of_data_sheet() -> list[Value]:
+    """Return what follows from the printed numbers alone: 1 (deg/h)/sqrt(Hz) is 1/60 deg/sqrt(h)."""
+    of = "printed numbers"
+    arw = paper.PAPER.value("arw_rate")
+    white = arw / 3600.0 / np.sqrt(paper.STATIC_S)
+    return [
+        Value("arw_angle", of, arw / 60.0, "rounded in print"),
+        Value("u_bias", of, float(white), "angle random walk over the root of 10 s; bias instability, 0.002, adds"),
+    ]
+
+
+def _of_rest(found: Findings, measured: Measured, rest: Rest, axis: str, surface: Surface | None) -> None:
+    begun = rest.t_s < paper.STATIC_S
+    readings = rest.rate_dps[axis][begun]
+    found.figures.insert(0, figures.at_rest(measured.name, rest.t_s[begun], readings))
+    try:
+        bias = static_bias(readings)
+    except LabctlError as error:
+        found.missing.append(Missing("Eqs. 1 and 15", str(error), "readings of one data set at rate 0, 10 s or more"))
+        return
+    at_rest = "contains the Earth's rate about the axis; another unit than the paper's"
+    found.values += [
+        Value("readings", measured.name, float(bias.readings), "readings in the first 10 s"),
+        Value(
+            "arw_rate",
+            measured.name,
+            float(bias.u_dps * np.sqrt(rest.t_s[begun][-1]) * 3600.0),
+            "white noise of the first 10 s; the data sheet gives a typical value",
+        ),
+        Value("bias_before", measured.name, bias.bias_dps, at_rest),
+        Value("u_bias", measured.name, bias.u_dps, "scatter of these readings over the root of their number"),
+    ]
+    if surface is not None:
+        still = np.abs(surface.rate_dps) <= AT_REST_DPS
+        if np.any(still):
+            first = int(np.flatnonzero(still)[0])
+            left = bias.bias_dps - (surface.output_dps[first] - surface.left_dps[first] - surface.rate_dps[first])
+            found.values.append(
+                Value("bias_after", measured.name, float(left), "the surface takes off its value at rest (eq. 15)")
+            )

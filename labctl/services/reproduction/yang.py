@@ -1,0 +1,95 @@
+"""Yang et al. 2018: K and B over temperature, errors by turning axis and output, and the effect that is missing."""
+
+from __future__ import annotations
+
+from labctl.errors import BadInput, LabctlError
+from labctl.fitting import FitData, FitResult, fit, fit_data_of, fit_turning, residuals
+from labctl.progress import report_stage
+from labctl.services.reproduction import yang_figures as figures
+from labctl.services.reproduction import yang_numbers as numbers
+from labctl.services.reproduction.findings import Findings, Missing, Value
+from labctl.services.reproduction.missing_effect import demonstrate
+from labctl.services.reproduction.sources import Measured, measured_from, simulated_readings
+from labctl.services.reproduction.yang_errors import Judged, at_shown, left_out_errors, raw_errors
+
+BENCH, RECIPE, BETWEEN = "yang-paper-sim", "yang-23-rates", "yang-between"
+UNIT = "YANG-2018, simulated"
+WHAT = (
+    "YANG-2018 is a simulated unit with the paper's printed K and B at 25 deg C, and a soft limit that leaves the "
+    "printed own-axis remainder. How K and B change with temperature is not printed in numbers: labctl's choice."
+)
+HOW = (
+    "Calibration: recipe yang-23-rates (the ten temperatures of Table 1, Table 2 and +-350 deg/s, three positions). "
+    "Errors are those of a second campaign, recipe yang-between, at nine temperatures half-way between, which no fit "
+    "has seen; 25 deg C is one of them."
+)
+#: Readings per second: the noise of a data-set mean is that of 125, and the page is made sooner.
+RATE_HZ = 4.0
+
+
+def reproduce_own() -> Findings:
+    """Return the paper by the simulated unit that has its printed K and B."""
+    readings = simulated_readings(RECIPE, BENCH, seed=1, sample_rate_hz=RATE_HZ)
+    calibration = measured_from(readings, UNIT, WHAT)
+    between = measured_from(simulated_readings(BETWEEN, BENCH, seed=2, sample_rate_hz=RATE_HZ), UNIT, HOW)
+    found = Findings(sources=[WHAT, HOW])
+    report_stage("fit yang2018 and the traditional method")
+    proposed = fit(calibration.recording, "yang2018")
+    traditional = fit(calibration.recording, "single_temperature")
+    data = fit_data_of(between.recording)
+    errors = {
+        name: residuals(result.fitted, data, fit_turning(result.fitted, data))
+        for name, result in (("proposed", proposed), ("traditional", traditional))
+    }
+    judged = Judged(
+        UNIT, data, raw_errors(data), errors["traditional"], errors["proposed"], proposed.fitted, traditional.fitted,
+        "second campaign, at temperatures and in readings that no fit has seen",
+    )  # fmt: skip
+    _take_in(found, judged, fit_data_of(calibration.recording))
+    found.add(demonstrate(readings, UNIT))
+    return found
+
+
+def reproduce(measured: Measured, axis: str | None) -> Findings:
+    """Return what a unit's recording gives of the paper. Raises BadInput for an axis: the paper takes all of them."""
+    if axis is not None:
+        raise BadInput(f"--axis {axis!r}: yang2018 takes all axes of the recording together; leave --axis out")
+    found = Findings(sources=[measured.sentence])
+    report_stage(f"fit yang2018 to {measured.name}")
+    try:
+        data = fit_data_of(measured.recording)
+        result = fit(measured.recording, "yang2018")
+    except LabctlError as error:
+        found.missing.append(Missing("Tables 1 to 4, figures 4 to 9", str(error), numbers.RECORD))
+        return found
+    judged = left_out_errors(measured, data, result)
+    found.sources.append(f"Errors after compensation: {judged.how}.")
+    _take_in(found, judged, data)
+    found.values += _of_fit(measured.name, result)
+    found.missing.append(
+        Missing(
+            "The missing effect",
+            "a criticism belongs to a version of the unit",
+            f"labctl fit {measured.name} --model yang2018; labctl criticise {measured.name}; "
+            f"labctl improve {measured.name} --add EFFECT",
+        )
+    )
+    return found
+
+
+def _of_fit(name: str, result: FitResult) -> list[Value]:
+    error = result.error
+    return [
+        Value("stalled", name, error.rms_dps, "on the data of the fit"),
+        Value("floor", name, error.noise_floor_dps, error.noise_floor_source),
+    ]
+
+
+def _take_in(found: Findings, judged: Judged, calibration: FitData) -> None:
+    found.values += [
+        *numbers.conditions(judged.name, calibration), *numbers.coefficients(judged), *numbers.largest_cross(judged),
+        *numbers.tables(judged), *numbers.own_axis(judged),
+    ]  # fmt: skip
+    found.missing += list(numbers.lacking(judged))
+    found.figures += figures.coefficients(judged.name, judged.proposed_model)
+    found.figures += figures.errors(judged, at_shown(judged.data))
