@@ -27,7 +27,6 @@ from labctl.cli.commands import (
     schedule,
     server,
     trend,
-    uncertainty,
 )
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.interrupts import process_of_one_command
@@ -70,7 +69,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "revoke": calibrations.revoke,
     "certifications": calibrations.certifications,
     "calibration": calibrations.calibration,
-    "uncertainty": uncertainty.uncertainty,
+    "uncertainty": noise.uncertainty,
     "compensate": calibrations.compensate,
     "backup": database.backup,
     "check": database.check,
