@@ -18,10 +18,11 @@ from labctl.certification import CalibrationWarning, Certification, read_certifi
 from labctl.errors import BadCalibrationFile
 from labctl.fitting import FitResult, FittedModel, coefficients_json
 from labctl.fitting.models.paper_units import in_paper_units
-from labctl.fitting.uncertainty import AxisEvidence, conditions_of
+from labctl.fitting.uncertainty import AxisEvidence, BenchConditions, conditions_of
 from labctl.fitting.uncertainty.document import Covered, uncertainty_json
 from labctl.json_types import JsonObject
-from labctl.json_types.calibrations import CalibrationJson, OutputUnitJson
+from labctl.json_types.budget import UncertaintyJson
+from labctl.json_types.calibrations import AxisEvidenceJson, CalibrationJson, OutputUnitJson
 from labctl.recording import OutputUnit, RecordingInfo
 from labctl.recording.info import Axis
 
@@ -38,6 +39,10 @@ __all__ = [
 ]
 
 SCHEMA = "labctl-calibration/1"
+HOW_TO_USE = (
+    "rate = (output - offset) / scale per axis; then the model's error is taken off: argument 'output' "
+    "subtracts it as a function of that rate, 'rate' solves rate = true + error(true) for the true rate"
+)
 #: The largest calibration file that is read; one of 6 axes' temperature tables has a fiftieth of it.
 MOST_BYTES = 64 << 20
 
@@ -144,9 +149,7 @@ def build_calibration(
     """
     exported, left_out = result.exported()
     bench = conditions_of(info, result.environment, used_on)
-    covered = Covered(_limits(result.rate_dps), _limits(result.temperature_c))
     use = {axis: one.to_json() for axis, one in (evidence or {}).items()}
-    kept = {axis: AxisEvidence.from_json(one) for axis, one in use.items()}  # by what a reader of the document has
     document: CalibrationJson = {
         "schema": SCHEMA,
         "serial": info.serial,
@@ -167,18 +170,24 @@ def build_calibration(
         "validity": {"temperature_c": list(result.temperature_c), "rate_dps": list(result.rate_dps)},
         "use": use,
         "standards": bench.to_json(),
-        "uncertainty": uncertainty_json(exported, covered, kept, bench),
+        "uncertainty": _uncertainty(exported, result, use, bench),
         "provenance": dict(provenance),
-        "how_to_use": (
-            "rate = (output - offset) / scale per axis; then the model's error is taken off: argument 'output' "
-            "subtracts it as a function of that rate, 'rate' solves rate = true + error(true) for the true rate"
-        ),
+        "how_to_use": HOW_TO_USE,
         "hash": "",
     }
     if result.poses is not None:
         document["poses"] = result.poses
     document["hash"] = hash_of(document)
     return Calibration(document)
+
+
+def _uncertainty(
+    exported: FittedModel, result: FitResult, use: Mapping[str, AxisEvidenceJson], bench: BenchConditions
+) -> UncertaintyJson | None:
+    """Return the bound of a document, computed from what its readers have."""
+    covered = Covered(_limits(result.rate_dps), _limits(result.temperature_c))
+    evidence = {axis: AxisEvidence.from_json(one) for axis, one in use.items()}
+    return uncertainty_json(exported, covered, evidence, bench)
 
 
 def with_certification(content: bytes, known: Certification) -> tuple[bytes, str]:

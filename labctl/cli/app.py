@@ -27,7 +27,6 @@ from labctl.cli.commands import (
     schedule,
     server,
     trend,
-    uncertainty,
 )
 from labctl.cli.commands.documents import certificate
 from labctl.cli.error_reporting import one_clear_line
@@ -74,7 +73,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "calibration": calibrations.calibration,
     "certificate": certificate.certificate,
     "certificates": certificate.certificates,
-    "uncertainty": uncertainty.uncertainty,
+    "uncertainty": noise.uncertainty,
     "compensate": calibrations.compensate,
     "backup": database.backup,
     "check": database.check,

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 from labctl.cli.output import console, format_number, stderr, table
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.budget import BudgetLineResponse, BudgetResponse
-    from labctl.services.schemas.uncertainty import UncertaintyResponse
+    from labctl.services.schemas.uncertainty import BudgetLineResponse, BudgetResponse, UncertaintyResponse
 
 #: Lines that are evaluated from the recording; the others are standards, whose names say what they are.
 EVALUATED = frozenset({"coefficients", "model", "repeatability"})

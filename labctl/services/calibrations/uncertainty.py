@@ -20,8 +20,12 @@ from labctl.fitting.uncertainty.combination import LEVEL
 from labctl.fitting.uncertainty.document import Covered
 from labctl.services.calibrations.contributions import contributions_over
 from labctl.services.criticism.versions import version_of
-from labctl.services.schemas.budget import BudgetResponse
-from labctl.services.schemas.uncertainty import AxisUncertainty, UncertaintyGrid, UncertaintyResponse
+from labctl.services.schemas.uncertainty import (
+    AxisUncertainty,
+    BudgetResponse,
+    UncertaintyGrid,
+    UncertaintyResponse,
+)
 from labctl.store import Store
 
 
