@@ -34,6 +34,7 @@ from labctl.store.repositories.calibrations import Calibrations, NewCalibration
 from labctl.store.repositories.campaign_journal import StoreJournal
 from labctl.store.repositories.campaign_summaries import CampaignSummary
 from labctl.store.repositories.campaigns import Campaigns, NewCampaign
+from labctl.store.repositories.drafts import DraftEvent, DraftRow, Drafts, DraftState
 from labctl.store.repositories.keys import Keys
 from labctl.store.repositories.leases import LeaseRow, Leases
 from labctl.store.repositories.recording_writer import Imports, ImportTicket
@@ -57,6 +58,10 @@ __all__ = [
     "Checked",
     "Copy",
     "DataSetRow",
+    "DraftEvent",
+    "DraftRow",
+    "DraftState",
+    "Drafts",
     "EventRow",
     "Finding",
     "Head",
@@ -112,6 +117,7 @@ class Store:
         self.benches = Benches(database)
         self.calibrations = Calibrations(database)
         self.certifications = Certifications(database)
+        self.drafts = Drafts(database)
         self.audit = Audit(database)
         self.keys = Keys(database)
         self.starts = Starts(database)

@@ -122,7 +122,9 @@ class BenchRunner:
             refuse_unconfirmed(self._store, bench.name)
             clear = confirmation_text(bench, request)
             clock = self._make_clock()
-            prepared = prepare(self._store, request.recipe, bench, clock, clip=request.clip, bench_clear=clear)
+            prepared = prepare(
+                self._store, request.recipe, bench, clock, clip=request.clip, fit=request.fit, bench_clear=clear
+            )
             self._begin(prepared)
         return campaign_status(self._store, prepared.id)
 

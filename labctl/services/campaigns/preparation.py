@@ -125,12 +125,14 @@ def prepare(
     clock: Clock,
     *,
     clip: bool,
+    fit: bool = True,
     opened: Bench | None = None,
     bench_clear: str = "",
 ) -> Prepared:
     """Open the bench, plan, and write the whole campaign down; the table is at rest when this returns.
 
-    `opened` is the bench where it is open already; `bench_clear` is what a person has confirmed about it.
+    Without `fit` it ends in its recordings, whatever its recipe says. `opened` is the bench where it is open already;
+    `bench_clear` is what a person has confirmed about it.
 
     Raises InstrumentError when an instrument does not answer, PlanRefused when the bench cannot do the recipe, Conflict
     where a unit or its USB adapter is not the one that it was.
@@ -138,6 +140,8 @@ def prepare(
     load_libraries()
     bench_file = with_drivers(bench_file)  # what is written down names the release of each driver
     recipe = _runnable(load_recipe(recipe_source))
+    if not fit:
+        recipe = recipe.model_copy(update={"fit": None})
     refuse_unconfirmed(store, bench_file.name)
     bench = opened or open_bench(bench_file, clock)
     try:

@@ -50,7 +50,8 @@ class ForegroundControl:
     def start(self, _: CommandContext, asked: CampaignStart) -> CampaignResponse:
         """Run a campaign in this process until it is over."""
         request = StartRequest(
-            recipe=asked.body.recipe, bench=asked.bench, clip=asked.body.clip, speed=asked.speed, seed=asked.seed,
+            recipe=asked.body.recipe, bench=asked.bench, clip=asked.body.clip, hide=asked.body.hide, fit=asked.body.fit,
+            speed=asked.speed, seed=asked.seed,
             confirmed_by=asked.body.confirmed_by, checks=asked.body.checks,
         )  # fmt: skip
         with self._open_terminal() as terminal:

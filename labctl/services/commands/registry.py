@@ -23,6 +23,8 @@ from labctl.services.commands.requests import (
     ToUnit,
     ToVersion,
 )
+from labctl.services.planning.fit_rules import check_fit
+from labctl.services.planning.loading import load_recipe
 from labctl.services.recordings import examples, importers, transfer
 from labctl.services.schedule import queue
 from labctl.services.schemas.admin import BackupNote, KeyRequest, KeyResponse, NewKeyResponse
@@ -75,6 +77,8 @@ def _revoke(context: CommandContext, asked: ToVersion[RevokeRequest]) -> Certifi
 
 def _start_campaign(context: CommandContext, asked: CampaignStart) -> CampaignResponse | ScheduledResponse:
     """Start a campaign now, or enter it into the schedule: the only place where that is decided."""
+    if asked.body.fit:
+        check_fit(load_recipe(asked.body.recipe))
     if queue.is_scheduled(asked.body):
         return context.control.schedule(context, asked)
     return context.control.start(context, asked)

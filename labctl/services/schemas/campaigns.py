@@ -25,7 +25,11 @@ class CampaignRequest(Request):
         default_factory=list,
         max_length=20,
         description="Effects to hide in the units of a simulated bench, each as EFFECT or EFFECT=SIZE, SIZE in the "
-        "unit of the effect; not for a later start.",
+        "unit of the effect.",
+    )
+    fit: bool = Field(
+        default=True,
+        description="End in a draft if the recipe has [fit]; false: end in the recordings, whatever the recipe says.",
     )
     at: str | None = Field(
         default=None,
@@ -77,6 +81,8 @@ class StartRequest(Request):
     recipe: str
     bench: str | None = None
     clip: bool = False
+    hide: list[str] = Field(default_factory=list, max_length=20, description="Same as in `POST /api/campaigns`.")
+    fit: bool = Field(default=True, description="Same as in `POST /api/campaigns`.")
     speed: float | None = Field(
         default=None,
         gt=0,
