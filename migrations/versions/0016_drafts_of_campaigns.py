@@ -31,9 +31,7 @@ def upgrade() -> None:
     op.create_index("ix_drafts_serial_recording_id", "drafts", ["serial", "recording_id"])
     op.create_index("ix_drafts_state", "drafts", ["state"])
     op.add_column("scheduled_starts", sa.Column("hide", sa.JSON(none_as_null=True), nullable=True))
-    op.add_column(
-        "scheduled_starts", sa.Column("fit", sa.Boolean(), server_default=sa.true(), nullable=False)
-    )
+    op.add_column("scheduled_starts", sa.Column("fit", sa.Boolean(), server_default=sa.true(), nullable=False))
 
 
 def downgrade() -> None:

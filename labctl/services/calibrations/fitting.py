@@ -28,9 +28,7 @@ from labctl.services.schemas.calibrations import (
 from labctl.store import NewCalibration, RecordingRow, Store
 
 
-def fit_unit(
-    store: Store, serial: str, request: FitRequest, at: datetime, *, is_draft: bool = False
-) -> FitResponse:
+def fit_unit(store: Store, serial: str, request: FitRequest, at: datetime, *, is_draft: bool = False) -> FitResponse:
     """Fit a model to a unit's recording and keep it as the next version.
 
     Raises NotFound, BadInput for an unknown model or effect, NotEnoughData, DataRefused for data that are certainly

@@ -23,6 +23,7 @@ from labctl.services.commands.requests import (
     ToUnit,
     ToVersion,
 )
+from labctl.services.drafts.make import make_drafts
 from labctl.services.planning.fit_rules import check_fit
 from labctl.services.planning.loading import load_recipe
 from labctl.services.recordings import examples, importers, transfer
@@ -32,6 +33,7 @@ from labctl.services.schemas.benches import BenchCheckResponse, BenchStatus, Che
 from labctl.services.schemas.calibrations import FitRequest, FitResponse, ImproveRequest, ImproveResponse
 from labctl.services.schemas.campaigns import CampaignResponse, ConfirmRequest, ReasonRequest
 from labctl.services.schemas.certification import CertificationResponse, CertifyRequest, RevokeRequest
+from labctl.services.schemas.drafts import DraftsRequest, DraftsResponse
 from labctl.services.schemas.recordings import (
     ExampleRequest,
     ImportResponse,
@@ -102,6 +104,10 @@ def _confirm_prompt(context: CommandContext, asked: ToCampaign[ConfirmRequest]) 
 
 def _cancel_start(context: CommandContext, asked: ToStart) -> ScheduledResponse:
     return queue.cancel_start(context.store, asked.start, context.now())
+
+
+def _make_drafts(context: CommandContext, asked: ToCampaign[DraftsRequest]) -> DraftsResponse:
+    return make_drafts(context.store, asked.campaign, asked.body, context.now())
 
 
 def _clear_bench(context: CommandContext, asked: ToBench[ClearRequest]) -> BenchStatus:
@@ -193,6 +199,13 @@ PAUSE_CAMPAIGN = Command(
 )
 ABORT_CAMPAIGN = Command(
     method="POST", path=_CAMPAIGN + "/abort", handler=_abort_campaign, responses={200: CampaignResponse}
+)
+MAKE_DRAFTS = Command(
+    method="POST",
+    path=_CAMPAIGN + "/drafts",
+    handler=_make_drafts,
+    responses={200: DraftsResponse},
+    computes=True,
 )
 CONFIRM_PROMPT = Command(
     method="POST", path=_CAMPAIGN + "/confirm", handler=_confirm_prompt, responses={200: CampaignResponse}

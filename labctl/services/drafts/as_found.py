@@ -65,9 +65,7 @@ def drift_from(in_force: CalibrationRecord, draft: CalibrationRecord, measured: 
     )
 
 
-def _difference(
-    in_force: CalibrationRecord, draft: CalibrationRecord, measured: Measurements
-) -> dict[str, Array]:
+def _difference(in_force: CalibrationRecord, draft: CalibrationRecord, measured: Measurements) -> dict[str, Array]:
     if motion_of(measured.row) == "poses":
         raise BadInput("in poses no data set has a rate of its own, so that corrected rates cannot be compared")
     old, _ = applied_errors(read_calibration(in_force.document), measured.points)

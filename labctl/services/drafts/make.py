@@ -9,13 +9,13 @@ from labctl.errors import Conflict, DataRefused, LabctlError
 from labctl.json_types import JsonObject
 from labctl.log import get_logger
 from labctl.progress import report_stage
-from labctl.services.calibrations.certification import version_in_force
 from labctl.services.calibrations.fitting import fit_unit
+from labctl.services.drafts.answers import drafts_of
 from labctl.services.drafts.as_found import REFUSALS
 from labctl.services.drafts.report import report_on
 from labctl.services.drafts.text import failure_text
 from labctl.services.schemas.calibrations import FitRequest
-from labctl.services.schemas.drafts import DraftReport, DraftResponse, DraftsRequest, DraftsResponse
+from labctl.services.schemas.drafts import DraftsRequest, DraftsResponse
 from labctl.store import DraftEvent, DraftRow, Store
 from procedures.contracts.campaign_state import CampaignState
 from procedures.recipe.fit_rules import FitRules
@@ -41,25 +41,11 @@ def make_drafts(store: Store, campaign: int, request: DraftsRequest, at: datetim
     return DraftsResponse(campaign=campaign, drafts=drafts_of(store, campaign))
 
 
-def drafts_of(store: Store, campaign: int) -> list[DraftResponse]:
-    """Return the drafts of a campaign as they are."""
-    return [draft_response(store, row) for row in store.drafts.of_campaign(campaign)]
-
-
-def draft_response(store: Store, row: DraftRow) -> DraftResponse:
-    """Return a draft, and whether it is in force by now."""
-    return DraftResponse(
-        serial=row.serial, campaign=row.campaign, recording=row.recording, state=row.state, version=row.version,
-        certified=row.version is not None and version_in_force(store, row.serial) == row.version, at=row.at,
-        reason=row.reason, report=None if row.report is None else DraftReport.model_validate(row.report),
-    )  # fmt: skip
-
-
 def _make(store: Store, draft: DraftRow, rules: FitRules, at: datetime) -> None:
     if why := store.drafts.dropped(draft.recording):
         fail_draft(store, draft, rules, f"the unit took no further part in the campaign: {why}", at)
         return
-    version = draft.version if draft.state == "fitted" else None
+    version = draft.version  # of a draft that was kept, and not yet reported on
     if version is None:
         report_stage(f"fitting {draft.serial}")
         request = FitRequest(recording=draft.recording, model=rules.model, effects=list(rules.effects))
@@ -92,6 +78,8 @@ def fail_draft(store: Store, draft: DraftRow, rules: FitRules, why: str, at: dat
 
 def _without_insisting(error: LabctlError) -> str:
     """Return an error in words, without the option that only a fit by hand has."""
-    return str(error).replace("; to do it nevertheless: --accept-warnings", "") if isinstance(
-        error, DataRefused
-    ) else str(error)
+    return (
+        str(error).replace("; to do it nevertheless: --accept-warnings", "")
+        if isinstance(error, DataRefused)
+        else str(error)
+    )

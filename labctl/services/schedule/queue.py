@@ -89,7 +89,8 @@ def _answer(store: Store, row: StartRow, note: str = "") -> ScheduledResponse:
     return ScheduledResponse(
         id=row.id, bench=row.bench_name, recipe=row.recipe_name, state=row.state,
         due_at=row.due_at.astimezone(zone) if waits else None, time_zone=row.time_zone, cron=row.cron,
-        priority=row.priority, clip=row.clip, hide=list(row.hide or ()), fit=row.fit, late_limit_s=row.late_limit_s, created_at=row.created_at, note=note,
+        priority=row.priority, clip=row.clip, hide=list(row.hide or ()), fit=row.fit,
+        late_limit_s=row.late_limit_s, created_at=row.created_at, note=note,
         history=[
             StartEventResponse(
                 at=event.at, due_at=event.due_at.astimezone(zone), outcome=event.outcome, message=event.message,

@@ -8,6 +8,7 @@ from typing import Literal, get_args
 from pydantic import Field
 
 from labctl.services.schemas.base import Request, ResponseModel
+from labctl.services.schemas.drafts import DraftResponse
 from labctl.services.schemas.plans import RecipeSource
 from procedures.contracts.campaign_state import ACTIVE, ENDED, CampaignState
 
@@ -241,6 +242,11 @@ class CampaignResponse(ResponseModel):
     started_at: datetime | None = None
     ended_at: datetime | None = None
     recordings: dict[str, int] = Field(default_factory=dict, description="serial -> recording")
+    drafts: list[DraftResponse] = Field(
+        default_factory=list,
+        description="The calibrations that it ends in, by recording; empty: the recipe has no [fit], or the campaign "
+        "is not done; empty in lists.",
+    )
     drivers: dict[str, DriverResponse] = Field(
         default_factory=dict,
         description="For each table, chamber and gyro: the driver that was used when the campaign began.",

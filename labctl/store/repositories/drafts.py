@@ -83,6 +83,13 @@ class Drafts:
         with self._database.reading() as connection:
             return [int(number) for number in connection.scalars(query)]
 
+    def is_awaited(self, campaign: int) -> bool:
+        """Return whether a draft of a campaign still has to be made."""
+        d = tables.drafts.c
+        query = sa.select(d.recording_id).where(d.campaign_id == campaign, d.state.in_(OPEN)).limit(1)
+        with self._database.reading() as connection:
+            return connection.scalar(query) is not None
+
     def dropped(self, recording: int) -> str | None:
         """Return why a unit took no further part in the campaign of a recording; None where it did."""
         r = tables.recordings.c
@@ -99,12 +106,13 @@ class Drafts:
     def conclude(self, recording: int, report: JsonObject, event: DraftEvent, at: datetime) -> bool:
         """Keep the report on a draft that was fitted, with its event; returns whether this was the first."""
         values = {"state": "made", "report": dict(report), "at": at, "reason": ""}
-        return self._ended(recording, ("fitted",), values, event, at)
+        return self._ended(recording, ("fitted", "failed"), values, event, at)
 
     @transaction
     def fail(self, recording: int, reason: str, event: DraftEvent, at: datetime) -> bool:
-        """Write down why a draft could not be made; returns whether it still had to be made, or had failed before."""
-        return self._ended(recording, ("due", "failed"), {"state": "failed", "reason": reason, "at": at}, event, at)
+        """Write down why a draft could not be made; returns False for one that was made."""
+        values = {"state": "failed", "reason": reason, "at": at}
+        return self._ended(recording, ("due", "fitted", "failed"), values, event, at)
 
     def _ended(
         self, recording: int, states: Sequence[DraftState], values: JsonObject, event: DraftEvent, at: datetime
