@@ -58,12 +58,16 @@ class DraftWatch:
 
     def _watch(self) -> None:
         with acting(ITSELF):  # no request asked for it
+            self._tick_on()  # what an earlier process left
             while not self._over.wait(self._clock.wall_s(POLL_S)):
-                try:
-                    self.tick()
-                    self._trouble = ""
-                except Exception as error:  # noqa: BLE001  the thread has to survive, or no draft is made any more
-                    self._note(error)
+                self._tick_on()
+
+    def _tick_on(self) -> None:
+        try:
+            self.tick()
+            self._trouble = ""
+        except Exception as error:  # noqa: BLE001  the thread has to survive, or no draft is made any more
+            self._note(error)
 
     def tick(self) -> None:
         """Make the drafts that are due. Raises StoreError where the database cannot be read."""

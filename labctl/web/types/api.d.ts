@@ -31,6 +31,7 @@ export type Comparison = Schema<"ComparisonResponse">;
 export type ComparisonColumns = Schema<"ComparisonColumns">;
 export type DeviceCheck = Schema<"DeviceCheck">;
 export type DataSets = Schema<"DataSetsResponse">;
+export type Draft = Schema<"DraftResponse">;
 export type Drift = Schema<"Drift">;
 export type Imported = Schema<"ImportResponse">;
 export type Joint = NonNullable<Schema<"CriticismResponse">["joint"]>;

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from instruments.clock import VirtualClock
+from instruments.clock import SystemClock, VirtualClock
 from labctl.errors import BadInput, Conflict
 from labctl.services.calibrations.certification import certify, version_in_force
 from labctl.services.calibrations.fitting import fit_unit
@@ -17,7 +17,7 @@ from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.execution import run_here
 from labctl.services.campaigns.status import campaign_status
 from labctl.services.commands.foreground_control import ForegroundControl
-from labctl.services.drafts import make
+from labctl.services.drafts import make, report
 from labctl.services.drafts.answers import drafts_of, newest_draft, with_drafts
 from labctl.services.drafts.make import make_drafts
 from labctl.services.drafts.watch import TRIES, DraftWatch
@@ -79,6 +79,12 @@ def store(location: str) -> Iterator[Store]:
         yield opened
 
 
+@pytest.fixture
+def unjudged(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave the verdict out, which takes longest, where a test is about something else."""
+    monkeypatch.setattr(report, "_assessed", lambda *_: None)
+
+
 def made(store: Store, at: datetime = NOW, *, again: bool = False) -> DraftResponse:
     return make_drafts(store, 1, DraftsRequest(again=again), at).drafts[0]
 
@@ -105,56 +111,60 @@ def test_a_draft_is_fitted_compared_judged_and_said_once(store: Store) -> None:
     assert [row.subject for row in store.audit.rows() if row.action == "draft"] == ["campaign 1"]
 
 
+@pytest.mark.usefixtures("unjudged")
 def test_limits_are_held_against_the_figures_and_an_unknown_figure_decides_nothing(store: Store) -> None:
-    report = made(store).report
-    assert report is not None
-    results = {each.limit: each for each in report.limits}
+    found = made(store).report
+    assert found is not None
+    results = {each.limit: each for each in found.limits}
     assert (results["heldout_rms_dps"].passed, results["max_error_dps"].passed) == (True, False)
-    assert report.as_left is not None
-    assert results["max_error_dps"].value_dps == report.as_left.axes["z"].max_dps
+    assert found.as_left is not None
+    assert results["max_error_dps"].value_dps == found.as_left.axes["z"].max_dps
     assert (results["drift_dps"].passed, results["drift_dps"].value_dps) == (None, None)
-    assert report.within_limits is False
-    assert "largest error of axis z" in report.text
-    assert "drift from the version in force" in report.text
+    assert found.within_limits is False
+    assert "largest error of axis z" in found.text
+    assert "drift from the version in force" in found.text
     levels = [event.level for event in store.campaigns.events(1) if event.kind == "draft"]
     assert levels == ["warning"]
 
 
+@pytest.mark.usefixtures("unjudged")
 def test_the_version_in_force_is_applied_as_it_is_and_the_drift_has_an_uncertainty(store: Store) -> None:
     fit_unit(store, UNIT, FitRequest(effects=["bias", "scale_factor"]), NOW)
     reason = "the first version, for the comparison"
     certify(store, UNIT, 1, CertifyRequest(by="A", reason=reason, override=True), NOW)
     draft = made(store)
     assert draft.version == 2
-    report = draft.report
-    assert report is not None
-    assert report.as_found is not None
-    assert report.drift is not None
-    assert report.as_found.version == report.drift.version == 1
-    assert report.as_found.lines["z"].u_bias_dps > 0
-    assert report.drift.largest_dps["z"] == pytest.approx(0.0, abs=1e-12)  # the same recording, the same model
-    by_name = {each.coefficient: each for each in report.drift.coefficients}
+    found = draft.report
+    assert found is not None
+    assert found.as_found is not None
+    assert found.drift is not None
+    assert found.as_found.version == found.drift.version == 1
+    assert found.as_found.lines["z"].u_bias_dps > 0
+    assert found.drift.largest_dps["z"] == pytest.approx(0.0, abs=1e-12)  # the same recording, the same model
+    by_name = {each.coefficient: each for each in found.drift.coefficients}
     assert set(by_name) == {"bias", "scale_factor"}
     assert by_name["bias"].change == 0.0
     assert by_name["bias"].u is not None
     assert by_name["bias"].u > 0
     assert by_name["bias"].significant is False
-    assert {each.limit: each.passed for each in report.limits}["drift_dps"] is True
+    assert {each.limit: each.passed for each in found.limits}["drift_dps"] is True
     assert version_in_force(store, UNIT) == 1
 
 
+@pytest.mark.usefixtures("unjudged")
 def test_another_model_in_force_is_compared_by_its_corrected_rates_alone(store: Store) -> None:
     fit_unit(store, UNIT, FitRequest(effects=["bias"]), NOW)
     certify(store, UNIT, 1, CertifyRequest(by="A", reason="the bias alone, to compare", override=True), NOW)
-    report = made(store).report
-    assert report is not None
-    assert report.drift is not None
-    assert report.drift.coefficients == []
-    assert "another model" in report.drift.why
-    assert report.drift.largest_dps["z"] > 0.1
-    assert {each.limit: each.passed for each in report.limits}["drift_dps"] is False
+    found = made(store).report
+    assert found is not None
+    assert found.drift is not None
+    assert found.drift.coefficients == []
+    assert "another model" in found.drift.why
+    assert found.drift.largest_dps["z"] > 0.1
+    assert {each.limit: each.passed for each in found.limits}["drift_dps"] is False
 
 
+@pytest.mark.usefixtures("unjudged")
 def test_what_was_interrupted_between_fit_and_report_is_reported_on_the_same_version(
     store: Store, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -173,6 +183,7 @@ def test_what_was_interrupted_between_fit_and_report_is_reported_on_the_same_ver
     assert len(events(store)) == 1
 
 
+@pytest.mark.usefixtures("unjudged")
 def test_a_draft_that_another_process_made_meanwhile_is_not_kept_again(store: Store) -> None:
     made(store)
     with pytest.raises(Conflict, match="by another process meanwhile"):
@@ -180,6 +191,7 @@ def test_a_draft_that_another_process_made_meanwhile_is_not_kept_again(store: St
     assert store.calibrations.versions(UNIT) == [1]
 
 
+@pytest.mark.usefixtures("unjudged")
 def test_data_that_cannot_be_fitted_leave_the_campaign_done_and_say_what_to_do(store: Store) -> None:
     rules = store.campaigns.get(1).recipe["fit"]
     assert isinstance(rules, dict)
@@ -222,6 +234,7 @@ def test_only_campaigns_of_the_own_bench_are_watched(store: Store) -> None:
     assert tried == [1]
 
 
+@pytest.mark.usefixtures("unjudged")
 def test_a_service_makes_what_the_last_one_left(location: str) -> None:
     with open_store(location, write=True) as store:
         service = LabService(store, VirtualClock(NOW))
@@ -233,11 +246,12 @@ def test_a_service_makes_what_the_last_one_left(location: str) -> None:
             assert draft is not None
             assert draft.version == 1
             row = next(row for row in store.audit.rows() if row.action == "draft")
-            assert row.actor == "labctl"
+            assert row.who == "labctl"
         finally:
             service.close()
 
 
+@pytest.mark.usefixtures("unjudged")
 def test_a_campaign_in_a_terminal_makes_its_draft_after_the_bench_is_closed(location: str) -> None:
     control = ForegroundControl(location)
     with open_store(location, write=False) as store:
@@ -259,10 +273,10 @@ def scheduled(tmp_path: Path) -> Iterator[Callable[[CampaignRequest], LabService
     opened: list[LabService] = []
 
     def begin(request: CampaignRequest) -> LabService:
-        bench, clock = load_bench("single-axis-sim"), VirtualClock(NOW)
+        bench = load_bench("single-axis-sim")
         store = open_store(str(tmp_path / "lab.sqlite"), write=True).__enter__()
         add_start(store, request, bench, NOW)
-        service = LabService(store, clock, BenchRunner(store, bench, lambda: VirtualClock(NOW)))
+        service = LabService(store, SystemClock(), BenchRunner(store, bench, lambda: VirtualClock(NOW)))
         opened.append(service)
         service.start()
         return service
@@ -272,6 +286,7 @@ def scheduled(tmp_path: Path) -> Iterator[Callable[[CampaignRequest], LabService
         service.close()
 
 
+@pytest.mark.usefixtures("unjudged")
 def test_a_scheduled_campaign_with_hidden_effects_ends_in_a_draft(
     scheduled: Callable[[CampaignRequest], LabService],
 ) -> None:

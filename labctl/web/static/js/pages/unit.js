@@ -14,6 +14,7 @@ import {
   modelName,
   table,
 } from "../core/components.js";
+import { draftsCard } from "../campaigns/drafts.js";
 import { query, updateQuery } from "../core/router.js";
 import { ladderFigure } from "../explore/error_ladder.js";
 import { askCertification, askRevocation, certificationTable } from "../unit/certification.js";
@@ -47,6 +48,7 @@ export async function page({ params, signal }) {
       h("a", { class: "button primary", href: explore }, "Explore"),
     ),
     h("section", { class: "card", "aria-label": "In force" }, inForce(unit, rows, force)),
+    unit.draft && !unit.draft.certified ? draftsCard([unit.draft]) : null,
     rows.length
       ? [
           versions(unit, rows, explore),
