@@ -33,7 +33,7 @@ from labctl.services.schemas.campaigns import (
     CampaignResponse,
     EventResponse,
 )
-from labctl.services.schemas.drafts import DraftsRequest, DraftsResponse
+from labctl.services.schemas.reports.drafts import DraftsRequest, DraftsResponse
 from labctl.services.schemas.service import HealthResponse, HeartbeatResponse, PulseResponse
 from labctl.services.units import count_due
 from labctl.store import Store

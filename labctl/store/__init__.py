@@ -34,7 +34,8 @@ from labctl.store.repositories.calibrations import Calibrations, NewCalibration
 from labctl.store.repositories.campaign_journal import StoreJournal
 from labctl.store.repositories.campaign_summaries import CampaignSummary
 from labctl.store.repositories.campaigns import Campaigns, NewCampaign
-from labctl.store.repositories.drafts import DraftEvent, DraftRow, Drafts, DraftState
+from labctl.store.repositories.drafts.records import DraftEvent, DraftRow, DraftState
+from labctl.store.repositories.drafts.repository import Drafts
 from labctl.store.repositories.keys import Keys
 from labctl.store.repositories.leases import LeaseRow, Leases
 from labctl.store.repositories.recording_writer import Imports, ImportTicket

@@ -28,8 +28,8 @@ from labctl.services.schemas.campaigns import (
     ReasonRequest,
     ResumeRequest,
 )
-from labctl.services.schemas.drafts import DraftsRequest, DraftsResponse
 from labctl.services.schemas.plans import CampaignPlanResponse
+from labctl.services.schemas.reports.drafts import DraftsRequest, DraftsResponse
 from labctl.services.schemas.schedule import ScheduledResponse
 
 router = APIRouter(prefix="/api/campaigns", tags=["campaigns"])

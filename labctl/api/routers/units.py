@@ -11,7 +11,7 @@ from labctl.api.dependencies import ServiceDep
 from labctl.services.calibrations.due import span
 from labctl.services.criticism.trend import trend_unit
 from labctl.services.datasheet.sheet import datasheet
-from labctl.services.schemas.datasheet import DatasheetResponse
+from labctl.services.schemas.reports.datasheet import DatasheetResponse
 from labctl.services.schemas.units import TrendResponse, UnitResponse
 from labctl.services.units import list_units, unit
 

@@ -200,7 +200,7 @@ def draft(
     from labctl.services.commands.open import current_status, execute
     from labctl.services.commands.registry import MAKE_DRAFTS
     from labctl.services.commands.requests import ToCampaign
-    from labctl.services.schemas.drafts import DraftsRequest
+    from labctl.services.schemas.reports.drafts import DraftsRequest
 
     with one_clear_line():
         wanted = campaign if campaign is not None else current_status(database, None).id

@@ -13,8 +13,8 @@ from procedures.contracts.campaign_state import STOPPED_EARLY, UNDER_WAY
 
 if TYPE_CHECKING:
     from labctl.services.schemas.campaigns import CampaignResponse
-    from labctl.services.schemas.drafts import DraftResponse
     from labctl.services.schemas.plans import AttendanceResponse, PlanResponse
+    from labctl.services.schemas.reports.drafts import DraftResponse
     from labctl.services.schemas.schedule import ScheduledResponse
 
 

@@ -64,14 +64,14 @@ def operator_of(bench: Bench) -> Operator:
     )
 
 
-def _runnable(recipe: Recipe) -> Recipe:
-    """Return a recipe; raises BadInput for one with courses of the rate, which no driver runs."""
+def _runnable(recipe: Recipe, *, fit: bool) -> Recipe:
+    """Return a recipe, without [fit] where none is wanted; raises BadInput for one with courses of the rate, which no driver runs."""
     if recipe.profiles:
         raise BadInput(
             f"recipe {recipe.name}: its {len(recipe.profiles)} [[profiles]] can be simulated only (`labctl simulate`): "
             "no driver runs a table along a course of rates; leave them out"
         )
-    return recipe
+    return recipe if fit else recipe.model_copy(update={"fit": None})
 
 
 def refuse_unconfirmed(store: Store, bench: str) -> None:
@@ -132,16 +132,12 @@ def prepare(
     """Open the bench, plan, and write the whole campaign down; the table is at rest when this returns.
 
     Without `fit` it ends in its recordings, whatever its recipe says. `opened` is the bench where it is open already;
-    `bench_clear` is what a person has confirmed about it.
-
-    Raises InstrumentError when an instrument does not answer, PlanRefused when the bench cannot do the recipe, Conflict
+    `bench_clear` is what a person has confirmed about it. Raises InstrumentError when an instrument does not answer, PlanRefused when the bench cannot do the recipe, Conflict
     where a unit or its USB adapter is not the one that it was.
     """
     load_libraries()
     bench_file = with_drivers(bench_file)  # what is written down names the release of each driver
-    recipe = _runnable(load_recipe(recipe_source))
-    if not fit:
-        recipe = recipe.model_copy(update={"fit": None})
+    recipe = _runnable(load_recipe(recipe_source), fit=fit)
     refuse_unconfirmed(store, bench_file.name)
     bench = opened or open_bench(bench_file, clock)
     try:

@@ -19,7 +19,7 @@ from labctl.services.planning.loading import bench_for, load_bench, load_recipe
 from labctl.services.schedule import queue
 from labctl.services.schemas.benches import BenchCheckResponse, CheckRequest
 from labctl.services.schemas.campaigns import CampaignResponse, ConfirmRequest, ReasonRequest, StartRequest
-from labctl.services.schemas.drafts import DraftsRequest
+from labctl.services.schemas.reports.drafts import DraftsRequest
 from labctl.services.schemas.schedule import ScheduledResponse
 from labctl.store import open_store
 from procedures.contracts.campaign_state import CampaignState

@@ -33,13 +33,13 @@ from labctl.services.schemas.benches import BenchCheckResponse, BenchStatus, Che
 from labctl.services.schemas.calibrations import FitRequest, FitResponse, ImproveRequest, ImproveResponse
 from labctl.services.schemas.campaigns import CampaignResponse, ConfirmRequest, ReasonRequest
 from labctl.services.schemas.certification import CertificationResponse, CertifyRequest, RevokeRequest
-from labctl.services.schemas.drafts import DraftsRequest, DraftsResponse
 from labctl.services.schemas.recordings import (
     ExampleRequest,
     ImportResponse,
     SimulatedRecordingResponse,
     SimulatedRequest,
 )
+from labctl.services.schemas.reports.drafts import DraftsRequest, DraftsResponse
 from labctl.services.schemas.schedule import ScheduledResponse
 
 

@@ -1,4 +1,4 @@
-"""The lines of a data sheet: name, unit, the specification it is held against, and what measures it."""
+"""The lines of a data sheet: name, unit, the specification it is compared with, and what measures it."""
 
 from __future__ import annotations
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from labctl.services.datasheet.catalogue import Line
-from labctl.services.schemas.datasheet import Characteristic
+from labctl.services.schemas.reports.datasheet import Characteristic
 
 RULE = (
     "Simple acceptance (ILAC-G8:09/2019, 4.2.1): a measured value inside the specified one passes, whatever its "

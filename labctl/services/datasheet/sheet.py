@@ -19,7 +19,7 @@ from labctl.services.datasheet.decision import RULE, decided
 from labctl.services.datasheet.measured import Figure, figures_of
 from labctl.services.recordings.allan import allan_unit
 from labctl.services.recordings.loading import points_of
-from labctl.services.schemas.datasheet import Characteristic, DatasheetResponse, MeasuredUnder
+from labctl.services.schemas.reports.datasheet import Characteristic, DatasheetResponse, MeasuredUnder
 from labctl.store import RecordingRow, Store, Unit
 
 #: Of many recordings the newest are used.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from labctl.services.schemas.campaigns import CampaignResponse
-from labctl.services.schemas.drafts import DraftReport, DraftResponse
+from labctl.services.schemas.reports.drafts import DraftReport, DraftResponse
 from labctl.store import DraftRow, Store
 from procedures.contracts.campaign_state import CampaignState
 

@@ -16,7 +16,7 @@ from labctl.services.criticism.measurements import Measurements
 from labctl.services.criticism.trend import line_left
 from labctl.services.criticism.verification.of_version import applied_errors, verify
 from labctl.services.recordings.loading import motion_of
-from labctl.services.schemas.drafts import AppliedDraft, CoefficientChange, DriftFromVersion, RemainingLine
+from labctl.services.schemas.reports.drafts import AppliedDraft, CoefficientChange, DriftFromVersion, RemainingLine
 from labctl.store import CalibrationRecord, Store
 
 #: What cannot be done with a recording or a version, as opposed to what went wrong on the way.
@@ -67,7 +67,9 @@ def drift_from(in_force: CalibrationRecord, draft: CalibrationRecord, measured: 
 
 def _difference(in_force: CalibrationRecord, draft: CalibrationRecord, measured: Measurements) -> dict[str, Array]:
     if motion_of(measured.row) == "poses":
-        raise BadInput("in poses no data set has a rate of its own, so that corrected rates cannot be compared")
+        raise BadInput(
+            "in poses no data set has a rate of its own, so that corrected rates cannot be compared; compare versions by `labctl verify`"
+        )
     old, _ = applied_errors(read_calibration(in_force.document), measured.points)
     new, _ = applied_errors(read_calibration(draft.document), measured.points)
     return {axis: new[axis] - old[axis] for axis in new if axis in old}

@@ -1,4 +1,4 @@
-"""The limits of a recipe's [fit], held against the figures of a draft."""
+"""The limits of a recipe's [fit], compared with the figures of a draft."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from typing import Literal
 
 from labctl.services.schemas.certification import CertifiedErrors
-from labctl.services.schemas.drafts import AppliedDraft, DriftFromVersion, LimitResult
+from labctl.services.schemas.reports.drafts import AppliedDraft, DriftFromVersion, LimitResult
 from procedures.recipe.fit_rules import FitLimits
 
 Limit = Literal["heldout_rms_dps", "max_error_dps", "drift_dps"]

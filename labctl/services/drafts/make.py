@@ -15,7 +15,7 @@ from labctl.services.drafts.as_found import REFUSALS
 from labctl.services.drafts.report import report_on
 from labctl.services.drafts.text import failure_text
 from labctl.services.schemas.calibrations import FitRequest
-from labctl.services.schemas.drafts import DraftsRequest, DraftsResponse
+from labctl.services.schemas.reports.drafts import DraftsRequest, DraftsResponse
 from labctl.store import DraftEvent, DraftRow, Store
 from procedures.contracts.campaign_state import CampaignState
 from procedures.recipe.fit_rules import FitRules
@@ -31,7 +31,9 @@ def make_drafts(store: Store, campaign: int, request: DraftsRequest, at: datetim
     """
     row = store.campaigns.get(campaign)
     if row.state is not CampaignState.DONE:
-        raise Conflict(f"campaign {campaign} is {row.state}: its drafts are made when it is done")
+        raise Conflict(
+            f"campaign {campaign} is {row.state}: its drafts are made when it is done; resume it, or wait for its end"
+        )
     asked = row.recipe.get("fit")
     if asked is not None:
         rules = FitRules.model_validate(asked)

@@ -13,7 +13,7 @@ from labctl.services.drafts.as_found import REFUSALS, applied, drift_from
 from labctl.services.drafts.limits import all_within, held_against
 from labctl.services.drafts.text import report_text
 from labctl.services.schemas.certification import AssessmentResponse, CertifiedErrors
-from labctl.services.schemas.drafts import AppliedDraft, ComparedModel, DraftReport, DriftFromVersion
+from labctl.services.schemas.reports.drafts import AppliedDraft, ComparedModel, DraftReport, DriftFromVersion
 from labctl.store import CalibrationRecord, Store
 from procedures.recipe.fit_rules import FitRules
 
@@ -72,7 +72,7 @@ def _smallest_heldout(compared: list[ComparedModel]) -> str | None:
 def _as_found(
     store: Store, draft: CalibrationRecord, measured: Measurements, rules: FitRules
 ) -> tuple[AppliedDraft | None, str, DriftFromVersion | None]:
-    """Return the version in force on the recording as it is, why not, and the drift of the draft against it."""
+    """Return the version in force applied to the recording, why not, and the drift of the draft against it."""
     if not rules.against:
         return None, NOT_ASKED, None
     version = version_in_force(store, draft.serial)

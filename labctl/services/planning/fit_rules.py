@@ -17,4 +17,4 @@ def check_fit(recipe: Recipe) -> None:
         try:
             preset_for(model, effects)
         except BadInput as error:
-            raise BadInput(f"recipe {recipe.name}: [fit]: {error}") from error
+            raise BadInput(f"recipe {recipe.name}: [fit]: {error}; correct the recipe") from error

@@ -8,8 +8,8 @@ from typing import Literal, get_args
 from pydantic import Field
 
 from labctl.services.schemas.base import Request, ResponseModel
-from labctl.services.schemas.drafts import DraftResponse
 from labctl.services.schemas.plans import RecipeSource
+from labctl.services.schemas.reports.drafts import DraftResponse
 from procedures.contracts.campaign_state import ACTIVE, ENDED, CampaignState
 
 #: What a person confirms about a real bench before a campaign starts there.

@@ -7,7 +7,7 @@ from datetime import datetime
 from pydantic import Field
 
 from labctl.services.schemas.base import ResponseModel
-from labctl.services.schemas.drafts import DraftResponse
+from labctl.services.schemas.reports.drafts import DraftResponse
 
 
 class ExportFormatResponse(ResponseModel):

@@ -17,7 +17,7 @@ from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.records import CalibrationRecord, CertificationRow, Judgement
 from labctl.store.repositories.audit import append
-from labctl.store.repositories.drafts import mark_fitted
+from labctl.store.repositories.drafts.marks import mark_fitted
 from labctl.store.repositories.units import SEEN
 from labctl.store.schema import tables
 

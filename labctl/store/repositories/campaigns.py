@@ -19,7 +19,7 @@ from labctl.store.records import CampaignRow, EventRow, NewUnit, StepRow
 from labctl.store.repositories.audit import append
 from labctl.store.repositories.campaign_journal import StoreJournal
 from labctl.store.repositories.campaign_summaries import CampaignSummaries, CampaignSummary
-from labctl.store.repositories.drafts import make_due
+from labctl.store.repositories.drafts.marks import make_due
 from labctl.store.repositories.recording_writer import new_recording
 from labctl.store.schema import tables
 from procedures.contracts.campaign_state import UNFINISHED, CampaignState

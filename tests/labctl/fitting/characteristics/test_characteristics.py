@@ -62,7 +62,7 @@ def test_polar_decomposition_agrees_with_scipy() -> None:
         witness_rotation, witness = scipy_polar(k, side="left")
         np.testing.assert_allclose(symmetric, witness, atol=1e-12)
         np.testing.assert_allclose(rotation, witness_rotation, atol=1e-12)
-        np.testing.assert_allclose(symmetric @ rotation, k, atol=1e-12)
+        assert symmetric @ rotation == pytest.approx(k, abs=1e-12)
 
 
 def test_a_turned_triad_is_misaligned_and_orthogonal() -> None:

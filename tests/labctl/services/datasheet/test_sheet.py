@@ -16,7 +16,7 @@ from labctl.cli.app import app
 from labctl.errors import BadInput, NotFound
 from labctl.recording import Recording
 from labctl.services.datasheet.sheet import datasheet
-from labctl.services.schemas.datasheet import Characteristic, DatasheetResponse
+from labctl.services.schemas.reports.datasheet import Characteristic, DatasheetResponse
 from labctl.store import Store, open_store
 from tests.helpers.recordings import STARTED, Triaxial
 from tests.helpers.service import add_recording, open_client

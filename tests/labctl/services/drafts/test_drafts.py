@@ -28,7 +28,7 @@ from labctl.services.schedule.queue import add_start, start_status
 from labctl.services.schemas.calibrations import FitRequest
 from labctl.services.schemas.campaigns import CampaignRequest, StartRequest
 from labctl.services.schemas.certification import CertifyRequest
-from labctl.services.schemas.drafts import DraftResponse, DraftsRequest
+from labctl.services.schemas.reports.drafts import DraftResponse, DraftsRequest
 from labctl.store import Store, open_store
 from procedures.contracts.errors import RecipeError
 from procedures.recipe.recipe import parse_recipe, shipped_recipes

@@ -33,7 +33,7 @@ class Characteristic(ResponseModel):
     along: str = Field(default="", description="Of the g-sensitivity: the axis of the specific force; else empty.")
     value: float | None = Field(description="Measured value; null: not measured, see `why`.")
     u: float | None = Field(description="Standard uncertainty of `value`; null: unknown.")
-    at_most: float | None = Field(default=None, description="Bound of a figure that cannot be told from nothing.")
+    at_most: float | None = Field(default=None, description="Bound of a figure that cannot be distinguished from zero.")
     unit: str
     conditions: MeasuredUnder | None
     specified: float | None = Field(description="Value of the maker's data sheet, in `unit`; null: not stated.")

@@ -1,47 +1,19 @@
-"""Drafts: the calibrations that campaigns end in. Each is due from the start of its campaign on, and made once."""
+"""Drafts: each is due from the start of its campaign on, and made once."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from datetime import datetime
-from typing import Literal
 
 import sqlalchemy as sa
 
-from labctl.errors import Conflict
 from labctl.json_types import JsonObject
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.repositories.audit import append
+from labctl.store.repositories.drafts.records import OPEN, DraftEvent, DraftRow, DraftState
 from labctl.store.schema import tables
 from procedures.contracts.campaign_state import CampaignState
-
-DraftState = Literal["due", "fitted", "made", "failed"]
-#: States of a draft that still has to be made.
-OPEN: tuple[DraftState, ...] = ("due", "fitted")
-
-
-@dataclass(frozen=True)
-class DraftRow:
-    """The draft of one recording."""
-
-    recording: int
-    campaign: int
-    serial: str
-    state: DraftState
-    version: int | None
-    at: datetime | None
-    reason: str
-    report: JsonObject | None
-
-
-@dataclass(frozen=True)
-class DraftEvent:
-    """What the events of the campaign say of a draft."""
-
-    message: str
-    level: Literal["info", "warning"]
 
 
 class Drafts:
@@ -134,24 +106,3 @@ class Drafts:
             detail = {"unit": row.serial, "version": row.version, "state": row.state, "said": event.message}
             append(connection, at, "draft", f"campaign {row.campaign_id}", detail)
         return True
-
-
-def make_due(connection: sa.Connection, campaign: int, recordings: Mapping[int, str]) -> None:
-    """Write down, with the plan of a campaign, that each of its recordings ends in a draft; recording -> serial."""
-    rows = [
-        {"recording_id": number, "campaign_id": campaign, "serial": serial, "state": "due"}
-        for number, serial in recordings.items()
-    ]
-    if rows:
-        connection.execute(sa.insert(tables.drafts), rows)
-
-
-def mark_fitted(connection: sa.Connection, recording: int, version: int) -> None:
-    """Note, in the transaction that keeps it, which version is the draft of a recording.
-
-    Raises Conflict where another process has made it meanwhile.
-    """
-    d = tables.drafts
-    mine = sa.update(d).where(d.c.recording_id == recording, d.c.state.in_(("due", "failed")))
-    if connection.execute(mine.values(state="fitted", version=version, reason="")).rowcount != 1:
-        raise Conflict(f"the draft of recording {recording} was made by another process meanwhile; nothing is to do")

@@ -1,43 +1,17 @@
-"""`labctl datasheet`: a unit in the terms of IEEE Std 528 and 952, measured beside specified."""
+"""A unit's data sheet as text."""
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
-
-from labctl.cli.error_reporting import one_clear_line
-from labctl.cli.options import Database, Json, Serial
-from labctl.cli.output import console, format_number, print_json, table
+from labctl.cli.output import console, format_number, table
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.datasheet import Characteristic, DatasheetResponse
+    from labctl.services.schemas.reports.datasheet import Characteristic, DatasheetResponse
 
 
-def datasheet(
-    serial: Serial,
-    out: Annotated[
-        Path | None, typer.Option("--out", metavar="FILE", help="Write the data sheet to a file, as JSON.")
-    ] = None,
-    as_json: Json = False,
-    database: Database = None,
-) -> None:
-    """Show the data sheet of a unit from its recordings; exit 1 if a specified value is not kept."""
-    from labctl.services.commands.open import open_readonly
-    from labctl.services.datasheet.sheet import datasheet as datasheet_of
-
-    with one_clear_line():
-        with open_readonly(database) as store:
-            answer = datasheet_of(store, serial)
-        if out is not None:
-            out.write_text(answer.model_dump_json(indent=2) + "\n", encoding="utf-8")
-    print_json(answer) if as_json else _print(answer)
-    if answer.passed is False:
-        raise typer.Exit(1)
-
-
-def _print(answer: DatasheetResponse) -> None:
+def print_datasheet(answer: DatasheetResponse) -> None:
+    """Print each characteristic with its uncertainty beside the specified value, then the decision in words."""
     console.print(f"[bold]{answer.serial}[/] {answer.model}", highlight=False)
     rows = table("", "characteristic", "axis", "value", "u", "unit", "specified", "", "recording", numbers=0)
     for each in answer.characteristics:
