@@ -65,7 +65,10 @@ def operator_of(bench: Bench) -> Operator:
 
 
 def _runnable(recipe: Recipe, *, fit: bool) -> Recipe:
-    """Return a recipe, without [fit] where none is wanted; raises BadInput for one with courses of the rate, which no driver runs."""
+    """Return a recipe, without [fit] where none is wanted.
+
+    Raises BadInput for one with courses of the rate, which no driver runs.
+    """
     if recipe.profiles:
         raise BadInput(
             f"recipe {recipe.name}: its {len(recipe.profiles)} [[profiles]] can be simulated only (`labctl simulate`): "
@@ -132,8 +135,8 @@ def prepare(
     """Open the bench, plan, and write the whole campaign down; the table is at rest when this returns.
 
     Without `fit` it ends in its recordings, whatever its recipe says. `opened` is the bench where it is open already;
-    `bench_clear` is what a person has confirmed about it. Raises InstrumentError when an instrument does not answer, PlanRefused when the bench cannot do the recipe, Conflict
-    where a unit or its USB adapter is not the one that it was.
+    `bench_clear` is what a person has confirmed about it. Raises InstrumentError when an instrument does not answer,
+    PlanRefused when the bench cannot do the recipe, Conflict where a unit or its USB adapter is not the one it was.
     """
     load_libraries()
     bench_file = with_drivers(bench_file)  # what is written down names the release of each driver

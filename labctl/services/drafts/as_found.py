@@ -68,7 +68,8 @@ def drift_from(in_force: CalibrationRecord, draft: CalibrationRecord, measured: 
 def _difference(in_force: CalibrationRecord, draft: CalibrationRecord, measured: Measurements) -> dict[str, Array]:
     if motion_of(measured.row) == "poses":
         raise BadInput(
-            "in poses no data set has a rate of its own, so that corrected rates cannot be compared; compare versions by `labctl verify`"
+            "in poses no data set has a rate of its own, so that corrected rates cannot be compared; compare versions "
+            "by `labctl verify`"
         )
     old, _ = applied_errors(read_calibration(in_force.document), measured.points)
     new, _ = applied_errors(read_calibration(draft.document), measured.points)
