@@ -19,6 +19,7 @@ import { query, updateQuery } from "../core/router.js";
 import { ladderFigure } from "../explore/error_ladder.js";
 import { askCertification, askRevocation, certificationTable } from "../unit/certification.js";
 import { coefficients, comparison } from "../unit/coefficients.js";
+import { datasheetCard } from "../unit/datasheet.js";
 import { exportFiles } from "../unit/export_files.js";
 import { inForce } from "../unit/in_force.js";
 import { trendCard } from "../trend/card.js";
@@ -60,6 +61,7 @@ export async function page({ params, signal }) {
           h("p", {}, "No calibration yet."),
           h("p", {}, h("a", { class: "button primary", href: explore }, "Fit a model")),
         ),
+    unit.recordings.length ? datasheetCard(unit.serial, signal) : null,
     h(
       "div",
       { class: "columns" },
