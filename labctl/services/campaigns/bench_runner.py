@@ -120,9 +120,11 @@ class BenchRunner:
             self._refuse_unless_free()
             bench = with_hidden_effects(self._bench, request.hide)
             refuse_unconfirmed(self._store, bench.name)
-            clear, clock = confirmation_text(bench, request), self._make_clock()
-            said = {"clip": request.clip, "fit": request.fit}
-            prepared = prepare(self._store, request.recipe, bench, clock, **said, bench_clear=clear)
+            clear = confirmation_text(bench, request)
+            store, clock = self._store, self._make_clock()
+            prepared = prepare(
+                store, request.recipe, bench, clock, clip=request.clip, fit=request.fit, bench_clear=clear
+            )
             self._begin(prepared)
         return campaign_status(self._store, prepared.id)
 

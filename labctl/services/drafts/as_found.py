@@ -11,7 +11,7 @@ from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.models.inversion import NotConverged
 from labctl.fitting.numeric.arrays import Array
-from labctl.json_types.models import Coefficients
+from labctl.json_types.models import AxisCoefficients
 from labctl.services.criticism.measurements import Measurements
 from labctl.services.criticism.trend import line_left
 from labctl.services.criticism.verification.of_version import applied_errors, verify
@@ -95,7 +95,7 @@ def _changes(in_force: CalibrationRecord, draft: CalibrationRecord) -> tuple[lis
 _Entry = tuple[str, str, float | None, float, float | None, str]
 
 
-def _entries(axes: Mapping[str, Mapping[str, Coefficients]]) -> Iterator[_Entry]:
+def _entries(axes: Mapping[str, AxisCoefficients]) -> Iterator[_Entry]:
     for axis, found in axes.items():
         coefficients = found["coefficients"]
         nodes = coefficients.get("temperature_c")
