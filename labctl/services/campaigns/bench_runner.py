@@ -121,10 +121,8 @@ class BenchRunner:
             bench = with_hidden_effects(self._bench, request.hide)
             refuse_unconfirmed(self._store, bench.name)
             clear = confirmation_text(bench, request)
-            store, clock = self._store, self._make_clock()
-            prepared = prepare(
-                store, request.recipe, bench, clock, clip=request.clip, fit=request.fit, bench_clear=clear
-            )
+            recipe, clock = request.recipe, self._make_clock()
+            prepared = prepare(self._store, recipe, bench, clock, clip=request.clip, fit=request.fit, bench_clear=clear)
             self._begin(prepared)
         return campaign_status(self._store, prepared.id)
 
