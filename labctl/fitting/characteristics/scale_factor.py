@@ -17,7 +17,6 @@ from labctl.fitting.numeric.arrays import Array
 PPM = 1e6
 #: Rates less than this share of the fastest apart are one.
 SAME_RATE = 1e-3
-LEAST_RATES_OF_A_CURVE = 4
 
 
 @dataclass(frozen=True)

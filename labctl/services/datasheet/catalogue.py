@@ -41,7 +41,7 @@ LINES = (
     Line("angle_random_walk", "Angle random walk N", "deg/s/rtHz", "angle_random_walk_dps_rthz",
          "recipe static-night"),
     Line("bias_instability", "Bias instability B", "deg/s", "bias_stability_dps", "recipe static-night"),
-    Line("rate_random_walk", "Rate random walk K", "deg/s^2/rtHz", "rate_random_walk_dps2_rthz",
+    Line("rate_random_walk", "Rate random walk K", "deg/s/sqrt(s)", "rate_random_walk_dps_rts",
          "recipe static-night"),
     Line("bandwidth", "Bandwidth, -3 dB", "Hz", "bandwidth_hz",
          "recipe sine-dwell or sweeps, simulated or imported, and a fit with the effect bandwidth", "at least"),

@@ -15,6 +15,7 @@ from labctl.fitting.characteristics.scale_factor import (
     PPM,
     StraightLine,
     asymmetry_ppm,
+    different_rates,
     nonlinearity_ppm,
     slope_over,
     straight_line,
@@ -25,6 +26,8 @@ from labctl.fitting.numeric.arrays import Array
 
 #: Figures at one temperature are at the level nearest to this, deg C.
 USUAL_C = 25.0
+#: Different rates of the table that a line takes.
+LEAST_RATES = 2
 PAIRS = ("xy", "xz", "yz")
 
 
@@ -61,7 +64,16 @@ class _Columns:
 
     def line(self, axis: str, rows: NDArray[np.bool_]) -> StraightLine | None:
         """Return the best straight line of an output over its own true rate."""
-        return straight_line(self.data.true_rate_dps(axis)[rows], self.data.outputs[axis][rows])
+        return self.line_about(axis, axis, rows)
+
+    def line_about(self, axis: str, about: str, rows: NDArray[np.bool_]) -> StraightLine | None:
+        """Return the line of an output over the true rate about an axis; None unless the table ran different rates.
+
+        The Earth's rate differs from position to position: it is no rate that a line could be drawn over.
+        """
+        if different_rates(self.table_dps[rows]) < LEAST_RATES:
+            return None
+        return straight_line(self.data.true_rate_dps(about)[rows], self.data.outputs[axis][rows])
 
 
 def figures_of(data: FitData) -> list[Figure]:
@@ -92,7 +104,7 @@ def _of_rates(seen: _Columns, axis: str) -> Iterator[Figure]:
     yield Figure("scale_factor", axis, line.scale_factor, here)
     yield Figure("bias", axis, line.bias_dps, here)
     rate = seen.data.true_rate_dps(axis)[here]
-    if len(np.unique(np.round(rate, 3))) >= 3:
+    if different_rates(seen.table_dps[here]) > LEAST_RATES:
         white = seen.data.white_var
         u = None if white is None else np.sqrt(white[axis][here])
         yield Figure("scale_factor_nonlinearity", axis, nonlinearity_ppm(line, float(np.max(np.abs(rate))), u), here)
@@ -175,7 +187,7 @@ def _alignment(seen: _Columns) -> Iterator[Figure]:
         rows = seen.own(about) & (seen.level == seen.usual)
         used |= rows
         for i, axis in enumerate(AXES):
-            line = straight_line(seen.data.true_rate_dps(about)[rows], seen.data.outputs[axis][rows])
+            line = seen.line_about(axis, about, rows)
             if line is None:
                 return
             k[i, j] = line.scale_factor.value

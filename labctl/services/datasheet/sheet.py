@@ -24,7 +24,8 @@ from labctl.store import RecordingRow, Store, Unit
 
 #: Of many recordings the newest are used.
 MOST_RECORDINGS = 32
-NOISE = {"angle_random_walk": "N", "bias_instability": "B", "rate_random_walk": "K"}
+#: Figure of the Allan deviation, and its unit there over that of the data sheet.
+NOISE = {"angle_random_walk": ("N", 60.0), "bias_instability": ("B", 3600.0), "rate_random_walk": ("K", 216_000.0)}
 Key = tuple[str, str, str]  #: id, axis, axis of the force
 
 
@@ -95,13 +96,17 @@ def _noise(store: Store, rows: Sequence[RecordingRow]) -> Iterator[Characteristi
         datasets=answer.datasets[-1] - answer.datasets[0] + 1,
     )  # fmt: skip
     for axis, noise in answer.axes.items():
-        for name, letter in NOISE.items():
+        for name, (letter, units) in NOISE.items():
             figure: NoiseFigure = {"N": noise["N"], "B": noise["B"], "K": noise["K"]}[letter]
             yield Characteristic(
-                id=name, title=lines[name].title, axis=axis, value=figure["value"], u=figure["u"],
-                at_most=figure["at_most"], unit=figure["unit"], conditions=under, specified=None,
+                id=name, title=lines[name].title, axis=axis, value=_over(figure["value"], units), u=_over(figure["u"], units),
+                at_most=_over(figure["at_most"], units), unit=lines[name].unit, conditions=under, specified=None,
                 specified_as="at most", passed=None, why=figure["why"],
             )  # fmt: skip
+
+
+def _over(value: float | None, units: float) -> float | None:
+    return None if value is None else value / units
 
 
 def _longest_rest(store: Store, row: RecordingRow) -> int:

@@ -14,7 +14,9 @@ from typer.testing import CliRunner
 
 from labctl.cli.app import app
 from labctl.errors import BadInput, NotFound
+from labctl.fitting.data.fit_data import fit_data_of
 from labctl.recording import Recording
+from labctl.services.datasheet.measured import figures_of
 from labctl.services.datasheet.sheet import datasheet
 from labctl.services.schemas.reports.datasheet import Characteristic, DatasheetResponse
 from labctl.store import Store, open_store
@@ -120,6 +122,28 @@ def test_g_sensitivity_is_from_the_recording_on_six_faces(sheet: DatasheetRespon
     assert found["xz"].conditions is not None
     assert (found["xz"].conditions.recording, found["xz"].conditions.datasets) == (1, 12)
     assert sheet.recordings == [1, 2]
+
+
+def test_a_recording_at_rest_gives_no_scale_factor_and_no_alignment(measured: Recording, unit: Triaxial) -> None:
+    still = six_faces(unit, measured)
+    info = still.info.model_copy(update={"latitude_deg": 48.0})  # the Earth's rate differs from face to face
+    found = {each.id for each in figures_of(fit_data_of(replace(still, info=info)))}
+    assert found == {"bias", "g_sensitivity"}
+
+
+def test_noise_is_in_the_units_of_the_specification(store: Store, measured: Recording) -> None:
+    rng = np.random.default_rng(4)
+    n, rate_hz, white = 4000, 10.0, 0.01
+    columns = {
+        "dataset": np.ones(n, int), "t_s": np.arange(n) / rate_hz, "position": np.full(n, "z"),
+        "run": np.ones(n, int), "table_rate_dps": np.zeros(n), "temperature_c": np.full(n, 25.0),
+        **{f"gyro_{axis}": rng.normal(0.1, white * np.sqrt(rate_hz), n) for axis in "xyz"},
+    }  # fmt: skip
+    info = measured.info.model_copy(update={"kind": "samples", "sample_rate_hz": rate_hz})
+    store.recordings.add_import(Recording(info, columns), STARTED)
+    found = lines(datasheet(store, measured.info.serial), "angle_random_walk")["x"]
+    assert found.unit == "deg/s/rtHz"
+    assert found.value == pytest.approx(white, rel=0.1)
 
 
 def test_what_is_specified_is_decided_by_simple_acceptance(sheet: DatasheetResponse) -> None:
