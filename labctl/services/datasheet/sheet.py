@@ -99,9 +99,9 @@ def _noise(store: Store, rows: Sequence[RecordingRow]) -> Iterator[Characteristi
         for name, (letter, units) in NOISE.items():
             figure: NoiseFigure = {"N": noise["N"], "B": noise["B"], "K": noise["K"]}[letter]
             yield Characteristic(
-                id=name, title=lines[name].title, axis=axis, value=_over(figure["value"], units), u=_over(figure["u"], units),
-                at_most=_over(figure["at_most"], units), unit=lines[name].unit, conditions=under, specified=None,
-                specified_as="at most", passed=None, why=figure["why"],
+                id=name, title=lines[name].title, axis=axis, value=_over(figure["value"], units),
+                u=_over(figure["u"], units), at_most=_over(figure["at_most"], units), unit=lines[name].unit,
+                conditions=under, specified=None, specified_as="at most", passed=None, why=figure["why"],
             )  # fmt: skip
 
 
