@@ -15,8 +15,11 @@ NEAR = 2.0
 
 def decided(line: Line, found: Characteristic, specified: float | None) -> Characteristic:
     """Return a characteristic with the specified value and the decision on it."""
-    if specified is None or found.value is None:
-        return found.model_copy(update={"specified": specified})
+    if specified is None:
+        return found
+    if found.value is None:  # a bound below the specified value passes; one above it decides nothing
+        bounded = line.specified_as == "at most" and found.at_most is not None and found.at_most <= specified
+        return found.model_copy(update={"specified": specified, "passed": True if bounded else None})
     value = abs(found.value) if line.specified_as == "at most" else found.value
     passed = value <= specified if line.specified_as == "at most" else value >= specified
     near = found.u is not None and abs(value - specified) < NEAR * found.u

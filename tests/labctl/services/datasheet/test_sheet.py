@@ -16,6 +16,8 @@ from labctl.cli.app import app
 from labctl.errors import BadInput, NotFound
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.recording import Recording
+from labctl.services.datasheet.catalogue import LINES
+from labctl.services.datasheet.decision import decided
 from labctl.services.datasheet.measured import figures_of
 from labctl.services.datasheet.sheet import datasheet
 from labctl.services.schemas.reports.datasheet import Characteristic, DatasheetResponse
@@ -158,6 +160,16 @@ def test_what_is_specified_is_decided_by_simple_acceptance(sheet: DatasheetRespo
     assert skewed.passed is (abs(skewed.value) <= SHEET["orthogonality_deg"])
     assert sheet.passed is False
     assert any("Scale factor nonlinearity" in text for text in sheet.text)
+
+
+@pytest.mark.parametrize(("at_most", "passed"), [(0.001, True), (0.004, None), (None, None)])
+def test_a_bound_decides_only_below_the_specified_value(at_most: float | None, passed: bool | None) -> None:
+    line = next(each for each in LINES if each.id == "bias_instability")
+    found = Characteristic(
+        id=line.id, title=line.title, axis="x", value=None, u=None, at_most=at_most, unit=line.unit, conditions=None,
+        specified=None, specified_as="at most", passed=None,
+    )  # fmt: skip
+    assert decided(line, found, 0.003).passed is passed
 
 
 def test_what_is_not_measured_is_null_and_names_its_recipe(sheet: DatasheetResponse) -> None:
