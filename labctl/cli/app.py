@@ -66,6 +66,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "ladder": criticism.ladder,
     "trend": trend.trend,
     "reproduce": effects.reproduce,
+    "datasheet": trend.datasheet,
     "units": trend.units,
     "certify": calibrations.certify,
     "revoke": calibrations.revoke,

@@ -21,7 +21,11 @@ from labctl.services.campaigns.status import from_rows, mark_abandoned, statuses
 from labctl.services.commands.command import Command, LocalExecutor, RequestT, ResponseT
 from labctl.services.commands.computed import carry_out
 from labctl.services.commands.context import CommandContext
+from labctl.services.commands.registry import MAKE_DRAFTS
+from labctl.services.commands.requests import ToCampaign
 from labctl.services.computation import Computation, InThreads, Pending
+from labctl.services.drafts.answers import with_drafts
+from labctl.services.drafts.watch import DraftWatch
 from labctl.services.local_bench import LocalBench
 from labctl.services.recordings.staging import remove_abandoned
 from labctl.services.schemas.benches import BenchResponse
@@ -29,6 +33,7 @@ from labctl.services.schemas.campaigns import (
     CampaignResponse,
     EventResponse,
 )
+from labctl.services.schemas.reports.drafts import DraftsRequest, DraftsResponse
 from labctl.services.schemas.service import HealthResponse, HeartbeatResponse, PulseResponse
 from labctl.services.units import count_due
 from labctl.store import Store
@@ -71,6 +76,7 @@ class LabService:
         self.bench_access: BenchAccess = access or LocalBench(store, clock, runner)
         self._executor = LocalExecutor(CommandContext(lambda: store, clock, self.bench_access.control))
         self._event_stream = CampaignEventStream(store, self.status, self.bench_access.listen)
+        self._drafts = DraftWatch(store, clock, lambda: None if self.bench is None else self.bench.name, self._draft)
         self._opened_at = clock.utc()
         self._closed = False
         self._hooks = ExitStack()
@@ -90,9 +96,14 @@ class LabService:
         self._hooks.enter_context(shutdown_hook(self.end_soon))
         remove_abandoned()
         self.bench_access.start()
+        self._drafts.start()
+
+    def _draft(self, campaign: int) -> DraftsResponse:
+        return self.execute(MAKE_DRAFTS, ToCampaign(campaign, DraftsRequest()))
 
     def end_soon(self) -> None:
         """Begin nothing more and let what runs go to its end in the safe state; returns at once."""
+        self._drafts.end_soon()
         self.bench_access.end_soon()
         self.computation.end_soon()
 
@@ -103,7 +114,9 @@ class LabService:
         self._closed = True
         with self._hooks:
             self.left = self.bench_access.close()
+            self._drafts.end_soon()
             self.computation.close()
+            self._drafts.close()
             self.store.close()
 
     def execute(self, command: Command[RequestT, ResponseT], request: RequestT) -> ResponseT:
@@ -125,6 +138,9 @@ class LabService:
 
     def status(self, campaign: int) -> CampaignResponse:
         """Return where a campaign is: live when it runs here, else as the database tells."""
+        return with_drafts(self.store, self._status(campaign))
+
+    def _status(self, campaign: int) -> CampaignResponse:
         access = self.bench_access
         answer = access.status(campaign)
         if answer is None:

@@ -7,6 +7,7 @@ from datetime import datetime, timedelta
 from labctl.exports import export_formats
 from labctl.services.calibrations.due import campaign_of
 from labctl.services.campaigns.plan_view import recipe_text
+from labctl.services.drafts.answers import newest_draft
 from labctl.services.schemas.units import ExportFormatResponse, RecalibrationResponse, UnitResponse
 from labctl.store import CertificationRow, Store, Unit
 
@@ -53,6 +54,7 @@ def _answer(
         due=act.due_at if act else None,
         overdue=bool(act and act.due_at and act.due_at <= now),
         recalibration=_recalibration(store, act) if act and whole else None,
+        draft=newest_draft(store, found.serial) if whole else None,
         formats=[
             ExportFormatResponse(id=name, title=each.title, suffix=each.suffix, options=dict(each.options))
             for name, each in export_formats().items()

@@ -35,6 +35,8 @@ from labctl.store.repositories.campaign_journal import StoreJournal
 from labctl.store.repositories.campaign_summaries import CampaignSummary
 from labctl.store.repositories.campaigns import Campaigns, NewCampaign
 from labctl.store.repositories.documents.certificates import CertificateForms, CertificateRow, Certificates
+from labctl.store.repositories.drafts.records import DraftEvent, DraftRow, DraftState
+from labctl.store.repositories.drafts.repository import Drafts
 from labctl.store.repositories.keys import Keys
 from labctl.store.repositories.leases import LeaseRow, Leases
 from labctl.store.repositories.recording_writer import Imports, ImportTicket
@@ -61,6 +63,10 @@ __all__ = [
     "Checked",
     "Copy",
     "DataSetRow",
+    "DraftEvent",
+    "DraftRow",
+    "DraftState",
+    "Drafts",
     "EventRow",
     "Finding",
     "Head",
@@ -117,6 +123,7 @@ class Store:
         self.calibrations = Calibrations(database)
         self.certifications = Certifications(database)
         self.certificates = Certificates(database)
+        self.drafts = Drafts(database)
         self.audit = Audit(database)
         self.keys = Keys(database)
         self.starts = Starts(database)

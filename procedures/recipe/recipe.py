@@ -13,6 +13,7 @@ from pydantic_core import PydanticCustomError
 
 from instruments.toml_documents import listed, parse_toml, read_toml_text, shown
 from procedures.contracts.errors import RecipeError
+from procedures.recipe.fit_rules import FitRules
 from procedures.recipe.profiles import Profile
 from procedures.recipe.rules import (
     AcquireRules,
@@ -73,6 +74,7 @@ class Recipe(Table):
     guards: GuardRules = GuardRules()
     on_failure: OnFailure = OnFailure()
     resume: ResumeRules = ResumeRules()
+    fit: FitRules | None = None  #: absent: a campaign ends in its recordings
 
     @model_validator(mode="before")
     @classmethod

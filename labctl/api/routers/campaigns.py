@@ -7,12 +7,14 @@ from typing import Annotated
 
 from fastapi import APIRouter, Header, Response
 
+from labctl.api.computation import execute
 from labctl.api.dependencies import ControlPoolDep, ServiceDep, command_route
 from labctl.api.event_stream import EventStream
 from labctl.services.campaigns.plan_view import campaign_plan
 from labctl.services.commands.registry import (
     ABORT_CAMPAIGN,
     CONFIRM_PROMPT,
+    MAKE_DRAFTS,
     PAUSE_CAMPAIGN,
     RESUME_CAMPAIGN,
     START_CAMPAIGN,
@@ -27,6 +29,7 @@ from labctl.services.schemas.campaigns import (
     ResumeRequest,
 )
 from labctl.services.schemas.plans import CampaignPlanResponse
+from labctl.services.schemas.reports.drafts import DraftsRequest, DraftsResponse
 from labctl.services.schemas.schedule import ScheduledResponse
 
 router = APIRouter(prefix="/api/campaigns", tags=["campaigns"])
@@ -90,6 +93,15 @@ def resume(campaign: int, request: ResumeRequest, service: ServiceDep) -> Campai
 def confirm(campaign: int, request: ConfirmRequest, service: ServiceDep) -> CampaignResponse:
     """Answer the question with this id; an answer to an older one is refused."""
     return service.execute(CONFIRM_PROMPT, ToCampaign(campaign, request))
+
+
+@command_route(router, MAKE_DRAFTS, "Make its drafts")
+async def make_drafts(campaign: int, request: DraftsRequest, service: ServiceDep) -> DraftsResponse:
+    """Make the drafts of a campaign that is done, where they are still due; with `again` also those that failed.
+
+    The service does this by itself when a campaign ends. Nothing is made twice, and nothing is certified.
+    """
+    return await execute(service, MAKE_DRAFTS, ToCampaign(campaign, request))
 
 
 @router.get(

@@ -10,6 +10,8 @@ from labctl.api.computation import while_connected
 from labctl.api.dependencies import ServiceDep
 from labctl.services.calibrations.due import span
 from labctl.services.criticism.trend import trend_unit
+from labctl.services.datasheet.sheet import datasheet
+from labctl.services.schemas.reports.datasheet import DatasheetResponse
 from labctl.services.schemas.units import TrendResponse, UnitResponse
 from labctl.services.units import list_units, unit
 
@@ -54,3 +56,10 @@ async def trend(
 ) -> TrendResponse:
     """As found and as left by recording, drift per year with its uncertainty, and when the bias leaves the limit."""
     return await while_connected(request, service, trend_unit, serial, version, limit_dps)
+
+
+@router.get("/units/{serial}/datasheet", summary="A unit's data sheet", tags=["criticism"])
+async def unit_datasheet(request: Request, serial: str, service: ServiceDep) -> DatasheetResponse:
+    """Characteristics in the terms of IEEE Std 528 and 952 with uncertainty, conditions and recording, beside the
+    specified values; what is not measured names the recipe that measures it."""
+    return await while_connected(request, service, datasheet, serial)

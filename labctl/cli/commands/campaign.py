@@ -75,6 +75,17 @@ ClearConfirmedBy = Annotated[
 ]
 
 
+Hide = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--hide",
+        metavar="EFFECT[=SIZE]",
+        help="Hide an effect in the units of a simulated bench; may be repeated; SIZE in the unit of the effect.",
+    ),
+]
+NoFit = Annotated[bool, typer.Option("--no-fit", help="Make no draft, whatever [fit] of the recipe says.")]
+
+
 @app.command("plan")
 def plan(
     recipe: Recipe,
@@ -118,12 +129,15 @@ def start(
     priority: Priority = None,
     late_limit_s: LateLimit = None,
     clear_confirmed_by: ClearConfirmedBy = None,
+    hide: Hide = None,
+    no_fit: NoFit = False,
     as_json: Json = False,
     database: Database = None,
 ) -> None:
     """Run a recipe. A service that uses the database runs it on its bench; without one it runs in this terminal
     until it ends.
 
+    A recipe with [fit] ends in a draft: a calibration that is fitted, criticised and not certified.
     With --at or --cron it is added to the schedule, which only a service (`labctl serve`) carries out. On a bench
     that is not simulated a person has to confirm first that the bench is clear, or will be at that time.
     """
@@ -139,6 +153,10 @@ def start(
         given: dict[str, Any] = {name: value for name, value in wanted.items() if value is not None}
         if clear_confirmed_by is not None:
             given |= {"confirmed_by": clear_confirmed_by, "checks": list(BENCH_CHECKS)}
+        if hide:
+            given["hide"] = hide
+        if no_fit:
+            given["fit"] = False
         request = CampaignRequest.model_validate({"recipe": own_text(recipe), "clip": clip, **given})
         asked = CampaignStart(request, bench=bench, speed=speed, seed=seed)
         with open_commands(database, campaign_terminal(quiet=as_json)) as commands:

@@ -1,4 +1,4 @@
-"""`labctl campaign` watch, pause, resume, abort, confirm: a campaign that runs, or was interrupted."""
+"""`labctl campaign` watch, pause, resume, abort, confirm, draft: a campaign that runs, or was interrupted."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import typer
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import BenchName, CampaignId, Database, Json
 from labctl.cli.output import console, print_json
-from labctl.cli.printing.campaigns import print_campaign, print_end
+from labctl.cli.printing.campaigns import print_campaign, print_drafts, print_end
 from labctl.cli.turn_text import turn_text
 
 if TYPE_CHECKING:
@@ -190,7 +190,32 @@ def confirm(
     print_json(answer) if as_json else print_campaign(answer)
 
 
+def draft(
+    campaign: CampaignId = None,
+    again: Annotated[bool, typer.Option("--again", help="Also try those again that failed before.")] = False,
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Make the drafts of a campaign that is done, where they are still due. A running service does it by itself."""
+    from labctl.services.commands.open import current_status, execute
+    from labctl.services.commands.registry import MAKE_DRAFTS
+    from labctl.services.commands.requests import ToCampaign
+    from labctl.services.schemas.reports.drafts import DraftsRequest
+
+    with one_clear_line():
+        wanted = campaign if campaign is not None else current_status(database, None).id
+        answer = execute(database, MAKE_DRAFTS, ToCampaign(wanted, DraftsRequest(again=again)))
+    if as_json:
+        print_json(answer)
+    elif answer.drafts:
+        print_drafts(answer.drafts)
+    else:
+        console.print(f"campaign {answer.campaign} has no draft: its recipe has no [fit]", markup=False)
+    if any(each.state == "failed" for each in answer.drafts):
+        raise typer.Exit(1)
+
+
 def add_to(app: typer.Typer) -> None:
     """Put these commands beside the others of `labctl campaign`."""
-    for command in (watch, pause, resume, abort, confirm):
+    for command in (watch, pause, resume, abort, confirm, draft):
         app.command(command.__name__)(command)

@@ -60,7 +60,7 @@ class DemoRunner:
         )
         gyros = settings.gyros if serial is None else (settings.gyros[0].model_copy(update={"serial": serial}),)
         settings = settings.model_copy(update={"simulation": simulation, "gyros": gyros})
-        prepared = prepare(self.store, recipe, settings, VirtualClock(), clip=False)
+        prepared = prepare(self.store, recipe, settings, VirtualClock(), clip=False, fit=False)
         row = self.store.campaigns.get(prepared.id)
         with CampaignProgress(quiet=self.quiet, title=f"campaign {prepared.id}") as bar:
 

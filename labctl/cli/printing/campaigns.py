@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import typer
@@ -13,6 +14,7 @@ from procedures.contracts.campaign_state import STOPPED_EARLY, UNDER_WAY
 if TYPE_CHECKING:
     from labctl.services.schemas.campaigns import CampaignResponse
     from labctl.services.schemas.plans import AttendanceResponse, PlanResponse
+    from labctl.services.schemas.reports.drafts import DraftResponse
     from labctl.services.schemas.schedule import ScheduledResponse
 
 
@@ -99,9 +101,23 @@ def print_campaign(answer: CampaignResponse) -> None:
     _print_advice(answer)
     for serial, recording in answer.recordings.items():
         console.print(f"  recording {recording}: {serial}", markup=False)
+    print_drafts(answer.drafts)
     for device, said in answer.reported.items():
         known = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in said.items())
         console.print(f"  {device} says: {known}", markup=False, soft_wrap=True)
+
+
+def print_drafts(drafts: Sequence[DraftResponse]) -> None:
+    """Print what each draft of a campaign is, or why there is none."""
+    for draft in drafts:
+        if draft.state == "failed":
+            console.print(f"  {draft.reason}", style="red", markup=False, soft_wrap=True)
+        elif draft.report is not None:
+            kept = draft.report.within_limits is not False and not draft.report.objections
+            console.print(f"  {draft.report.text}", style="" if kept else "yellow", markup=False, soft_wrap=True)
+        else:
+            text = f"  draft of {draft.serial}: not made yet; a service makes it, or `labctl campaign draft "
+            console.print(f"{text}{draft.campaign}`", markup=False, soft_wrap=True)
 
 
 def _print_instruments(answer: CampaignResponse) -> None:

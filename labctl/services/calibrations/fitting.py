@@ -28,11 +28,11 @@ from labctl.services.schemas.calibrations import (
 from labctl.store import NewCalibration, RecordingRow, Store
 
 
-def fit_unit(store: Store, serial: str, request: FitRequest, at: datetime) -> FitResponse:
+def fit_unit(store: Store, serial: str, request: FitRequest, at: datetime, *, is_draft: bool = False) -> FitResponse:
     """Fit a model to a unit's recording and keep it as the next version.
 
     Raises NotFound, BadInput for an unknown model or effect, NotEnoughData, DataRefused for data that are certainly
-    wrong and for a fit that is worse than none.
+    wrong and for a fit that is worse than none. A draft (`is_draft`) is kept once: raises Conflict for another one.
     """
     measured = Measurements(store, chosen_rows(store, serial, request.recording, request.recordings))
     recording, campaign, recordings = measured.row.id, measured.row.campaign, measured.recordings
@@ -62,8 +62,9 @@ def fit_unit(store: Store, serial: str, request: FitRequest, at: datetime) -> Fi
             "hash": calibration.hash, "warnings": [as_json(warning) for warning in warnings],
         }  # fmt: skip
         return NewCalibration(
-            None, recording, result.fitted.model.name, calibration.to_bytes(), calibration.hash, answer, recordings
-        )
+            None, recording, result.fitted.model.name, calibration.to_bytes(), calibration.hash, answer, recordings,
+            is_draft=is_draft,
+        )  # fmt: skip
 
     kept = keep_next_version(store, serial, at, build)
     return FitResponse.model_validate(kept.answer, extra="forbid")

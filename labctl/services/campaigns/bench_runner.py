@@ -121,8 +121,8 @@ class BenchRunner:
             bench = with_hidden_effects(self._bench, request.hide)
             refuse_unconfirmed(self._store, bench.name)
             clear = confirmation_text(bench, request)
-            clock = self._make_clock()
-            prepared = prepare(self._store, request.recipe, bench, clock, clip=request.clip, bench_clear=clear)
+            recipe, clock = request.recipe, self._make_clock()
+            prepared = prepare(self._store, recipe, bench, clock, clip=request.clip, fit=request.fit, bench_clear=clear)
             self._begin(prepared)
         return campaign_status(self._store, prepared.id)
 

@@ -92,7 +92,7 @@ class CampaignEventStream:
         self, campaign: int, after: int, over: Callable[[], bool]
     ) -> AsyncIterator[EventResponse | CampaignResponse | None]:
         """Yield a campaign's events after number `after`, where it stands whenever that has changed, and None to show
-        that the stream lives, until the campaign ends or it is `over` for another reason.
+        that the stream lives, until the campaign has ended and its drafts are made, or it is `over` for another reason.
 
         A client that reads slowly gets the newest status next, never a queue of old ones; the bench only rings a bell,
         at most every LEAST_S.
@@ -103,7 +103,7 @@ class CampaignEventStream:
         try:
             while True:
                 bell.clear()
-                state, updates = await self._updates(campaign, after)
+                state, awaited, updates = await self._updates(campaign, after)
                 for event in updates:
                     after = event.id
                     yield event
@@ -111,7 +111,7 @@ class CampaignEventStream:
                 if now != shown:
                     shown = now
                     yield now
-                if state in ENDED or over():
+                if (state in ENDED and not awaited) or over():
                     return
                 async for live in self._meanwhile(campaign, bell):
                     if live is None or live != shown:
@@ -121,15 +121,17 @@ class CampaignEventStream:
             if stop is not None:
                 stop()
 
-    async def _updates(self, campaign: int, after: int) -> tuple[CampaignState, list[EventResponse]]:
-        """Return the state in the database, not that of the live picture, and the events that came before it.
+    async def _updates(self, campaign: int, after: int) -> tuple[CampaignState, bool, list[EventResponse]]:
+        """Return the state in the database, not that of the live picture, whether a campaign that is done still awaits
+        a draft, and the events that came before.
 
         The last event is written before the state there ends, so that a client that sees the end has seen every event.
         """
 
-        def look() -> tuple[CampaignState, list[EventResponse]]:
+        def look() -> tuple[CampaignState, bool, list[EventResponse]]:
             state = self._store.campaigns.state(campaign)
-            return state, [event_answer(row) for row in self._store.campaigns.events(campaign, after)]
+            awaited = state is CampaignState.DONE and self._store.drafts.is_awaited(campaign)
+            return state, awaited, [event_answer(row) for row in self._store.campaigns.events(campaign, after)]
 
         return await self._status_cache.at(("updates", campaign, after), look)
 

@@ -20,6 +20,7 @@ from labctl.services.campaigns.preparation import Prepared, clock_for, prepare, 
 from labctl.services.campaigns.status import answer_of, describe_interrupted, from_rows
 from labctl.services.planning.loading import bench_for, load_bench, load_recipe
 from labctl.services.schemas.campaigns import BENCH_CHECKS, CampaignResponse, StartRequest
+from labctl.services.simulation.hidden_effects import with_hidden_effects
 from labctl.store import Store
 from labctl.store.connection.writer_lock import note_campaign
 from procedures.contracts.campaign_state import ENDED
@@ -145,6 +146,7 @@ def run_here(
     bench, StartNotConfirmed where no person has confirmed that it is clear.
     """
     bench_file = seeded(load_bench(request.bench or bench_for(load_recipe(request.recipe))), request.seed)
+    bench_file = with_hidden_effects(bench_file, request.hide)
     with open_for(bench_file, database or default_database()) as store, holding(store, bench_file) as control:
         clock = clock_for(bench_file, request.speed)
         SafeStateRetry(store, bench_file, lambda: clock).attempt()
@@ -158,7 +160,9 @@ def run_here(
         if questions and not request.confirmed_by and ask_clear is not None and (by := ask_clear(questions)):
             request = request.model_copy(update={"confirmed_by": by, "checks": list(BENCH_CHECKS)})
         clear = confirmation_text(bench_file, request)
-        prepared = prepare(store, request.recipe, bench_file, clock, clip=request.clip, bench_clear=clear)
+        prepared = prepare(
+            store, request.recipe, bench_file, clock, clip=request.clip, fit=request.fit, bench_clear=clear
+        )
         return run_attended(store, prepared, control, observe, attend)
 
 

@@ -66,14 +66,17 @@ def operator_of(bench: Bench) -> Operator:
     )
 
 
-def _runnable(recipe: Recipe) -> Recipe:
-    """Return a recipe; raises BadInput for one with courses of the rate, which no driver runs."""
+def _runnable(recipe: Recipe, *, fit: bool) -> Recipe:
+    """Return a recipe, without [fit] where none is wanted.
+
+    Raises BadInput for one with courses of the rate, which no driver runs.
+    """
     if recipe.profiles:
         raise BadInput(
             f"recipe {recipe.name}: its {len(recipe.profiles)} [[profiles]] can be simulated only (`labctl simulate`): "
             "no driver runs a table along a course of rates; leave them out"
         )
-    return recipe
+    return recipe if fit else recipe.model_copy(update={"fit": None})
 
 
 def refuse_unconfirmed(store: Store, bench: str) -> None:
@@ -127,19 +130,19 @@ def prepare(
     clock: Clock,
     *,
     clip: bool,
+    fit: bool = True,
     opened: Bench | None = None,
     bench_clear: str = "",
 ) -> Prepared:
     """Open the bench, plan, and write the whole campaign down; the table is at rest when this returns.
 
-    `opened` is the bench where it is open already; `bench_clear` is what a person has confirmed about it.
-
-    Raises InstrumentError when an instrument does not answer, PlanRefused when the bench cannot do the recipe, Conflict
-    where a unit or its USB adapter is not the one that it was.
+    Without `fit` it ends in its recordings, whatever its recipe says. `opened` is the bench where it is open already;
+    `bench_clear` is what a person has confirmed about it. Raises InstrumentError when an instrument does not answer,
+    PlanRefused when the bench cannot do the recipe, Conflict where a unit or its USB adapter is not the one it was.
     """
     load_libraries()
     bench_file = with_drivers(bench_file)  # what is written down names the release of each driver
-    recipe = _runnable(load_recipe(recipe_source))
+    recipe = _runnable(load_recipe(recipe_source), fit=fit)
     refuse_unconfirmed(store, bench_file.name)
     bench = opened or open_bench(bench_file, clock)
     try:

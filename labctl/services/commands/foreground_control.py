@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 
+from instruments.clock import SystemClock
 from labctl.errors import BadInput
 from labctl.services.benches.check import check_bench
 from labctl.services.campaigns.execution import AskClear, Attend, Observe, run_here
@@ -13,11 +14,15 @@ from labctl.services.campaigns.resume import resume_here
 from labctl.services.campaigns.unattended import abort_abandoned, not_running
 from labctl.services.commands.context import CommandContext
 from labctl.services.commands.requests import CampaignResume, CampaignStart, ToBench, ToCampaign
+from labctl.services.drafts.answers import with_drafts
 from labctl.services.planning.loading import bench_for, load_bench, load_recipe
 from labctl.services.schedule import queue
 from labctl.services.schemas.benches import BenchCheckResponse, CheckRequest
 from labctl.services.schemas.campaigns import CampaignResponse, ConfirmRequest, ReasonRequest, StartRequest
+from labctl.services.schemas.reports.drafts import DraftsRequest
 from labctl.services.schemas.schedule import ScheduledResponse
+from labctl.store import open_store
+from procedures.contracts.campaign_state import CampaignState
 
 
 @dataclass(frozen=True)
@@ -50,13 +55,27 @@ class ForegroundControl:
     def start(self, _: CommandContext, asked: CampaignStart) -> CampaignResponse:
         """Run a campaign in this process until it is over."""
         request = StartRequest(
-            recipe=asked.body.recipe, bench=asked.bench, clip=asked.body.clip, speed=asked.speed, seed=asked.seed,
+            recipe=asked.body.recipe, bench=asked.bench, clip=asked.body.clip, hide=asked.body.hide, fit=asked.body.fit,
+            speed=asked.speed, seed=asked.seed,
             confirmed_by=asked.body.confirmed_by, checks=asked.body.checks,
         )  # fmt: skip
         with self._open_terminal() as terminal:
-            return run_here(
+            answer = run_here(
                 self._database, request, terminal.observe, terminal.attend, terminal.say, terminal.ask_clear
             )
+        return self._with_drafts(answer)
+
+    def _with_drafts(self, answer: CampaignResponse) -> CampaignResponse:
+        """Make the drafts of a campaign that has run here: the bench is closed, and no other process makes them."""
+        if answer.state is not CampaignState.DONE:
+            return answer
+        with open_store(self._database, write=True) as store:
+            if not store.drafts.is_awaited(answer.id):
+                return answer
+            from labctl.services.drafts.make import make_drafts  # noqa: PLC0415  it loads the libraries of the fit
+
+            make_drafts(store, answer.id, DraftsRequest(), SystemClock().utc())
+            return with_drafts(store, answer)
 
     def schedule(self, context: CommandContext, asked: CampaignStart) -> ScheduledResponse:
         """Enter a campaign into the schedule of a bench; a service that holds this bench and database starts it."""
@@ -73,9 +92,10 @@ class ForegroundControl:
     def resume(self, _: CommandContext, asked: CampaignResume) -> CampaignResponse:
         """Resume a campaign in this process and run it until it is over."""
         with self._open_terminal() as terminal:
-            return resume_here(
+            answer = resume_here(
                 self._database, asked.campaign, asked.bench, asked.speed, asked.body, terminal.observe, terminal.attend
             )
+        return self._with_drafts(answer)
 
     def pause(self, context: CommandContext, asked: ToCampaign[ReasonRequest]) -> CampaignResponse:
         """Raise Conflict: a campaign that this process could pause would hold the database."""

@@ -24,6 +24,9 @@ from labctl.services.commands.requests import (
     ToUnit,
     ToVersion,
 )
+from labctl.services.drafts.make import make_drafts
+from labctl.services.planning.fit_rules import check_fit
+from labctl.services.planning.loading import load_recipe
 from labctl.services.recordings import examples, importers, transfer
 from labctl.services.schedule import queue
 from labctl.services.schemas.admin import BackupNote, KeyRequest, KeyResponse, NewKeyResponse
@@ -38,6 +41,7 @@ from labctl.services.schemas.recordings import (
     SimulatedRecordingResponse,
     SimulatedRequest,
 )
+from labctl.services.schemas.reports.drafts import DraftsRequest, DraftsResponse
 from labctl.services.schemas.schedule import ScheduledResponse
 
 
@@ -81,6 +85,8 @@ def _issue_certificate(context: CommandContext, asked: ToVersion[CertificateRequ
 
 def _start_campaign(context: CommandContext, asked: CampaignStart) -> CampaignResponse | ScheduledResponse:
     """Start a campaign now, or enter it into the schedule: the only place where that is decided."""
+    if asked.body.fit:
+        check_fit(load_recipe(asked.body.recipe))
     if queue.is_scheduled(asked.body):
         return context.control.schedule(context, asked)
     return context.control.start(context, asked)
@@ -104,6 +110,10 @@ def _confirm_prompt(context: CommandContext, asked: ToCampaign[ConfirmRequest]) 
 
 def _cancel_start(context: CommandContext, asked: ToStart) -> ScheduledResponse:
     return queue.cancel_start(context.store, asked.start, context.now())
+
+
+def _make_drafts(context: CommandContext, asked: ToCampaign[DraftsRequest]) -> DraftsResponse:
+    return make_drafts(context.store, asked.campaign, asked.body, context.now())
 
 
 def _clear_bench(context: CommandContext, asked: ToBench[ClearRequest]) -> BenchStatus:
@@ -202,6 +212,13 @@ PAUSE_CAMPAIGN = Command(
 )
 ABORT_CAMPAIGN = Command(
     method="POST", path=_CAMPAIGN + "/abort", handler=_abort_campaign, responses={200: CampaignResponse}
+)
+MAKE_DRAFTS = Command(
+    method="POST",
+    path=_CAMPAIGN + "/drafts",
+    handler=_make_drafts,
+    responses={200: DraftsResponse},
+    computes=True,
 )
 CONFIRM_PROMPT = Command(
     method="POST", path=_CAMPAIGN + "/confirm", handler=_confirm_prompt, responses={200: CampaignResponse}

@@ -92,7 +92,7 @@ def _point(
         channels = fit_data_of(data.points)
     except LabctlError as error:
         return found.model_copy(update={"why": str(error)})
-    axes = {axis: _left(values, channels.true_rate_dps(axis)) for axis, values in errors.items()}
+    axes = {axis: line_left(values, channels.true_rate_dps(axis)) for axis, values in errors.items()}
     pooled = np.concatenate(list(errors.values()))
     return found.model_copy(update={"rms_dps": float(np.sqrt(np.mean(pooled**2))), "axes": axes})
 
@@ -109,7 +109,7 @@ def _applied(store: Store, version: Sequence[CalibrationRecord], data: Measureme
     )
 
 
-def _left(error_dps: Array, rate_dps: Array) -> AxisPoint:
+def line_left(error_dps: Array, rate_dps: Array) -> AxisPoint:
     """Return what is left of bias and scale factor on one axis: a straight line over the rate, by least squares."""
     turned = len(np.unique(np.round(rate_dps, 3))) >= LEAST_RATES
     columns = np.column_stack([np.ones(len(rate_dps)), rate_dps] if turned else [np.ones(len(rate_dps))])

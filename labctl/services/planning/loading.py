@@ -19,6 +19,7 @@ from instruments.interfaces.table import TableLimits
 from instruments.toml_documents import read_toml_text, shown
 from labctl.errors import BadBench
 from labctl.services.planning.attendance import attendance, visits_s
+from labctl.services.planning.fit_rules import check_fit
 from labctl.services.schemas.plans import PlanResponse, Visibility
 from procedures.contracts.errors import PlanRefused
 from procedures.planning.limits import BenchLimits, missing_instruments
@@ -145,6 +146,7 @@ def _can_do(recipe: Recipe, bench: BenchFile) -> bool:
 def plan_for(recipe_source: str, bench_source: str | None, *, clip: bool) -> tuple[Plan, BenchFile]:
     """Return the plan of a recipe on a bench. Raises RecipeError, BadBench, PlanRefused."""
     recipe = load_recipe(recipe_source)
+    check_fit(recipe)
     bench = load_bench(bench_source or bench_for(recipe))
     return make_plan(recipe, limits_of(bench), clip=clip), bench
 

@@ -12,6 +12,7 @@ from labctl.services.planning.loading import limits_of, load_recipe
 from labctl.services.schedule import times
 from labctl.services.schemas.campaigns import CampaignRequest
 from labctl.services.schemas.schedule import ScheduledResponse, StartEventResponse
+from labctl.services.simulation.hidden_effects import with_hidden_effects
 from labctl.store import NewStart, StartRow, Store
 from procedures.planning.plan import make_plan
 
@@ -23,10 +24,6 @@ def is_scheduled(request: CampaignRequest) -> bool:
     if request.at is not None and request.cron is not None:
         raise BadInput("a start has a time or a cron line, not both; leave one out")
     if request.at is not None or request.cron is not None:
-        if request.hide:
-            raise BadInput(
-                "hide: possible only for a campaign that begins now; leave out hide, or the time of the start"
-            )
         return True
     given = [name for name in ("time_zone", "priority", "late_limit_s") if name in request.model_fields_set]
     if given:
@@ -50,12 +47,14 @@ def add_start(store: Store, request: CampaignRequest, bench: BenchFile, now: dat
         assert request.at is not None
         due = times.moment(request.at, zone, now)
     recipe = load_recipe(request.recipe)
+    with_hidden_effects(bench, request.hide)  # what cannot be hidden is refused now
     plan = make_plan(recipe, limits_of(bench), clip=request.clip)
     confirmed = confirmation_text(bench, request)
     new = NewStart(
         bench_name=bench.name, recipe_name=recipe.name, recipe=request.recipe, clip=request.clip,
         priority=request.priority, cron=request.cron, time_zone=zone.key, late_limit_s=request.late_limit_s, due_at=due,
         confirmed_by=request.confirmed_by.strip() if confirmed else None, visits_s=visits_s(plan, bench),
+        hide=tuple(request.hide) or None, fit=request.fit,
     )  # fmt: skip
     row = store.starts.get(store.starts.add(new, now))
     assumed = request.time_zone is None and (request.cron is not None or not _has_zone(request.at))
@@ -90,7 +89,8 @@ def _answer(store: Store, row: StartRow, note: str = "") -> ScheduledResponse:
     return ScheduledResponse(
         id=row.id, bench=row.bench_name, recipe=row.recipe_name, state=row.state,
         due_at=row.due_at.astimezone(zone) if waits else None, time_zone=row.time_zone, cron=row.cron,
-        priority=row.priority, clip=row.clip, late_limit_s=row.late_limit_s, created_at=row.created_at, note=note,
+        priority=row.priority, clip=row.clip, hide=list(row.hide or ()), fit=row.fit,
+        late_limit_s=row.late_limit_s, created_at=row.created_at, note=note,
         history=[
             StartEventResponse(
                 at=event.at, due_at=event.due_at.astimezone(zone), outcome=event.outcome, message=event.message,

@@ -167,7 +167,10 @@ class Scheduler:
 def _request(row: StartRow) -> CampaignRequest:
     """Return the start of an entry, with the confirmation that was given when it was entered."""
     checks = list(BENCH_CHECKS) if row.confirmed_by else []
-    return CampaignRequest(recipe=row.recipe, clip=row.clip, confirmed_by=row.confirmed_by or "", checks=checks)
+    return CampaignRequest(
+        recipe=row.recipe, clip=row.clip, hide=list(row.hide or ()), fit=row.fit, confirmed_by=row.confirmed_by or "",
+        checks=checks,
+    )  # fmt: skip
 
 
 def _span(seconds: float) -> str:

@@ -9,6 +9,7 @@ from pydantic import Field
 
 from labctl.services.schemas.base import Request, ResponseModel
 from labctl.services.schemas.plans import RecipeSource
+from labctl.services.schemas.reports.drafts import DraftResponse
 from procedures.contracts.campaign_state import ACTIVE, ENDED, CampaignState
 
 #: What a person confirms about a real bench before a campaign starts there.
@@ -25,7 +26,11 @@ class CampaignRequest(Request):
         default_factory=list,
         max_length=20,
         description="Effects to hide in the units of a simulated bench, each as EFFECT or EFFECT=SIZE, SIZE in the "
-        "unit of the effect; not for a later start.",
+        "unit of the effect.",
+    )
+    fit: bool = Field(
+        default=True,
+        description="End in a draft if the recipe has [fit]; false: end in the recordings, whatever the recipe says.",
     )
     at: str | None = Field(
         default=None,
@@ -77,6 +82,8 @@ class StartRequest(Request):
     recipe: str
     bench: str | None = None
     clip: bool = False
+    hide: list[str] = Field(default_factory=list, max_length=20, description="Same as in `POST /api/campaigns`.")
+    fit: bool = Field(default=True, description="Same as in `POST /api/campaigns`.")
     speed: float | None = Field(
         default=None,
         gt=0,
@@ -235,6 +242,11 @@ class CampaignResponse(ResponseModel):
     started_at: datetime | None = None
     ended_at: datetime | None = None
     recordings: dict[str, int] = Field(default_factory=dict, description="serial -> recording")
+    drafts: list[DraftResponse] = Field(
+        default_factory=list,
+        description="The calibrations that it ends in, by recording; empty: the recipe has no [fit], or the campaign "
+        "is not done; empty in lists.",
+    )
     drivers: dict[str, DriverResponse] = Field(
         default_factory=dict,
         description="For each table, chamber and gyro: the driver that was used when the campaign began.",

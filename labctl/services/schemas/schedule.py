@@ -33,6 +33,11 @@ class ScheduledResponse(ResponseModel):
     cron: str | None
     priority: int
     clip: bool
+    hide: list[str] = Field(
+        default_factory=list,
+        description="Effects hidden in the units of a simulated bench, each as EFFECT or EFFECT=SIZE.",
+    )
+    fit: bool = Field(default=True, description="Whether the campaign ends in a draft if its recipe has [fit].")
     late_limit_s: float | None
     created_at: datetime
     note: str = ""

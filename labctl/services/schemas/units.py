@@ -7,6 +7,7 @@ from datetime import datetime
 from pydantic import Field
 
 from labctl.services.schemas.base import ResponseModel
+from labctl.services.schemas.reports.drafts import DraftResponse
 
 
 class ExportFormatResponse(ResponseModel):
@@ -42,6 +43,10 @@ class UnitResponse(ResponseModel):
     recalibration: RecalibrationResponse | None = Field(
         default=None,
         description="Null: the version in force is not from a campaign. Only of one unit, or with `due_within`.",
+    )
+    draft: DraftResponse | None = Field(
+        default=None,
+        description="The draft that a campaign ended in last; null: none did. Only of one unit, or with `due_within`.",
     )
     formats: list[ExportFormatResponse] = Field(description="Formats in which the unit's calibrations are available.")
 

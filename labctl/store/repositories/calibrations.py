@@ -17,6 +17,7 @@ from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.records import CalibrationRecord, CertificationRow, Judgement
 from labctl.store.repositories.audit import append
+from labctl.store.repositories.drafts.marks import mark_fitted
 from labctl.store.repositories.units import SEEN
 from labctl.store.schema import tables
 
@@ -97,6 +98,7 @@ class NewCalibration:
     hash: str
     answer: KeptAnswer
     recordings: tuple[int, ...] = ()  #: all that it was fitted to, where there are several
+    is_draft: bool = False  #: of the campaign that made its recording
 
     @property
     def fitted_to(self) -> tuple[int, ...]:
@@ -120,7 +122,8 @@ class Calibrations:
     def add(self, serial: str, at: datetime, version: int, new: NewCalibration) -> CalibrationRecord:
         """Keep a unit's next version, which was built with its number.
 
-        Raises VersionTaken when another one got the number meanwhile; nothing was changed.
+        Raises VersionTaken when another one got the number meanwhile, Conflict when the draft of its recording was
+        made meanwhile; nothing was changed.
         """
         values = {
             "serial": serial, "version": version, "parent": new.parent, "recording_id": new.recording,
@@ -134,6 +137,8 @@ class Calibrations:
                 c = tables.calibrations.c
                 number = connection.scalar(sa.insert(tables.calibrations).values(**values).returning(c.id))
                 _add_recordings(connection, number, new.fitted_to)
+                if new.is_draft and new.recording is not None:
+                    mark_fitted(connection, new.recording, version)
                 detail: dict[str, Any] = {
                     "model": new.model, "recording": new.recording, "parent": new.parent, "hash": new.hash,
                 }  # fmt: skip

@@ -19,6 +19,7 @@ from labctl.store.records import CampaignRow, EventRow, NewUnit, StepRow
 from labctl.store.repositories.audit import append
 from labctl.store.repositories.campaign_journal import StoreJournal
 from labctl.store.repositories.campaign_summaries import CampaignSummaries, CampaignSummary
+from labctl.store.repositories.drafts.marks import make_due
 from labctl.store.repositories.recording_writer import new_recording
 from labctl.store.schema import tables
 from procedures.contracts.campaign_state import UNFINISHED, CampaignState
@@ -86,9 +87,13 @@ class Campaigns:
                     for index, step in enumerate(new.steps)
                 ],
             )
+            made: dict[int, str] = {}
             for unit in new.units:
                 info = RecordingInfo.model_validate(unit.info)
-                new_recording(connection, info, at, campaign=number, gyro=unit.gyro, channels=unit.channels)
+                key = new_recording(connection, info, at, campaign=number, gyro=unit.gyro, channels=unit.channels)
+                made[key] = info.serial
+            if new.recipe.get("fit") is not None:
+                make_due(connection, number, made)
             if new.bench_clear:
                 _confirmed(connection, number, new.bench_clear, at)
             append(connection, at, "campaign start", f"campaign {number}", _audited(new))

@@ -34,6 +34,8 @@ class NewStart:
     due_at: datetime
     confirmed_by: str | None  #: who confirmed that the bench will be clear; None: not asked
     visits_s: Sequence[float] | None  #: when the plan needs a person, s from its begin; None: not known
+    hide: Sequence[str] | None  #: effects hidden in the units of a simulated bench; None: none
+    fit: bool  #: whether it ends in a draft where its recipe says so
 
 
 @dataclass(frozen=True)
@@ -101,7 +103,7 @@ class Starts:
         s = tables.scheduled_starts.c
         query = sa.select(
             s.bench_name, s.recipe_name, s.recipe, s.clip, s.priority, s.cron, s.time_zone, s.late_limit_s, s.due_at,
-            s.confirmed_by, s.visits_s, s.id, s.state, s.created_at,
+            s.confirmed_by, s.visits_s, s.hide, s.fit, s.id, s.state, s.created_at,
         )  # fmt: skip
         with self._database.reading() as connection:
             rows = connection.execute(query.where(condition).order_by(*order)).mappings().all()

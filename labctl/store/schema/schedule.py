@@ -24,6 +24,8 @@ scheduled_starts = sa.Table(
     sa.Column("created_at", Instant, nullable=False),
     sa.Column("confirmed_by", sa.String(200)),  # who confirmed that the bench will be clear
     sa.Column("visits_s", sa.JSON),  # when the plan needs a person, s from its begin
+    sa.Column("hide", sa.JSON(none_as_null=True)),  # effects hidden in the units of a simulated bench
+    sa.Column("fit", sa.Boolean, nullable=False, server_default=sa.true()),  # whether it ends in a draft
     sa.Index(None, "bench_name", "state", "due_at"),
 )
 

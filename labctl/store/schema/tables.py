@@ -8,6 +8,7 @@ from labctl.store.schema.benches import benches, leases
 from labctl.store.schema.calibrations import calibration_recordings, calibrations, certifications
 from labctl.store.schema.campaigns import campaigns, events, steps
 from labctl.store.schema.certificates import certificates
+from labctl.store.schema.drafts import drafts
 from labctl.store.schema.recordings import data_set_means, data_sets, environment, recordings, sample_blocks
 from labctl.store.schema.schedule import scheduled_starts, start_events
 from labctl.store.schema.types import Instant, metadata
@@ -26,6 +27,7 @@ __all__ = [
     "certifications",
     "data_set_means",
     "data_sets",
+    "drafts",
     "environment",
     "events",
     "leases",

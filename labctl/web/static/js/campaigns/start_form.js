@@ -86,14 +86,12 @@ export function startForm(bench, order) {
     await navigate("/bench");
   }
   async function later() {
-    const { hide, ...rest } = order();
-    if (hide.length) throw new Error("An effect can be hidden only in a campaign that begins now.");
     if (chosen === "at" && !at.value) throw new Error("Enter a time or a cron line.");
     const clear = bench && (await askBenchClear(bench, { later: true }));
     if (!clear) return;
     const made = await post("/api/campaigns", {
       body: {
-        ...rest,
+        ...order(),
         ...clear,
         ...timeOfStart(),
         time_zone: zone.value || null,

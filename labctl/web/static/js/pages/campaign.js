@@ -11,6 +11,7 @@ import { eventList } from "../bench/event_list.js";
 import { followCampaign } from "../bench/campaign_stream.js";
 import { remainingSeconds } from "../bench/campaign_history.js";
 import { planChart } from "../campaigns/plan_chart.js";
+import { draftsCard } from "../campaigns/drafts.js";
 import { adviceNotice } from "../campaigns/advice.js";
 import { campaignDuration, campaignInstant, durationTaken } from "../campaigns/campaign_time.js";
 import { hasEnded, isRunning, stateKind } from "../campaigns/states.js";
@@ -43,6 +44,7 @@ export async function page({ params, query, signal }) {
   const level = LEVELS.find(([each]) => each === query.level)?.[0] ?? "info";
   const events = eventList(MAX_EVENTS, level, now);
   const [about, reason, connection] = [h("div", {}), h("div", { class: "stack" }), h("div", { "aria-live": "polite" })];
+  const drafts = h("div", {});
   const picture = planChart(
     `Campaign ${now.id} plan`,
     () => ({ timeline: plan.timeline, now_s: isRunning(now) ? now.t_s : null, live: true }),
@@ -60,6 +62,7 @@ export async function page({ params, query, signal }) {
     now = next;
     setChildren(about, summary(now, plan));
     setChildren(reason, reasonNotices(now));
+    setChildren(drafts, draftsCard(now.drafts ?? []));
     if (ended) showAgain();
     else if (Date.now() - asked > PLAN_REFRESH_MS) again();
   }
@@ -107,6 +110,7 @@ export async function page({ params, query, signal }) {
     connection,
     reason,
     about,
+    drafts,
     cardWithHeader("Plan", h("span", { class: "muted small" }, "Press a data set to open its readings."), picture),
     recordingsCard(now),
     Object.assign(

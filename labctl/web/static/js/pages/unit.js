@@ -14,11 +14,13 @@ import {
   modelName,
   table,
 } from "../core/components.js";
+import { draftsCard } from "../campaigns/drafts.js";
 import { query, updateQuery } from "../core/router.js";
 import { ladderFigure } from "../explore/error_ladder.js";
 import { askCertification, askRevocation, certificationTable } from "../unit/certification.js";
 import { coefficients, comparison } from "../unit/coefficients.js";
 import { certificateFiles } from "../unit/certificate.js";
+import { datasheetCard } from "../unit/datasheet.js";
 import { exportFiles } from "../unit/export_files.js";
 import { inForce } from "../unit/in_force.js";
 import { trendCard } from "../trend/card.js";
@@ -49,6 +51,7 @@ export async function page({ params, signal }) {
       h("a", { class: "button primary", href: explore }, "Explore"),
     ),
     h("section", { class: "card", "aria-label": "In force" }, inForce(unit, rows, force)),
+    unit.draft && !unit.draft.certified ? draftsCard([unit.draft]) : null,
     rows.length
       ? [
           versions(unit, rows, issued, explore),
@@ -60,6 +63,7 @@ export async function page({ params, signal }) {
           h("p", {}, "No calibration yet."),
           h("p", {}, h("a", { class: "button primary", href: explore }, "Fit a model")),
         ),
+    unit.recordings.length ? datasheetCard(unit.serial, signal) : null,
     h(
       "div",
       { class: "columns" },

@@ -1,0 +1,1 @@
+"""The data sheet of a unit, from its own recordings."""

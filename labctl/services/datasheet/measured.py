@@ -1,0 +1,207 @@
+"""Figures of a data sheet from the data sets of one recording; the outputs as they are, nothing corrected."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.fitting.characteristics.alignment import alignment_of
+from labctl.fitting.characteristics.at_rest import AXES, g_sensitivity, repeatability
+from labctl.fitting.characteristics.estimate import Estimate
+from labctl.fitting.characteristics.scale_factor import (
+    PPM,
+    StraightLine,
+    asymmetry_ppm,
+    different_rates,
+    nonlinearity_ppm,
+    slope_over,
+    straight_line,
+)
+from labctl.fitting.data.fit_data import FitData
+from labctl.fitting.data.temperature.levels import level_means
+from labctl.fitting.numeric.arrays import Array
+
+#: Figures at one temperature are at the level nearest to this, deg C.
+USUAL_C = 25.0
+#: Different rates of the table that a line takes.
+LEAST_RATES = 2
+PAIRS = ("xy", "xz", "yz")
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure of a recording: id, axis, for the g-sensitivity the axis of the force, and its data sets."""
+
+    id: str
+    axis: str
+    estimate: Estimate
+    rows: NDArray[np.bool_]  #: the data sets behind it, (m,)
+    along: str = ""
+
+
+@dataclass(frozen=True)
+class _Columns:
+    """The data sets of a recording: temperature level, position, run and rate of each, (m,)."""
+
+    data: FitData
+    level: NDArray[np.int64]
+    level_c: Array
+    position: NDArray[np.str_]
+    run: NDArray[np.int64]
+    table_dps: Array
+
+    @property
+    def usual(self) -> int:
+        """The level nearest to `USUAL_C`."""
+        return int(np.argmin(np.abs(self.level_c - USUAL_C)))
+
+    def own(self, axis: str) -> NDArray[np.bool_]:
+        """Return which data sets turn about an axis, (m,)."""
+        return np.asarray(np.char.lstrip(self.position, "-") == axis)
+
+    def line(self, axis: str, rows: NDArray[np.bool_]) -> StraightLine | None:
+        """Return the best straight line of an output over its own true rate."""
+        return self.line_about(axis, axis, rows)
+
+    def line_about(self, axis: str, about: str, rows: NDArray[np.bool_]) -> StraightLine | None:
+        """Return the line of an output over the true rate about an axis; None unless the table ran different rates.
+
+        The Earth's rate differs from position to position: it is no rate that a line could be drawn over.
+        """
+        if different_rates(self.table_dps[rows]) < LEAST_RATES:
+            return None
+        return straight_line(self.data.true_rate_dps(about)[rows], self.data.outputs[axis][rows])
+
+
+def figures_of(data: FitData) -> list[Figure]:
+    """Return all figures that the data sets of a recording give."""
+    seen = _columns(data)
+    found = [each for axis in data.outputs for each in (*_of_rates(seen, axis), *_at_rest(seen, axis))]
+    return [*found, *_alignment(seen)]
+
+
+def _columns(data: FitData) -> _Columns:
+    m = len(data)
+    level = data.levels if data.levels is not None else np.zeros(m, dtype=np.int64)
+    run = data.channels["run"] if "run" in data.channels else np.ones(m)
+    position = np.asarray(data.channels["position"]).astype(np.str_)
+    return _Columns(
+        data, level, np.asarray(level_means(data.temperature_c, level)), position, np.asarray(run, dtype=np.int64),
+        data.channels.table_rate_dps(),
+    )  # fmt: skip
+
+
+def _of_rates(seen: _Columns, axis: str) -> Iterator[Figure]:
+    """Yield what the rates about an axis say of it: at the usual temperature, over temperature, and from run to run."""
+    own = seen.own(axis)
+    here = own & (seen.level == seen.usual)
+    line = seen.line(axis, here)
+    if line is None:
+        return
+    yield Figure("scale_factor", axis, line.scale_factor, here)
+    yield Figure("bias", axis, line.bias_dps, here)
+    rate = seen.data.true_rate_dps(axis)[here]
+    if different_rates(seen.table_dps[here]) > LEAST_RATES:
+        white = seen.data.white_var
+        u = None if white is None else np.sqrt(white[axis][here])
+        yield Figure("scale_factor_nonlinearity", axis, nonlinearity_ppm(line, float(np.max(np.abs(rate))), u), here)
+    if (found := asymmetry_ppm(rate, seen.data.outputs[axis][here])) is not None:
+        yield Figure("scale_factor_asymmetry", axis, found, here)
+    yield from _over_temperature(seen, axis, own, line.scale_factor.value)
+    yield from _from_run_to_run(seen, axis, own, line.scale_factor.value)
+
+
+def _over_temperature(seen: _Columns, axis: str, own: NDArray[np.bool_], scale_factor: float) -> Iterator[Figure]:
+    lines = {
+        level: line
+        for level in range(len(seen.level_c))
+        if (line := seen.line(axis, own & (seen.level == level))) is not None
+    }
+    warm = seen.level_c[list(lines)]
+    bias = slope_over(warm, [line.bias_dps for line in lines.values()])
+    scale = slope_over(warm, [line.scale_factor for line in lines.values()])
+    if bias is not None:
+        yield Figure("bias_temperature", axis, bias, own)
+    if scale is not None:
+        yield Figure("scale_factor_temperature", axis, _times(scale, PPM / scale_factor), own)
+
+
+def _from_run_to_run(seen: _Columns, axis: str, own: NDArray[np.bool_], scale_factor: float) -> Iterator[Figure]:
+    biases, scales = [], []
+    for level in range(len(seen.level_c)):
+        for position in np.unique(seen.position[own]):
+            rows = own & (seen.level == level) & (seen.position == position)
+            lines = {
+                int(run): line
+                for run in np.unique(seen.run[rows])
+                if (line := seen.line(axis, rows & (seen.run == run))) is not None
+            }
+            biases.append({run: line.bias_dps.value for run, line in lines.items()})
+            scales.append({run: line.scale_factor.value for run, line in lines.items()})
+    if (found := repeatability(biases)) is not None:
+        yield Figure("bias_repeatability", axis, found[0], own)
+    if (found := repeatability(scales)) is not None:
+        yield Figure("scale_factor_repeatability", axis, _times(found[0], PPM / scale_factor), own)
+
+
+def _at_rest(seen: _Columns, axis: str) -> Iterator[Figure]:
+    """Yield what is known at rest alone: bias and its repeatability where no rate was run, and the g-sensitivity."""
+    still = seen.table_dps == 0
+    error = seen.data.outputs[axis] - seen.data.true_rate_dps(axis)
+    if not np.any(seen.table_dps):
+        yield from _bias_at_rest(seen, axis, error)
+    fullest = max(
+        range(len(seen.level_c)), key=lambda each: len(np.unique(seen.position[still & (seen.level == each)]))
+    )
+    rows = still & (seen.level == fullest)
+    if (found := g_sensitivity(seen.position[rows], error[rows])) is not None:
+        for along, estimate in zip(AXES, found, strict=True):
+            yield Figure("g_sensitivity", axis, estimate, rows, along)
+
+
+def _bias_at_rest(seen: _Columns, axis: str, error: Array) -> Iterator[Figure]:
+    rows = seen.level == seen.usual
+    n = int(np.count_nonzero(rows))
+    u = float(np.std(error[rows], ddof=1) / np.sqrt(n)) if n > 1 else None
+    yield Figure("bias", axis, Estimate(float(np.mean(error[rows])), u), rows)
+    groups = []
+    for level in range(len(seen.level_c)):
+        for position in np.unique(seen.position):
+            at = (seen.level == level) & (seen.position == position)
+            runs = np.unique(seen.run[at])
+            groups.append({int(run): float(np.mean(error[at & (seen.run == run)])) for run in runs})
+    if (found := repeatability(groups)) is not None:
+        yield Figure("bias_repeatability", axis, found[0], np.ones(len(error), dtype=bool))
+
+
+def _alignment(seen: _Columns) -> Iterator[Figure]:
+    """Yield misalignment and orthogonality from the slopes of all outputs over the rate about each axis."""
+    if set(seen.data.outputs) != set(AXES):
+        return
+    k, u, known = np.eye(3), np.zeros((3, 3)), True
+    used = np.zeros(len(seen.data), dtype=bool)
+    for j, about in enumerate(AXES):
+        rows = seen.own(about) & (seen.level == seen.usual)
+        used |= rows
+        for i, axis in enumerate(AXES):
+            line = seen.line_about(axis, about, rows)
+            if line is None:
+                return
+            k[i, j] = line.scale_factor.value
+            known &= line.scale_factor.u is not None
+            u[i, j] = line.scale_factor.u or 0.0
+    try:
+        found = alignment_of(k, u if known else None)
+    except ValueError:  # an axis has its sign reversed: no rotation takes it there
+        return
+    for axis, estimate in zip(AXES, found.misalignment_deg, strict=True):
+        yield Figure("misalignment", axis, estimate, used)
+    for pair, estimate in zip(PAIRS, found.orthogonality_deg, strict=True):
+        yield Figure("orthogonality", pair, estimate, used)
+
+
+def _times(estimate: Estimate, factor: float) -> Estimate:
+    return Estimate(estimate.value * factor, None if estimate.u is None else estimate.u * abs(factor))

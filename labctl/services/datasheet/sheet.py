@@ -1,0 +1,188 @@
+"""The data sheet of a unit: each characteristic from the newest recording that gives it, beside its specification."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from labctl.errors import BadInput, LabctlError, NotEnoughData
+from labctl.fitting.data.fit_data import FitData, fit_data_of
+from labctl.fitting.data.rate_profile import TIME_CONSTANT
+from labctl.json_types.noise import NoiseFigure
+from labctl.progress import report_stage
+from labctl.recording import RecordingInfo
+from labctl.services.cache import UNNAMED, compute
+from labctl.services.datasheet.catalogue import LINES, OF_THREE_AXES, Line
+from labctl.services.datasheet.decision import RULE, decided
+from labctl.services.datasheet.measured import Figure, figures_of
+from labctl.services.recordings.allan import allan_unit
+from labctl.services.recordings.loading import points_of
+from labctl.services.schemas.reports.datasheet import Characteristic, DatasheetResponse, MeasuredUnder
+from labctl.store import RecordingRow, Store, Unit
+
+#: Of many recordings the newest are used.
+MOST_RECORDINGS = 32
+#: Figure of the Allan deviation, and its unit there over that of the data sheet.
+NOISE = {"angle_random_walk": ("N", 60.0), "bias_instability": ("B", 3600.0), "rate_random_walk": ("K", 216_000.0)}
+Key = tuple[str, str, str]  #: id, axis, axis of the force
+
+
+def datasheet(store: Store, serial: str) -> DatasheetResponse:
+    """Return the data sheet of a unit, from its own recordings. Raises NotFound, BadInput for a unit without any."""
+    unit = store.units.get(serial)
+    rows = sorted(store.recordings.of_unit(unit.serial), key=lambda row: row.id, reverse=True)[:MOST_RECORDINGS]
+    if not rows:
+        raise BadInput(f"unit {unit.serial} has no recording: import one, or run a campaign")
+    compute(UNNAMED)
+    found: dict[Key, Characteristic] = {}
+    for row in rows:
+        report_stage(f"reading recording {row.id}")
+        for each in _of_recording(store, row):
+            found.setdefault((each.id, each.axis, each.along), each)
+    for each in (*_noise(store, rows), *_bandwidth(store, unit.serial)):
+        found.setdefault((each.id, each.axis, each.along), each)
+    return _response(unit, rows, found)
+
+
+def _of_recording(store: Store, row: RecordingRow) -> Iterator[Characteristic]:
+    info = RecordingInfo.model_validate(row.info)
+    if row.kind == "coefficients" or info.motion not in {"rates", "rest"}:
+        return
+    try:
+        data = fit_data_of(points_of(store, row))
+    except (BadInput, NotEnoughData):
+        return
+    lines = {line.id: line for line in LINES}
+    for figure in figures_of(data):
+        yield _characteristic(lines[figure.id], figure, _conditions(row, data, figure))
+
+
+def _conditions(row: RecordingRow, data: FitData, figure: Figure) -> MeasuredUnder:
+    warm, rate = data.temperature_c[figure.rows], data.channels.table_rate_dps()[figure.rows]
+    runs = len(np.unique(np.asarray(data.channels["run"])[figure.rows])) if "run" in data.channels else None
+    return MeasuredUnder(
+        recording=row.id, temperature_c=(float(warm.min()), float(warm.max())),
+        rate_dps=(float(rate.min()), float(rate.max())), runs=runs, datasets=int(np.count_nonzero(figure.rows)),
+    )  # fmt: skip
+
+
+def _characteristic(line: Line, figure: Figure, conditions: MeasuredUnder) -> Characteristic:
+    return Characteristic(
+        id=line.id, title=line.title, axis=figure.axis, along=figure.along, value=figure.estimate.value,
+        u=figure.estimate.u, unit=line.unit, conditions=conditions, specified=None, specified_as=line.specified_as,
+        passed=None,
+    )  # fmt: skip
+
+
+def _noise(store: Store, rows: Sequence[RecordingRow]) -> Iterator[Characteristic]:
+    """Yield N, B and K of the recording with the longest section at rest, by the readings of one data set."""
+    longest = max(
+        ((_longest_rest(store, row), row) for row in rows if row.kind == "samples"),
+        key=lambda each: each[0], default=None,
+    )  # fmt: skip
+    if longest is None or not longest[0]:
+        return
+    report_stage(f"noise of recording {longest[1].id}")
+    try:
+        answer = allan_unit(store, longest[1].id, None)
+    except LabctlError:
+        return
+    lines = {line.id: line for line in LINES}
+    warm = answer.temperature_c
+    under = MeasuredUnder(
+        recording=longest[1].id, temperature_c=None if warm is None else (warm, warm), rate_dps=(0.0, 0.0), runs=1,
+        datasets=answer.datasets[-1] - answer.datasets[0] + 1,
+    )  # fmt: skip
+    for axis, noise in answer.axes.items():
+        for name, (letter, units) in NOISE.items():
+            figure: NoiseFigure = {"N": noise["N"], "B": noise["B"], "K": noise["K"]}[letter]
+            yield Characteristic(
+                id=name, title=lines[name].title, axis=axis, value=_over(figure["value"], units),
+                u=_over(figure["u"], units), at_most=_over(figure["at_most"], units), unit=lines[name].unit,
+                conditions=under, specified=None, specified_as="at most", passed=None, why=figure["why"],
+            )  # fmt: skip
+
+
+def _over(value: float | None, units: float) -> float | None:
+    return None if value is None else value / units
+
+
+def _longest_rest(store: Store, row: RecordingRow) -> int:
+    sets = store.recordings.data_sets(row.id)
+    return max((each.n for each in sets if each.state == "complete" and each.table_rate_dps == 0), default=0)
+
+
+def _bandwidth(store: Store, serial: str) -> Iterator[Characteristic]:
+    """Yield the bandwidth of each axis by the newest version that has one."""
+    line = next(each for each in LINES if each.id == "bandwidth")
+    for row in store.calibrations.of_unit(serial):  # newest first
+        for axis, found in row.answer["axes"].items():
+            constant = found["coefficients"].get(TIME_CONSTANT)
+            if not isinstance(constant, dict) or isinstance(constant["value"], list) or row.recording is None:
+                continue
+            tau_s, u_s = constant["value"], constant["u"]
+            if tau_s <= 0 or isinstance(u_s, list):
+                continue
+            hertz = 1 / (2 * math.pi * tau_s)
+            yield Characteristic(
+                id=line.id, title=line.title, axis=axis, value=hertz, u=None if u_s is None else hertz * u_s / tau_s,
+                unit=line.unit, specified=None, specified_as=line.specified_as, passed=None,
+                conditions=MeasuredUnder(
+                    recording=row.recording, version=row.version, temperature_c=None, rate_dps=None, runs=None,
+                    datasets=None,
+                ),
+            )  # fmt: skip
+
+
+def _response(unit: Unit, rows: Sequence[RecordingRow], found: Mapping[Key, Characteristic]) -> DatasheetResponse:
+    infos = [RecordingInfo.model_validate(row.info) for row in rows]
+    specified: dict[str, float] = {}
+    for info in reversed(infos):  # the newest recording says it last
+        specified |= info.datasheet
+    axes = list(dict.fromkeys(str(axis) for info in infos for axis in info.axes))
+    lines = [each for line in LINES for each in _lines(line, axes, found, specified)]
+    decisions = [each.passed for each in lines if each.passed is not None]
+    used = sorted({each.conditions.recording for each in lines if each.conditions is not None})
+    measured = {each.id for each in lines if each.value is not None or each.at_most is not None}
+    missing = [line.id for line in LINES if line.id not in measured and any(each.id == line.id for each in lines)]
+    return DatasheetResponse(
+        serial=unit.serial, model=unit.model, technology=unit.technology, recordings=used, characteristics=lines,
+        passed=all(decisions) if decisions else None, not_measured=missing, decision_rule=RULE,
+        text=list(_text(unit.serial, lines, decisions, missing)),
+    )  # fmt: skip
+
+
+def _lines(
+    line: Line, axes: Sequence[str], found: Mapping[Key, Characteristic], specified: Mapping[str, float]
+) -> list[Characteristic]:
+    """Return the lines of one characteristic; one that says what measures it where there is none."""
+    if line.id in OF_THREE_AXES and len(axes) < 3:
+        return []
+    limit = None if line.key is None else specified.get(line.key)
+    here = [each for (name, _, _), each in sorted(found.items()) if name == line.id]
+    if here:
+        return [decided(line, each, limit) for each in here]
+    return [
+        Characteristic(
+            id=line.id, title=line.title, axis="", value=None, u=None, unit=line.unit, conditions=None,
+            specified=limit, specified_as=line.specified_as, passed=None, why=f"not measured: {line.measured_by} "
+            "measures it",
+        )
+    ]  # fmt: skip
+
+
+def _text(
+    serial: str, lines: Sequence[Characteristic], decisions: Sequence[bool], missing: Sequence[str]
+) -> Iterator[str]:
+    if decisions:
+        yield f"{serial}: {sum(decisions)} of {len(decisions)} figures with a specified value pass."
+    else:
+        yield f"{serial}: no measured figure has a specified value; state them in [datasheet] of the bench file."
+    for each in lines:
+        if each.passed is False:
+            axis = f", axis {each.axis}" if each.axis else ""
+            yield f"{each.title}{axis}: {each.value:.3g} {each.unit}, specified {each.specified_as} {each.specified:g}."
+    if missing:
+        yield f"Not measured: {', '.join(name.replace('_', ' ') for name in missing)}."

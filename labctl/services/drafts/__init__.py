@@ -1,0 +1,1 @@
+"""Drafts: the calibration that a campaign ends in, made, reported on, and never certified by itself."""

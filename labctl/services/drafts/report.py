@@ -1,0 +1,87 @@
+"""The report on a draft: its errors, the models beside it, the verdict, as found and as left, drift and limits."""
+
+from __future__ import annotations
+
+from labctl.errors import BadInput, NotEnoughData
+from labctl.fitting import fit
+from labctl.fitting.models.inversion import NotConverged
+from labctl.progress import report_stage
+from labctl.services.calibrations.assessment import assess
+from labctl.services.calibrations.certification import version_in_force
+from labctl.services.criticism.measurements import Measurements
+from labctl.services.drafts.as_found import REFUSALS, applied, drift_from
+from labctl.services.drafts.limits import all_within, held_against
+from labctl.services.drafts.text import report_text
+from labctl.services.schemas.certification import AssessmentResponse, CertifiedErrors
+from labctl.services.schemas.reports.drafts import AppliedDraft, ComparedModel, DraftReport, DriftFromVersion
+from labctl.store import CalibrationRecord, Store
+from procedures.recipe.fit_rules import FitRules
+
+NOT_ASKED = "the recipe does not ask for it"
+
+
+def report_on(store: Store, draft: CalibrationRecord, recording: int, rules: FitRules) -> DraftReport:
+    """Return the report on a draft that was fitted to a recording as a recipe's [fit] says. Raises NotFound."""
+    measured = Measurements(store, (store.recordings.get(recording),))
+    error = CertifiedErrors.model_validate(dict(draft.answer["error"]))
+    compared = [ComparedModel(model=draft.model, error=error), *_compared(measured, rules)]
+    known = _assessed(store, draft, rules)
+    as_left, as_left_why = applied(store, draft, measured)
+    as_found, as_found_why, drift = _as_found(store, draft, measured, rules)
+    limits = held_against(rules.limits, error, as_left, drift)
+    report = DraftReport(
+        model=draft.model, error=error, compared=compared, smallest_heldout=_smallest_heldout(compared),
+        verdict=known.verdict if known else None, verdict_text=known.verdict_text if known else "",
+        verdict_reason=known.verdict_reason if known else NOT_ASKED, objections=known.objections if known else [],
+        as_found=as_found, as_found_why=as_found_why, as_left=as_left, as_left_why=as_left_why, drift=drift,
+        limits=limits, within_limits=all_within(limits), text="",
+    )  # fmt: skip
+    return report.model_copy(update={"text": report_text(draft.serial, draft.version, report)})
+
+
+def _assessed(store: Store, draft: CalibrationRecord, rules: FitRules) -> AssessmentResponse | None:
+    if not rules.criticise:
+        return None
+    report_stage("criticising the draft")
+    return assess(store, draft.serial, draft.version)
+
+
+def _compared(measured: Measurements, rules: FitRules) -> list[ComparedModel]:
+    found: list[ComparedModel] = []
+    for model in rules.compare:
+        report_stage(f"fitting {model}")
+        try:
+            error = fit(measured.source, model, [], covered=measured.covered).error
+        except (BadInput, NotEnoughData, NotConverged) as refusal:
+            found.append(ComparedModel(model=model, error=None, why=str(refusal)))
+            continue
+        figures = {name: getattr(error, name) for name in CertifiedErrors.model_fields}
+        found.append(ComparedModel(model=model, error=CertifiedErrors.model_validate(figures)))
+    return found
+
+
+def _smallest_heldout(compared: list[ComparedModel]) -> str | None:
+    known = [
+        (each.error.heldout_rms_dps, each.model)
+        for each in compared
+        if each.error is not None and each.error.heldout_rms_dps is not None
+    ]
+    return min(known)[1] if known else None
+
+
+def _as_found(
+    store: Store, draft: CalibrationRecord, measured: Measurements, rules: FitRules
+) -> tuple[AppliedDraft | None, str, DriftFromVersion | None]:
+    """Return the version in force applied to the recording, why not, and the drift of the draft against it."""
+    if not rules.against:
+        return None, NOT_ASKED, None
+    version = version_in_force(store, draft.serial)
+    if version is None or version == draft.version:
+        return None, "no version was in force", None
+    report_stage(f"applying version {version}")
+    in_force = store.calibrations.get(draft.serial, version)
+    found, why = applied(store, in_force, measured)
+    try:
+        return found, why, drift_from(in_force, draft, measured)
+    except REFUSALS as error:
+        return found, why or str(error), None

@@ -1,0 +1,66 @@
+"""The data sheet of a unit: measured characteristics beside specified ones."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from labctl.services.schemas.base import ResponseModel
+
+
+class MeasuredUnder(ResponseModel):
+    """Conditions of a measured figure."""
+
+    recording: int
+    version: int | None = Field(
+        default=None, description="Version that the figure is a coefficient of; null: it is from the recording itself."
+    )
+    temperature_c: tuple[float, float] | None = Field(
+        description="Lowest and highest temperature, deg C; null: unknown."
+    )
+    rate_dps: tuple[float, float] | None = Field(description="Lowest and highest rate, deg/s; null: unknown.")
+    runs: int | None = Field(description="Powered sessions; null: unknown.")
+    datasets: int | None = Field(description="Data sets that the figure is from; null: unknown.")
+
+
+class Characteristic(ResponseModel):
+    """One line of a data sheet."""
+
+    id: str
+    title: str
+    axis: str = Field(description="Output axis, or pair of axes; empty: of the whole unit.")
+    along: str = Field(default="", description="Of the g-sensitivity: the axis of the specific force; else empty.")
+    value: float | None = Field(description="Measured value; null: not measured, see `why`.")
+    u: float | None = Field(description="Standard uncertainty of `value`; null: unknown.")
+    at_most: float | None = Field(default=None, description="Bound of a figure that cannot be distinguished from zero.")
+    unit: str
+    conditions: MeasuredUnder | None
+    specified: float | None = Field(description="Value of the maker's data sheet, in `unit`; null: not stated.")
+    specified_as: Literal["at most", "at least"] = Field(
+        description="The magnitude may be at most, or the value must be at least, the specified one."
+    )
+    passed: bool | None = Field(
+        description="Simple acceptance (ILAC-G8): the measured value is inside the specified one; null: no decision."
+    )
+    near_limit: bool = Field(
+        default=False,
+        description="The specified value is less than 2 u away: the risk of a wrong decision is up to 50 %.",
+    )
+    why: str = Field(default="", description="Why there is no value, and which recipe measures it; else empty.")
+
+
+class DatasheetResponse(ResponseModel):
+    """A unit in the terms of IEEE Std 528 and 952."""
+
+    serial: str
+    model: str
+    technology: str | None
+    recordings: list[int] = Field(description="Recordings that figures are from, rising.")
+    characteristics: list[Characteristic]
+    passed: bool | None = Field(
+        description="Whether all that is specified and measured passes; null: nothing specified is measured."
+    )
+    not_measured: list[str] = Field(description="Ids of characteristics without a value on any axis.")
+    decision_rule: str
+    text: list[str]

@@ -1,0 +1,134 @@
+"""Drafts: the calibrations that campaigns end in."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Literal
+
+from pydantic import Field
+
+from labctl.services.schemas.base import Request, ResponseModel
+from labctl.services.schemas.certification import CertifiedErrors, Objection
+from labctl.services.schemas.criticism import AxisVerification
+
+
+class DraftsRequest(Request):
+    """Which drafts of a campaign to make now."""
+
+    again: bool = Field(default=False, description="Also try those again that failed before.")
+
+
+class ComparedModel(ResponseModel):
+    """A model fitted to the recording of a draft; only the draft's own is kept as a version."""
+
+    model: str
+    error: CertifiedErrors | None = Field(description="Its errors, deg/s; null: it could not be fitted, see `why`.")
+    why: str = ""
+
+
+class RemainingLine(ResponseModel):
+    """Straight line over the rate through the error that a version leaves on one axis, by least squares."""
+
+    bias_dps: float
+    u_bias_dps: float
+    scale_factor: float | None = Field(description="Error over rate (1 = 100 %); null: the recording has one rate.")
+    u_scale_factor: float | None
+
+
+class AppliedDraft(ResponseModel):
+    """A version applied to the recording of a draft as it is, nothing refitted. Errors: corrected minus true rate."""
+
+    version: int
+    rms_dps: float
+    max_dps: float
+    bias_dps: float
+    axes: dict[str, AxisVerification]
+    expected_dps: float | None = Field(description="Error that the version promises, deg/s; null: unknown.")
+    ok: bool = Field(description="Whether `rms_dps` is at most twice `expected_dps`.")
+    lines: dict[str, RemainingLine] = Field(
+        default_factory=dict, description="For each axis: bias and scale factor error that the version leaves."
+    )
+
+
+class CoefficientChange(ResponseModel):
+    """One coefficient of the draft beside the same of the version in force."""
+
+    axis: str
+    coefficient: str
+    temperature_c: float | None = Field(description="Node of a temperature table, deg C; null: there is no table.")
+    in_force: float
+    draft: float
+    change: float = Field(description="`draft` minus `in_force`, in `unit`.")
+    u: float | None = Field(description="Standard uncertainty of `change`: root sum of squares; null: unknown.")
+    unit: str
+    significant: bool | None = Field(description="Whether |change| is larger than 2 u; null: u is unknown.")
+
+
+class DriftFromVersion(ResponseModel):
+    """The draft against the version that was in force."""
+
+    version: int = Field(description="The version that was in force when the draft was made.")
+    largest_dps: dict[str, float] = Field(
+        description="For each axis: largest difference of the corrected rates at any data set of the recording, deg/s."
+    )
+    rms_dps: dict[str, float] = Field(description="For each axis: root mean square of that difference, deg/s.")
+    coefficients: list[CoefficientChange] = Field(description="Empty: the models differ, see `why`.")
+    why: str = ""
+
+
+class LimitResult(ResponseModel):
+    """A figure of the draft against a limit of the recipe: it passes if it is at most the limit (simple acceptance)."""
+
+    limit: Literal["heldout_rms_dps", "max_error_dps", "drift_dps"]
+    axis: str | None = Field(description="Axis; null: over all axes.")
+    value_dps: float | None = Field(description="The figure, deg/s; null: it is not known, see `why`.")
+    at_most_dps: float
+    passed: bool | None = Field(description="Null: the figure is not known, so that nothing is decided.")
+    why: str = ""
+
+
+class DraftReport(ResponseModel):
+    """What is known of a draft when it is made."""
+
+    model: str
+    error: CertifiedErrors
+    compared: list[ComparedModel] = Field(description="The draft's model first, then those of the recipe.")
+    smallest_heldout: str | None = Field(description="Model with the smallest held-out error; null: none has one.")
+    verdict: str | None = Field(description="Verdict of the criticism on the recording; null: see `verdict_reason`.")
+    verdict_text: str
+    verdict_reason: str = Field(description="Why there is no verdict; else empty.")
+    objections: list[Objection] = Field(description="Objections to a certification of the draft.")
+    as_found: AppliedDraft | None = Field(description="The version in force; null: see `as_found_why`.")
+    as_found_why: str = ""
+    as_left: AppliedDraft | None = Field(description="The draft; null: it cannot be applied, see `as_left_why`.")
+    as_left_why: str = ""
+    drift: DriftFromVersion | None = Field(description="Null: no version was in force, or it was not asked for.")
+    limits: list[LimitResult]
+    within_limits: bool | None = Field(
+        description="Whether all limits are kept; null: the recipe has none, or a figure is not known."
+    )
+    text: str = Field(description="The report in one paragraph.")
+
+
+class DraftResponse(ResponseModel):
+    """The draft of one recording of a campaign."""
+
+    serial: str
+    campaign: int
+    recording: int
+    state: Literal["due", "fitted", "made", "failed"] = Field(
+        description="due: it is made when the campaign is done; fitted: the version is kept, the report is not yet; "
+        "made; failed: see `reason`."
+    )
+    version: int | None = Field(description="The version of the unit that the draft is.")
+    certified: bool = Field(default=False, description="Whether this version is in force now.")
+    at: datetime | None = Field(description="When it was made or failed.")
+    reason: str = Field(description="Why it failed, and what to do; else empty.")
+    report: DraftReport | None = None
+
+
+class DraftsResponse(ResponseModel):
+    """The drafts of a campaign."""
+
+    campaign: int
+    drafts: list[DraftResponse] = Field(description="By recording; empty: the recipe has no [fit].")

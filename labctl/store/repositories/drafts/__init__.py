@@ -1,0 +1,1 @@
+"""Drafts: the calibrations that campaigns end in."""
