@@ -98,6 +98,6 @@ def test_noise_that_is_not_known_is_asked_for(mems: Calibration, name: str, opti
 
 def test_a_gyro_of_one_axis_has_no_covariance_of_three(fog: Calibration) -> None:
     with pytest.raises(
-        BadInput, match="needs covariances of x, y and z, but .* is calibrated only along z; calibrate x, y too"
+        BadInput, match=r"needs covariances of x, y and z, but .* is calibrated only along z; calibrate x, y too"
     ):
         exported(fog, "ros2-imu", noise_dps_rthz="0.1", rate_hz="100")
