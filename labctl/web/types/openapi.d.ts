@@ -130,6 +130,27 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/units/{serial}/datasheet": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * A unit's data sheet
+         * @description Characteristics in the terms of IEEE Std 528 and 952 with uncertainty, conditions and recording, beside the
+         *     specified values; what is not measured names the recipe that measures it.
+         */
+        get: operations["unit_datasheet_api_units__serial__datasheet_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/benches": {
         parameters: {
             query?: never;
@@ -612,6 +633,54 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/units/{serial}/certificates": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Certificates of a unit
+         * @description Every certificate of the unit, newest first, with what it replaces and what replaces it.
+         */
+        get: operations["certificates_api_units__serial__certificates_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/units/{serial}/calibrations/{version}/certificate": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * A certificate as it was issued
+         * @description The certificate as a file, always the same bytes; the ETag is the hash of its JSON and the format.
+         */
+        get: operations["certificate_api_units__serial__calibrations__version__certificate_get"];
+        put?: never;
+        /**
+         * Issue a certificate
+         * @description Issue the certificate of the version from stored facts and those of the order; one that was issued is answered.
+         *
+         *     400 with `missing` where mandatory facts are missing: each one, and where to state it. 409 for a revoked version, a
+         *     reference standard past its due date, and other facts than those of the one that was issued, unless `amend` says
+         *     why it is replaced. Needs an approver's key.
+         */
+        post: operations["issue_api_units__serial__calibrations__version__certificate_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/recipes": {
         parameters: {
             query?: never;
@@ -798,6 +867,28 @@ export interface paths {
          * @description Answer the question with this id; an answer to an older one is refused.
          */
         post: operations["confirm_api_campaigns__campaign__confirm_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/campaigns/{campaign}/drafts": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Make its drafts
+         * @description Make the drafts of a campaign that is done, where they are still due; with `again` also those that failed.
+         *
+         *     The service does this by itself when a campaign ends. Nothing is made twice, and nothing is certified.
+         */
+        post: operations["make_drafts_api_campaigns__campaign__drafts_post"];
         delete?: never;
         options?: never;
         head?: never;
@@ -1406,6 +1497,41 @@ export interface components {
             stepper_lines: components["schemas"]["AngleLine"][];
         };
         /**
+         * AppliedDraft
+         * @description A version applied to the recording of a draft as it is, nothing refitted. Errors: corrected minus true rate.
+         */
+        AppliedDraft: {
+            /** Version */
+            version: number;
+            /** Rms Dps */
+            rms_dps: number;
+            /** Max Dps */
+            max_dps: number;
+            /** Bias Dps */
+            bias_dps: number;
+            /** Axes */
+            axes: {
+                [key: string]: components["schemas"]["AxisVerification"];
+            };
+            /**
+             * Expected Dps
+             * @description Error that the version promises, deg/s; null: unknown.
+             */
+            expected_dps: number | null;
+            /**
+             * Ok
+             * @description Whether `rms_dps` is at most twice `expected_dps`.
+             */
+            ok: boolean;
+            /**
+             * Lines
+             * @description For each axis: bias and scale factor error that the version leaves.
+             */
+            lines: {
+                [key: string]: components["schemas"]["RemainingLine"];
+            };
+        };
+        /**
          * AppliedVersion
          * @description A version applied to a recording without refitting.
          */
@@ -1625,18 +1751,23 @@ export interface components {
              */
             repeatability_source: string;
             /**
+             * Standards Dps
+             * @description Standard uncertainty from all stated reference standards of the bench, deg/s; null: none is stated.
+             */
+            standards_dps: number | null;
+            /**
              * Same Run Dps
-             * @description Coefficients and model combined, for use in the same power-on as the calibration, deg/s; null if one of the two is unknown.
+             * @description Coefficients, model and standards combined, for use in the same power-on as the calibration, deg/s; null if coefficients or model are unknown.
              */
             same_run_dps: number | null;
             /**
              * Combined Dps
-             * @description Coefficients, model and repeatability combined, deg/s; null if one of the three is unknown.
+             * @description `expanded_dps` over `coverage_factor`, deg/s; null if coefficients, model or repeatability are unknown.
              */
             combined_dps: number | null;
             /**
              * Expanded Dps
-             * @description `combined_dps` times the coverage factor, deg/s.
+             * @description Expanded uncertainty U of the budget, deg/s; it covers with a probability of 95.45 %.
              */
             expanded_dps: number | null;
             /**
@@ -1711,7 +1842,7 @@ export interface components {
              * @description What the last safe state of the bench could not confirm; empty when all is well.
              */
             unconfirmed: string;
-            /** @description What was found when it was last checked since the service was started. */
+            /** @description Result of the latest check since the service started; null: not checked yet. */
             check: components["schemas"]["BenchCheckResponse"] | null;
             /**
              * Heard S
@@ -1743,7 +1874,7 @@ export interface components {
              * @description What the last safe state of the bench could not confirm; empty when all is well.
              */
             unconfirmed: string;
-            /** @description What was found when it was last checked since the service was started. */
+            /** @description Result of the latest check since the service started; null: not checked yet. */
             check: components["schemas"]["BenchCheckResponse"] | null;
             /**
              * Heard S
@@ -1794,7 +1925,7 @@ export interface components {
             confirmed_at: string | null;
             /**
              * Left
-             * @description Campaigns whose process is gone and that have not been ended.
+             * @description Interrupted campaigns: their process ended before they did.
              */
             left: string[];
         };
@@ -1884,6 +2015,132 @@ export interface components {
             modified_ms?: number | null;
         };
         /**
+         * BudgetLineResponse
+         * @description One source of uncertainty; null is unknown, never 0.
+         */
+        BudgetLineResponse: {
+            /**
+             * Source
+             * @description coefficients, model, repeatability, or the quantity of a reference standard.
+             */
+            source: string;
+            /**
+             * Name
+             * @description Of the standard, with the number of its certificate.
+             */
+            name: string;
+            /**
+             * Type
+             * @description Evaluated by statistics (A) or otherwise (B).
+             * @enum {string}
+             */
+            type: "A" | "B";
+            /** Distribution */
+            distribution: string;
+            /**
+             * U
+             * @description Standard uncertainty of the input, in `unit`; null: not stated or unknown.
+             */
+            u: number | null;
+            /** Unit */
+            unit: string;
+            /**
+             * Sensitivity
+             * @description Derivative of the result along the input, per `unit`.
+             */
+            sensitivity: number | null;
+            /**
+             * Contribution
+             * @description Size of sensitivity times u, in the unit of the result.
+             */
+            contribution: number | null;
+            /**
+             * Degrees Of Freedom
+             * @description null: infinite.
+             */
+            degrees_of_freedom: number | null;
+            /**
+             * Uncorrected
+             * @description Known error that nothing corrects for, in the unit of the result.
+             */
+            uncorrected: number;
+            /**
+             * Common To All Rates
+             * @description Whether the error is the same at all rates, so that it adds linearly and no mean reduces it.
+             */
+            common_to_all_rates: boolean;
+            /**
+             * Stated
+             * @description Whether the bench states this standard; if not, it is not in the result.
+             */
+            stated: boolean;
+            /**
+             * Overdue
+             * @description Whether the standard was past its due date when it was used.
+             */
+            overdue: boolean;
+            /** Due */
+            due: string | null;
+            /**
+             * Why
+             * @description Why a number is null or 0, or how it was evaluated.
+             */
+            why: string;
+        };
+        /**
+         * BudgetResponse
+         * @description A result with its lines (GUM).
+         */
+        BudgetResponse: {
+            /**
+             * Result
+             * @description corrected_rate, bias, scale_factor, or misalignment with an axis.
+             */
+            result: string;
+            /**
+             * Unit
+             * @description Of the result and of every contribution; 1 is a share of the rate.
+             */
+            unit: string;
+            /**
+             * Value
+             * @description Of a coefficient.
+             */
+            value: number | null;
+            /** Lines */
+            lines: components["schemas"]["BudgetLineResponse"][];
+            /**
+             * Combined
+             * @description Combined standard uncertainty; null: a line of type A is unknown.
+             */
+            combined: number | null;
+            /**
+             * Effective Degrees Of Freedom
+             * @description Welch-Satterthwaite; null: infinite.
+             */
+            effective_degrees_of_freedom: number | null;
+            /**
+             * K
+             * @description Coverage factor for a probability of 95.45 %.
+             */
+            k: number | null;
+            /**
+             * Expanded
+             * @description k times combined, plus the size of known errors left uncorrected.
+             */
+            expanded: number | null;
+            /**
+             * Not Stated
+             * @description Standards that are not stated and therefore not in the result.
+             */
+            not_stated: string[];
+            /**
+             * Overdue
+             * @description Whether a standard was past its due date when it was used.
+             */
+            overdue: boolean;
+        };
+        /**
          * CalibrationRow
          * @description One line of a unit's list of calibrations.
          */
@@ -1955,9 +2212,15 @@ export interface components {
             clip?: boolean;
             /**
              * Hide
-             * @description Effects to hide in the units of a simulated bench, each as EFFECT or EFFECT=SIZE, SIZE in the unit of the effect; not for a later start.
+             * @description Effects to hide in the units of a simulated bench, each as EFFECT or EFFECT=SIZE, SIZE in the unit of the effect.
              */
             hide?: string[];
+            /**
+             * Fit
+             * @description End in a draft if the recipe has [fit]; false: end in the recordings, whatever the recipe says.
+             * @default true
+             */
+            fit?: boolean;
             /**
              * At
              * @description Time of the start, ISO 8601; a time without an offset is in `time_zone`. `now`: start as soon as the bench is free. Default: start at once.
@@ -2097,6 +2360,11 @@ export interface components {
                 [key: string]: number;
             };
             /**
+             * Drafts
+             * @description The calibrations that it ends in, by recording; empty: the recipe has no [fit], or the campaign is not done; empty in lists.
+             */
+            drafts: components["schemas"]["DraftResponse"][];
+            /**
              * Drivers
              * @description For each table, chamber and gyro: the driver that was used when the campaign began.
              */
@@ -2204,6 +2472,148 @@ export interface components {
             unit: string;
             /** Leaves */
             leaves: boolean;
+        };
+        /**
+         * CertificateOrder
+         * @description The facts of the order: what a campaign cannot know. They are kept with the certificate.
+         */
+        CertificateOrder: {
+            /**
+             * @default {
+             *       "name": "",
+             *       "street": "",
+             *       "post_code": "",
+             *       "city": "",
+             *       "country": "",
+             *       "email": "",
+             *       "phone": "",
+             *       "contact": "",
+             *       "order": ""
+             *     }
+             */
+            customer?: components["schemas"]["Customer"];
+            /**
+             * @default {
+             *       "description": "Gyroscope",
+             *       "manufacturer": "",
+             *       "identification": "",
+             *       "condition": ""
+             *     }
+             */
+            item?: components["schemas"]["OrderedItem"];
+            /**
+             * @default {
+             *       "name": "",
+             *       "deviations": ""
+             *     }
+             */
+            method?: components["schemas"]["OrderedMethod"];
+            /** @description null: no statement is made. */
+            conformity?: components["schemas"]["OrderedConformity"] | null;
+            /**
+             * Adjustment
+             * @description What was adjusted or repaired beside the coefficients; empty: nothing.
+             * @default
+             */
+            adjustment?: string;
+            /**
+             * External
+             * @description Results of external providers, and whose; empty: there are none.
+             * @default
+             */
+            external?: string;
+            /**
+             * State Due
+             * @description State the date of the next calibration: only where the customer agreed to it.
+             * @default false
+             */
+            state_due?: boolean;
+            /** @description Where the bench file of the campaign has no [laboratory]. */
+            laboratory?: components["schemas"]["Laboratory"] | null;
+        };
+        /**
+         * CertificateRequest
+         * @description Issue the certificate of a version, or an amended one.
+         */
+        CertificateRequest: {
+            /**
+             * By
+             * @description Person who issues it.
+             */
+            by: string;
+            /**
+             * @default {
+             *       "customer": {
+             *         "city": "",
+             *         "contact": "",
+             *         "country": "",
+             *         "email": "",
+             *         "name": "",
+             *         "order": "",
+             *         "phone": "",
+             *         "post_code": "",
+             *         "street": ""
+             *       },
+             *       "item": {
+             *         "condition": "",
+             *         "description": "Gyroscope",
+             *         "identification": "",
+             *         "manufacturer": ""
+             *       },
+             *       "method": {
+             *         "deviations": "",
+             *         "name": ""
+             *       },
+             *       "adjustment": "",
+             *       "external": "",
+             *       "state_due": false
+             *     }
+             */
+            order?: components["schemas"]["CertificateOrder"];
+            /**
+             * Amend
+             * @description Why the certificate of this version is replaced by a new one; null: it is not.
+             */
+            amend?: string | null;
+        };
+        /**
+         * CertificateResponse
+         * @description A certificate that was issued.
+         */
+        CertificateResponse: {
+            /** Serial */
+            serial: string;
+            /** Version */
+            version: number;
+            /** Number */
+            number: string;
+            /**
+             * Issued At
+             * Format: date-time
+             */
+            issued_at: string;
+            /** By */
+            by: string;
+            /**
+             * Hash
+             * @description SHA-256 of its JSON.
+             */
+            hash: string;
+            /**
+             * Replaces
+             * @description Number of the certificate that it replaces; null: none.
+             */
+            replaces: string | null;
+            /**
+             * Reason
+             * @description Why it replaces another one; empty: it does not.
+             */
+            reason: string;
+            /**
+             * Replaced By
+             * @description Number of the one that replaces it; null: it is valid.
+             */
+            replaced_by: string | null;
         };
         /**
          * CertificationResponse
@@ -2334,6 +2744,73 @@ export interface components {
             z: number | null;
         };
         /**
+         * Characteristic
+         * @description One line of a data sheet.
+         */
+        Characteristic: {
+            /** Id */
+            id: string;
+            /** Title */
+            title: string;
+            /**
+             * Axis
+             * @description Output axis, or pair of axes; empty: of the whole unit.
+             */
+            axis: string;
+            /**
+             * Along
+             * @description Of the g-sensitivity: the axis of the specific force; else empty.
+             * @default
+             */
+            along: string;
+            /**
+             * Value
+             * @description Measured value; null: not measured, see `why`.
+             */
+            value: number | null;
+            /**
+             * U
+             * @description Standard uncertainty of `value`; null: unknown.
+             */
+            u: number | null;
+            /**
+             * At Most
+             * @description Bound of a figure that cannot be distinguished from zero.
+             */
+            at_most: number | null;
+            /** Unit */
+            unit: string;
+            conditions: components["schemas"]["MeasuredUnder"] | null;
+            /**
+             * Specified
+             * @description Value of the maker's data sheet, in `unit`; null: not stated.
+             */
+            specified: number | null;
+            /**
+             * Specified As
+             * @description The magnitude may be at most, or the value must be at least, the specified one.
+             * @enum {string}
+             */
+            specified_as: "at most" | "at least";
+            /**
+             * Passed
+             * @description Simple acceptance (ILAC-G8): the measured value is inside the specified one; null: no decision.
+             */
+            passed: boolean | null;
+            /**
+             * Near Limit
+             * @description The specified value is less than 2 u away: the risk of a wrong decision is up to 50 %.
+             * @default false
+             */
+            near_limit: boolean;
+            /**
+             * Why
+             * @description Why there is no value, and which recipe measures it; else empty.
+             * @default
+             */
+            why: string;
+        };
+        /**
          * CheckRequest
          * @description A check of the whole bench; it needs no answers.
          */
@@ -2370,6 +2847,42 @@ export interface components {
             unit: string;
         };
         /**
+         * CoefficientChange
+         * @description One coefficient of the draft beside the same of the version in force.
+         */
+        CoefficientChange: {
+            /** Axis */
+            axis: string;
+            /** Coefficient */
+            coefficient: string;
+            /**
+             * Temperature C
+             * @description Node of a temperature table, deg C; null: there is no table.
+             */
+            temperature_c: number | null;
+            /** In Force */
+            in_force: number;
+            /** Draft */
+            draft: number;
+            /**
+             * Change
+             * @description `draft` minus `in_force`, in `unit`.
+             */
+            change: number;
+            /**
+             * U
+             * @description Standard uncertainty of `change`: root sum of squares; null: unknown.
+             */
+            u: number | null;
+            /** Unit */
+            unit: string;
+            /**
+             * Significant
+             * @description Whether |change| is larger than 2 u; null: u is unknown.
+             */
+            significant: boolean | null;
+        };
+        /**
          * CoefficientTable
          * @description The same at each node of a temperature table.
          */
@@ -2384,6 +2897,21 @@ export interface components {
             at_most?: (number | null)[];
             /** Unit */
             unit: string;
+        };
+        /**
+         * ComparedModel
+         * @description A model fitted to the recording of a draft; only the draft's own is kept as a version.
+         */
+        ComparedModel: {
+            /** Model */
+            model: string;
+            /** @description Its errors, deg/s; null: it could not be fitted, see `why`. */
+            error: components["schemas"]["CertifiedErrors"] | null;
+            /**
+             * Why
+             * @default
+             */
+            why: string;
         };
         /**
          * ComparisonColumns
@@ -2543,6 +3071,43 @@ export interface components {
             reason?: string;
         };
         /**
+         * ContributionLines
+         * @description Contributions along one variable, deg/s.
+         */
+        ContributionLines: {
+            /** At */
+            at: number[];
+            /**
+             * Contributions
+             * @description Source -> contribution; null: not stated.
+             */
+            contributions: {
+                [key: string]: (number | null)[];
+            };
+            /** Combined */
+            combined: (number | null)[];
+            /** Expanded */
+            expanded: (number | null)[];
+        };
+        /**
+         * ContributionsOver
+         * @description Contributions to the uncertainty of one axis, over rate and over temperature.
+         */
+        ContributionsOver: {
+            /**
+             * Temperature C
+             * @description Temperature of the lines over rate, deg C.
+             */
+            temperature_c: number;
+            /**
+             * Rate Dps
+             * @description Rate of the lines over temperature, deg/s.
+             */
+            rate_dps: number;
+            over_rate: components["schemas"]["ContributionLines"];
+            over_temperature: components["schemas"]["ContributionLines"];
+        };
+        /**
          * CriticisedErrors
          * @description RMS errors of the model refitted, deg/s; `explained`: share of the raw excess chi2 that the model explains.
          */
@@ -2678,6 +3243,61 @@ export interface components {
             views: components["schemas"]["Views"];
         };
         /**
+         * Customer
+         * @description Who ordered the calibration.
+         */
+        Customer: {
+            /**
+             * Name
+             * @default
+             */
+            name?: string;
+            /**
+             * Street
+             * @description Street and number, or box.
+             * @default
+             */
+            street?: string;
+            /**
+             * Post Code
+             * @default
+             */
+            post_code?: string;
+            /**
+             * City
+             * @default
+             */
+            city?: string;
+            /**
+             * Country
+             * @description ISO 3166-1 alpha-2, as DE.
+             * @default
+             */
+            country?: string;
+            /**
+             * Email
+             * @default
+             */
+            email?: string;
+            /**
+             * Phone
+             * @default
+             */
+            phone?: string;
+            /**
+             * Contact
+             * @description Person to ask.
+             * @default
+             */
+            contact?: string;
+            /**
+             * Order
+             * @description The customer's number of the order.
+             * @default
+             */
+            order?: string;
+        };
+        /**
          * DataSetColumns
          * @description The data sets one by one, as columns of equal length; `of`: how many the recording has.
          *
@@ -2790,6 +3410,39 @@ export interface components {
             text: string;
         };
         /**
+         * DatasheetResponse
+         * @description A unit in the terms of IEEE Std 528 and 952.
+         */
+        DatasheetResponse: {
+            /** Serial */
+            serial: string;
+            /** Model */
+            model: string;
+            /** Technology */
+            technology: string | null;
+            /**
+             * Recordings
+             * @description Recordings that figures are from, rising.
+             */
+            recordings: number[];
+            /** Characteristics */
+            characteristics: components["schemas"]["Characteristic"][];
+            /**
+             * Passed
+             * @description Whether all that is specified and measured passes; null: nothing specified is measured.
+             */
+            passed: boolean | null;
+            /**
+             * Not Measured
+             * @description Ids of characteristics without a value on any axis.
+             */
+            not_measured: string[];
+            /** Decision Rule */
+            decision_rule: string;
+            /** Text */
+            text: string[];
+        };
+        /**
          * DeviceCheck
          * @description What one instrument of a bench answered.
          */
@@ -2851,6 +3504,135 @@ export interface components {
             version: string;
         };
         /**
+         * DraftReport
+         * @description What is known of a draft when it is made.
+         */
+        DraftReport: {
+            /** Model */
+            model: string;
+            error: components["schemas"]["CertifiedErrors"];
+            /**
+             * Compared
+             * @description The draft's model first, then those of the recipe.
+             */
+            compared: components["schemas"]["ComparedModel"][];
+            /**
+             * Smallest Heldout
+             * @description Model with the smallest held-out error; null: none has one.
+             */
+            smallest_heldout: string | null;
+            /**
+             * Verdict
+             * @description Verdict of the criticism on the recording; null: see `verdict_reason`.
+             */
+            verdict: string | null;
+            /** Verdict Text */
+            verdict_text: string;
+            /**
+             * Verdict Reason
+             * @description Why there is no verdict; else empty.
+             */
+            verdict_reason: string;
+            /**
+             * Objections
+             * @description Objections to a certification of the draft.
+             */
+            objections: components["schemas"]["Objection"][];
+            /** @description The version in force; null: see `as_found_why`. */
+            as_found: components["schemas"]["AppliedDraft"] | null;
+            /**
+             * As Found Why
+             * @default
+             */
+            as_found_why: string;
+            /** @description The draft; null: it cannot be applied, see `as_left_why`. */
+            as_left: components["schemas"]["AppliedDraft"] | null;
+            /**
+             * As Left Why
+             * @default
+             */
+            as_left_why: string;
+            /** @description Null: no version was in force, or it was not asked for. */
+            drift: components["schemas"]["DriftFromVersion"] | null;
+            /** Limits */
+            limits: components["schemas"]["LimitResult"][];
+            /**
+             * Within Limits
+             * @description Whether all limits are kept; null: the recipe has none, or a figure is not known.
+             */
+            within_limits: boolean | null;
+            /**
+             * Text
+             * @description The report in one paragraph.
+             */
+            text: string;
+        };
+        /**
+         * DraftResponse
+         * @description The draft of one recording of a campaign.
+         */
+        DraftResponse: {
+            /** Serial */
+            serial: string;
+            /** Campaign */
+            campaign: number;
+            /** Recording */
+            recording: number;
+            /**
+             * State
+             * @description due: it is made when the campaign is done; fitted: the version is kept, the report is not yet; made; failed: see `reason`.
+             * @enum {string}
+             */
+            state: "due" | "fitted" | "made" | "failed";
+            /**
+             * Version
+             * @description The version of the unit that the draft is.
+             */
+            version: number | null;
+            /**
+             * Certified
+             * @description Whether this version is in force now.
+             * @default false
+             */
+            certified: boolean;
+            /**
+             * At
+             * @description When it was made or failed.
+             */
+            at: string | null;
+            /**
+             * Reason
+             * @description Why it failed, and what to do; else empty.
+             */
+            reason: string;
+            report: components["schemas"]["DraftReport"] | null;
+        };
+        /**
+         * DraftsRequest
+         * @description Which drafts of a campaign to make now.
+         */
+        DraftsRequest: {
+            /**
+             * Again
+             * @description Also try those again that failed before.
+             * @default false
+             */
+            again?: boolean;
+        };
+        /**
+         * DraftsResponse
+         * @description The drafts of a campaign.
+         */
+        DraftsResponse: {
+            /** Campaign */
+            campaign: number;
+            /**
+             * Drafts
+             * @description By recording; empty: the recipe has no [fit].
+             */
+            drafts: components["schemas"]["DraftResponse"][];
+        };
+        /**
          * Drift
          * @description A straight line through the figures of the recordings; repeatability from day to day is its noise.
          */
@@ -2895,6 +3677,41 @@ export interface components {
             significant: boolean;
             /** @description Points of the line, for a picture. */
             line: components["schemas"]["DriftLine"];
+        };
+        /**
+         * DriftFromVersion
+         * @description The draft against the version that was in force.
+         */
+        DriftFromVersion: {
+            /**
+             * Version
+             * @description The version that was in force when the draft was made.
+             */
+            version: number;
+            /**
+             * Largest Dps
+             * @description For each axis: largest difference of the corrected rates at any data set of the recording, deg/s.
+             */
+            largest_dps: {
+                [key: string]: number;
+            };
+            /**
+             * Rms Dps
+             * @description For each axis: root mean square of that difference, deg/s.
+             */
+            rms_dps: {
+                [key: string]: number;
+            };
+            /**
+             * Coefficients
+             * @description Empty: the models differ, see `why`.
+             */
+            coefficients: components["schemas"]["CoefficientChange"][];
+            /**
+             * Why
+             * @default
+             */
+            why: string;
         };
         /**
          * DriftLine
@@ -2986,7 +3803,7 @@ export interface components {
             noise_floor_source: string;
             /**
              * Heldout By Leg
-             * @description Error of heating by a fit to cooling, and the reverse; empty: one leg.
+             * @description Error in the heating leg of a model fitted to the cooling leg, and the reverse; empty: only one leg was measured.
              */
             heldout_by_leg: components["schemas"]["LegError"][];
         };
@@ -3671,6 +4488,77 @@ export interface components {
             revoked_at: string | null;
         };
         /**
+         * Laboratory
+         * @description The laboratory of a bench file: `[laboratory]`.
+         */
+        Laboratory: {
+            /**
+             * Name
+             * @default
+             */
+            name?: string;
+            /**
+             * Street
+             * @description Street and number, or box.
+             * @default
+             */
+            street?: string;
+            /**
+             * Post Code
+             * @default
+             */
+            post_code?: string;
+            /**
+             * City
+             * @default
+             */
+            city?: string;
+            /**
+             * Country
+             * @description ISO 3166-1 alpha-2, as DE.
+             * @default
+             */
+            country?: string;
+            /**
+             * Email
+             * @default
+             */
+            email?: string;
+            /**
+             * Phone
+             * @default
+             */
+            phone?: string;
+            /**
+             * Accreditation
+             * @description Code under which it is accredited; empty: none.
+             * @default
+             */
+            accreditation?: string;
+            /**
+             * Place
+             * @default laboratory
+             * @enum {string}
+             */
+            place?: "laboratory" | "customer" | "laboratoryBranch" | "customerBranch" | "other";
+            /**
+             * Url
+             * @default
+             */
+            url?: string;
+            /**
+             * Number Prefix
+             * @default
+             */
+            number_prefix?: string;
+            /**
+             * Procedure
+             * @description Number of its written procedure.
+             * @default
+             */
+            procedure?: string;
+        };
+        /**
          * LackOfFit
          * @description Chi2 of the whitened residual over its degrees of freedom, and its p-value.
          */
@@ -3832,6 +4720,39 @@ export interface components {
             z: number | null;
         };
         /**
+         * LimitResult
+         * @description A figure of the draft against a limit of the recipe: it passes if it is at most the limit (simple acceptance).
+         */
+        LimitResult: {
+            /**
+             * Limit
+             * @enum {string}
+             */
+            limit: "heldout_rms_dps" | "max_error_dps" | "drift_dps";
+            /**
+             * Axis
+             * @description Axis; null: over all axes.
+             */
+            axis: string | null;
+            /**
+             * Value Dps
+             * @description The figure, deg/s; null: it is not known, see `why`.
+             */
+            value_dps: number | null;
+            /** At Most Dps */
+            at_most_dps: number;
+            /**
+             * Passed
+             * @description Null: the figure is not known, so that nothing is decided.
+             */
+            passed: boolean | null;
+            /**
+             * Why
+             * @default
+             */
+            why: string;
+        };
+        /**
          * LogColumn
          * @description One column of a log.
          */
@@ -3950,6 +4871,45 @@ export interface components {
             low: (number | null)[];
             /** High */
             high: (number | null)[];
+        };
+        /**
+         * MeasuredUnder
+         * @description Conditions of a measured figure.
+         */
+        MeasuredUnder: {
+            /** Recording */
+            recording: number;
+            /**
+             * Version
+             * @description Version that the figure is a coefficient of; null: it is from the recording itself.
+             */
+            version: number | null;
+            /**
+             * Temperature C
+             * @description Lowest and highest temperature, deg C; null: unknown.
+             */
+            temperature_c: [
+                number,
+                number
+            ] | null;
+            /**
+             * Rate Dps
+             * @description Lowest and highest rate, deg/s; null: unknown.
+             */
+            rate_dps: [
+                number,
+                number
+            ] | null;
+            /**
+             * Runs
+             * @description Powered sessions; null: unknown.
+             */
+            runs: number | null;
+            /**
+             * Datasets
+             * @description Data sets that the figure is from; null: unknown.
+             */
+            datasets: number | null;
         };
         /**
          * ModelLines
@@ -4171,6 +5131,83 @@ export interface components {
             do: string;
         };
         /**
+         * OrderedConformity
+         * @description The specification to which conformity is to be stated, and the rule.
+         */
+        OrderedConformity: {
+            /** Specification */
+            specification: string;
+            /**
+             * Limit Dps
+             * @description Largest permitted error of a corrected rate.
+             */
+            limit_dps: number;
+            /**
+             * Rule
+             * @description simple: pass up to the limit; guard-band: pass up to the limit less the expanded uncertainty.
+             * @enum {string}
+             */
+            rule: "simple" | "guard-band";
+        };
+        /**
+         * OrderedItem
+         * @description What the laboratory noted of the item when it came.
+         */
+        OrderedItem: {
+            /**
+             * Description
+             * @default Gyroscope
+             */
+            description?: string;
+            /**
+             * Manufacturer
+             * @default
+             */
+            manufacturer?: string;
+            /**
+             * Identification
+             * @description The customer's own number of the item.
+             * @default
+             */
+            identification?: string;
+            /**
+             * Condition
+             * @description Condition of the item on receipt.
+             * @default
+             */
+            condition?: string;
+            /**
+             * Received
+             * @description Date of receipt; null: the results do not depend on it.
+             */
+            received?: string | null;
+        };
+        /**
+         * OrderedMethod
+         * @description What is to be said of the method beside the recipe.
+         */
+        OrderedMethod: {
+            /**
+             * Name
+             * @description Of an imported recording; a campaign has its recipe.
+             * @default
+             */
+            name?: string;
+            /**
+             * Deviations
+             * @description Additions to, deviations or exclusions from the method; empty: none.
+             * @default
+             */
+            deviations?: string;
+            /**
+             * Performed From
+             * @description Of an imported recording; a campaign has its own.
+             */
+            performed_from?: string | null;
+            /** Performed Until */
+            performed_until?: string | null;
+        };
+        /**
          * OrientationResponse
          * @description The angle of one axis, positive counter-clockwise and never wrapped, from its rate.
          */
@@ -4198,6 +5235,8 @@ export interface components {
              * @description At the end; 0 at the end of the rest.
              */
             angle_deg: number;
+            /** Drift Between Stops Deg Per Min */
+            drift_between_stops_deg_per_min: number[];
             /**
              * Drift Deg Per Min
              * @description Angle over time: the drift where the unit stood; null: no time.
@@ -4785,6 +5824,23 @@ export interface components {
             depends_on: string[];
         };
         /**
+         * RemainingLine
+         * @description Straight line over the rate through the error that a version leaves on one axis, by least squares.
+         */
+        RemainingLine: {
+            /** Bias Dps */
+            bias_dps: number;
+            /** U Bias Dps */
+            u_bias_dps: number;
+            /**
+             * Scale Factor
+             * @description Error over rate (1 = 100 %); null: the recording has one rate.
+             */
+            scale_factor: number | null;
+            /** U Scale Factor */
+            u_scale_factor: number | null;
+        };
+        /**
          * RepeatabilityJson
          * @description Standard deviation of what is different after each power-on, day or mounting, on one axis.
          */
@@ -5159,6 +6215,17 @@ export interface components {
             priority: number;
             /** Clip */
             clip: boolean;
+            /**
+             * Hide
+             * @description Effects hidden in the units of a simulated bench, each as EFFECT or EFFECT=SIZE.
+             */
+            hide: string[];
+            /**
+             * Fit
+             * @description Whether the campaign ends in a draft if its recipe has [fit].
+             * @default true
+             */
+            fit: boolean;
             /** Late Limit S */
             late_limit_s: number | null;
             /**
@@ -5765,6 +6832,13 @@ export interface components {
             axes: {
                 [key: string]: components["schemas"]["AxisUncertainty"][][];
             };
+            /**
+             * Contributions
+             * @description For each axis: the lines of the budget over rate and over temperature.
+             */
+            contributions: {
+                [key: string]: components["schemas"]["ContributionsOver"];
+            };
         };
         /**
          * UncertaintyResponse
@@ -5779,8 +6853,16 @@ export interface components {
             rate_dps: number;
             /** Temperature C */
             temperature_c: number;
-            /** Coverage Factor */
+            /**
+             * Coverage Factor
+             * @description `expanded_dps` over `combined_dps`.
+             */
             coverage_factor: number;
+            /**
+             * Coverage
+             * @description Probability that the interval covers.
+             */
+            coverage: number;
             /**
              * Inside
              * @description Whether rate and temperature are within the calibrated range.
@@ -5790,6 +6872,32 @@ export interface components {
             axes: {
                 [key: string]: components["schemas"]["AxisUncertainty"];
             };
+            /**
+             * Budget
+             * @description For each axis: the budget of the corrected rate, deg/s.
+             */
+            budget: {
+                [key: string]: components["schemas"]["BudgetResponse"];
+            };
+            /**
+             * Coefficients
+             * @description For each axis: the budgets of bias, scale factor and misalignments at this temperature.
+             */
+            coefficients: {
+                [key: string]: {
+                    [key: string]: components["schemas"]["BudgetResponse"];
+                };
+            };
+            /**
+             * Not Stated
+             * @description Standards that the bench does not state; they are not in U.
+             */
+            not_stated: string[];
+            /**
+             * Overdue
+             * @description Whether a standard was past its due date when it was used.
+             */
+            overdue: boolean;
             /** @description The uncertainty over the calibrated range; null unless `grid` was requested. */
             grid: components["schemas"]["UncertaintyGrid"] | null;
         };
@@ -5823,6 +6931,8 @@ export interface components {
             overdue: boolean;
             /** @description Null: the version in force is not from a campaign. Only of one unit, or with `due_within`. */
             recalibration: components["schemas"]["RecalibrationResponse"] | null;
+            /** @description The draft that a campaign ended in last; null: none did. Only of one unit, or with `due_within`. */
+            draft: components["schemas"]["DraftResponse"] | null;
             /**
              * Formats
              * @description Formats in which the unit's calibrations are available.
@@ -6260,6 +7370,37 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["TrendResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    unit_datasheet_api_units__serial__datasheet_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                serial: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["DatasheetResponse"];
                 };
             };
             /** @description Validation Error */
@@ -7084,6 +8225,110 @@ export interface operations {
             };
         };
     };
+    certificates_api_units__serial__certificates_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                serial: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CertificateResponse"][];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    certificate_api_units__serial__calibrations__version__certificate_get: {
+        parameters: {
+            query?: {
+                /** @description pdf (PDF/A-3), xml (DCC 3.3.0) or json. */
+                format?: string;
+                /** @description Number of a certificate of the version; default: the one that is valid. */
+                number?: string | null;
+            };
+            header?: {
+                "if-none-match"?: string | null;
+            };
+            path: {
+                serial: string;
+                version: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    issue_api_units__serial__calibrations__version__certificate_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                serial: string;
+                version: number;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["CertificateRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CertificateResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
     recipes_api_recipes_get: {
         parameters: {
             query?: never;
@@ -7388,6 +8633,41 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["CampaignResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    make_drafts_api_campaigns__campaign__drafts_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                campaign: number;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["DraftsRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["DraftsResponse"];
                 };
             };
             /** @description Validation Error */
