@@ -13,6 +13,8 @@ from labctl.plots.theme import INK, grid_of, place
 
 #: Colours of the sources, in the order in which they appear first; the sums are drawn in the colour of the text.
 COLOURS = [*qualitative.Safe, *qualitative.Vivid]
+#: Room for the legend below the panels.
+LEGEND_PX = 140
 STYLE = "body { font: 16px/1.5 system-ui, sans-serif; max-width: 72rem; margin: 2rem auto; padding: 0 1rem; }"
 
 
@@ -39,7 +41,10 @@ def contributions(over: Mapping[str, ContributionsOverJson]) -> go.Figure:
     figure.update_xaxes(title="rate, deg/s", col=1)
     figure.update_xaxes(title="temperature, deg C", col=2)
     figure.update_yaxes(title="standard uncertainty, deg/s", rangemode="tozero", col=1)
-    figure.update_layout(showlegend=True, legend={"y": -0.15, "yanchor": "top", "x": 0, "xanchor": "left"})
+    below = {"yref": "container", "y": 0.0, "yanchor": "bottom", "x": 0.0, "xanchor": "left"}
+    figure.update_layout(
+        showlegend=True, legend=below, margin={"b": LEGEND_PX}, height=figure.layout.height + LEGEND_PX
+    )
     return figure
 
 
