@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.errors import NotEnoughData
 from labctl.fitting.criticism.candidate_shape import CandidateShape, slices_of
 from labctl.fitting.criticism.candidates import untestable_channels
 from labctl.fitting.criticism.evidence.design import Design, EliminatedBase
@@ -69,11 +70,15 @@ def schedule_of(recording: Recording, model: ErrorModel | None = None) -> Schedu
     data = reduce_recording(recording, outliers=False)
     model = model or usual_model(fit_data_of(recording))
     info = data.info
+    if data.white_var is None:
+        raise NotEnoughData(
+            f"{info.serial}: the noise of a data set's mean is not known: each data set has fewer than 6 readings, or "
+            "readings that are all equal; measure longer, or at more readings per second"
+        )
     drift = Noise(expected_drift_dps(info.technology or "", info.datasheet.get("bias_stability_dps")), 0.0, 0.0)
     designs, left, slices = {}, {}, {}
     for axis in map(str, info.axes):
         design = design_of(data, model, axis)
-        assert data.white_var is not None
         white = data.white_var[axis]
         scale = np.repeat(np.sqrt(white)[None, :], len(data.present), axis=0)
         no_output: NDArray[np.float64] = np.zeros(data.present.shape)

@@ -16,6 +16,8 @@ from procedures.planning.plan import Plan
 
 #: Readings per second at which a plan is walked through: its channels are slow.
 WALK_HZ = 1.0
+#: Readings of the shortest data set, at least: fewer do not show how large their white noise is.
+LEAST_READINGS = 10
 SEED = 1
 #: A file has up to a megabyte for each 10,000 s of readings.
 WALKS = FileCache("walks", ".npz", most=60)
@@ -24,15 +26,21 @@ READINGS, ENVIRONMENT = "readings/", "environment/"
 
 
 def walked(plan: Plan, bench: BenchFile) -> Recording:
-    """Return what the first gyro of a bench gives on a plan in the simulated world, at `WALK_HZ`. Raises BadInput."""
+    """Return what the first gyro of a bench gives on a plan in the simulated world. Raises BadInput."""
     steps = hashlib.sha256(plan.model_dump_json().encode()).hexdigest()
-    question = {"kind": "walk", "plan": steps, "bench": bench.model_dump(mode="json"), "hz": WALK_HZ, "seed": SEED}
+    on, hz = bench.model_dump(mode="json"), _walk_hz(plan)
+    question = {"kind": "walk", "plan": steps, "bench": on, "hz": hz, "seed": SEED}
     return WALKS.get(question, _decoded, lambda: _encoded(_walk(plan, bench)))
 
 
 def _walk(plan: Plan, bench: BenchFile) -> Recording:
-    gyro = bench.gyros[0].model_copy(update={"sample_rate_hz": WALK_HZ})
+    gyro = bench.gyros[0].model_copy(update={"sample_rate_hz": _walk_hz(plan)})
     return hidden_recording(plan, bench, gyro, SEED, {})
+
+
+def _walk_hz(plan: Plan) -> float:
+    shortest_s = min((step.duration_s for step in plan.steps if step.kind == "acquire"), default=np.inf)
+    return max(WALK_HZ, LEAST_READINGS / shortest_s)
 
 
 def _encoded(walk: Recording) -> bytes:

@@ -9,6 +9,7 @@ import pytest
 
 from labctl.services.planning.loading import limits_of, load_bench, load_recipe
 from labctl.services.simulation import walks
+from labctl.services.simulation.visibility import planned_schedule
 from procedures.planning.plan import Plan, make_plan
 
 
@@ -34,6 +35,16 @@ def test_a_walk_from_a_file_is_the_walk_itself(monkeypatch: pytest.MonkeyPatch) 
         for one, other in ((made.columns, kept.columns), (made.environment, kept.environment)):
             assert list(one) == list(other)
             assert all(np.array_equal(one[name], other[name]) for name in one)
+
+
+def test_short_data_sets_have_enough_readings_to_show_their_noise() -> None:
+    recipe = load_recipe("short")
+    quick = recipe.model_copy(update={"acquire": recipe.acquire.model_copy(update={"duration_s": 5.0})})
+    bench = load_bench("single-axis-sim")
+    plan = make_plan(quick, limits_of(bench))
+    counts = np.unique(walks.walked(plan, bench).columns["dataset"], return_counts=True)[1]
+    assert counts.min() >= walks.LEAST_READINGS - 1
+    assert planned_schedule(plan, bench).data.white_var is not None
 
 
 def test_another_plan_or_bench_is_another_walk() -> None:
