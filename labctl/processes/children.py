@@ -6,6 +6,7 @@ The end of the line tells either side that the other has ended.
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import os
 import signal
 import socket
@@ -21,6 +22,8 @@ from labctl.log.settings import level_asked
 from labctl.log.setup import begin_log
 
 Line = Connection
+#: Of linux/prctl.h.
+PR_SET_PDEATHSIG = 1
 
 
 class Failed(LabctlError):
@@ -110,6 +113,16 @@ def line_to_parent() -> tuple[Line, Any]:
         return line, line.recv()
     except (EOFError, ConnectionError):
         sys.exit(1)
+
+
+def end_with_parent() -> None:
+    """Have the kernel kill this process when the thread that started it has ended; on systems without that, nothing.
+
+    A process that stands still cannot hear the end of its line: it would keep its memory and the service's address.
+    Linux, prctl(2), PR_SET_PDEATHSIG.
+    """
+    with contextlib.suppress(OSError, AttributeError):
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
 
 
 def tell(line: Line, what: object) -> None:

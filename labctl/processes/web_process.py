@@ -19,7 +19,7 @@ from labctl.api.app import create_app
 from labctl.api.connection_limits import limits_for, raise_open_files
 from labctl.api.http_protocol import bounded_http
 from labctl.log import get_logger
-from labctl.processes.children import begin_child_log, line_to_parent, tell
+from labctl.processes.children import begin_child_log, end_with_parent, line_to_parent, tell
 from labctl.processes.remote_bench import RemoteBench, RemoteWriter
 from labctl.processes.settings import ServeRequest, WebSettings
 from labctl.services.admin.api_keys import require_an_api_key
@@ -111,6 +111,7 @@ def serve(line: Connection, settings: WebSettings) -> None:
 
 def main() -> int:
     """Run the process that the supervisor has started; returns its exit status."""
+    end_with_parent()
     line, settings = line_to_parent()
     signal.signal(signal.SIGHUP, signal.SIG_IGN)  # the supervisor hears it
     begin_child_log("web", settings.request.location)

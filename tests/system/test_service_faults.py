@@ -86,12 +86,14 @@ def test_a_stopped_bench_process_is_told_of_and_replaced(service: ServiceProcess
     )
 
 
-def test_a_bench_process_that_stands_still_is_replaced_by_the_next_service(service: ServiceProcess) -> None:
+def test_processes_that_stand_still_are_replaced_by_the_next_service(service: ServiceProcess) -> None:
     campaign = started(service)
-    os.kill(service.bench_pid, signal.SIGSTOP)
+    for child in (service.bench_pid, service.web_pid):
+        os.kill(child, signal.SIGSTOP)
     service.process.kill()
     service.process.wait()
-    heir = begin(labctl(service.database, "serve", "--port", "0", "--json", *SPEED, "--bench", "single-axis-sim"))
+    at = str(service.http.base_url.port)  # the web process that stood still has given the address back
+    heir = begin(labctl(service.database, "serve", "--port", at, "--json", *SPEED, "--bench", "single-axis-sim"))
     try:
         reported = json.loads(first_line(heir))
         assert reported["bench_pid"] != service.bench_pid
