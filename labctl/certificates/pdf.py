@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from datetime import UTC, datetime, time
 from importlib import resources
 from io import BytesIO
+from typing import TYPE_CHECKING, cast
 
 from labctl.certificates.document import Certificate
 from labctl.certificates.readable import readable_certificate
 from labctl.errors import BadInput
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
 
 #: PDF/A-3, level A: tagged, and with fonts, colours and attachments as PDF/A-3b asks.
 STANDARD = "a-3a"
@@ -22,7 +25,7 @@ def pdf_of(given: Certificate, xml: bytes) -> bytes:
     import typst  # noqa: PLC0415  both libraries take a tenth of a second, which only this function needs
 
     #: It takes a project as a dictionary of files too, which its types leave out.
-    compiled: Callable[..., bytes | list[bytes] | None] = typst.compile
+    compiled = cast("Callable[..., bytes | list[bytes] | None]", typst.compile)
     template = resources.files("labctl.certificates").joinpath("template.typ").read_bytes()
     files = {
         "main.typ": template,

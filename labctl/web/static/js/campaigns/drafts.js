@@ -80,8 +80,7 @@ function limits(draft) {
       { title: "At most, deg/s", number: true, cell: (row) => number(row.at_most_dps) },
       {
         title: "",
-        cell: (row) =>
-          row.passed === null ? row.why : row.passed ? chip("passed", "good") : chip("failed", "bad"),
+        cell: (row) => (row.passed === null ? row.why : row.passed ? chip("passed", "good") : chip("failed", "bad")),
       },
     ],
     draft.report?.limits ?? [],

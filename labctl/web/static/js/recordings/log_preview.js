@@ -116,7 +116,11 @@ export function logPreview(file, taken) {
     return h(
       "div",
       { class: "row" },
-      labelledField("Option of the importer", input, "KEY=VALUE, for example instance=1 for the second gyro of a ULog file."),
+      labelledField(
+        "Option of the importer",
+        input,
+        "KEY=VALUE, for example instance=1 for the second gyro of a ULog file.",
+      ),
       button("Look again", () => {
         options = input.value.trim() ? [input.value.trim()] : [];
         return look(null);

@@ -83,7 +83,12 @@ export function contributionFigures(contributions) {
     "div",
     { class: "columns", style: "--column-min: 24rem" },
     Object.entries(contributions).flatMap(([axis, over]) => [
-      one(`Contributions, axis ${axis}, over rate`, over.over_rate, "rate, deg/s", `${number(over.temperature_c, 3)} deg C`),
+      one(
+        `Contributions, axis ${axis}, over rate`,
+        over.over_rate,
+        "rate, deg/s",
+        `${number(over.temperature_c, 3)} deg C`,
+      ),
       one(
         `Contributions, axis ${axis}, over temperature`,
         over.over_temperature,

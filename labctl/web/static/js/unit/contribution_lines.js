@@ -49,5 +49,5 @@ export function contributionTraces(lines, ink) {
     trace(SUMS.combined, lines.combined, { color: ink, width: 2.5 }),
     trace(SUMS.expanded, lines.expanded, { color: ink, width: 2.5, dash: "dash" }),
   ];
-  return [...sources, ...sums].filter(({ y }) => y?.some((value) => value !== null));
+  return [...sources, ...sums].filter(({ y }) => Array.from(y ?? []).some((value) => value !== null));
 }

@@ -67,9 +67,7 @@ function source(row) {
   const under = row.conditions;
   if (!under) return row.why;
   const warm = under.temperature_c;
-  const at = warm
-    ? ` ${number(warm[0])}${warm[1] - warm[0] > 0.5 ? ` to ${number(warm[1])}` : ""} °C`
-    : "";
+  const at = warm ? ` ${number(warm[0])}${warm[1] - warm[0] > 0.5 ? ` to ${number(warm[1])}` : ""} °C` : "";
   const sets = under.datasets === null ? "" : `, ${under.datasets} data sets`;
   return h("span", {}, h("a", { href: `/recordings/${under.recording}` }, `recording ${under.recording}`), at, sets);
 }

@@ -102,7 +102,9 @@ function over({ grid, coverage_factor }) {
 
 /** @param {Uncertainty} answer */
 function pictures({ grid }) {
-  return grid ? h("div", { class: "stack" }, h("h3", {}, "Contributions"), contributionFigures(grid.contributions)) : null;
+  return grid
+    ? h("div", { class: "stack" }, h("h3", {}, "Contributions"), contributionFigures(grid.contributions))
+    : null;
 }
 
 /**

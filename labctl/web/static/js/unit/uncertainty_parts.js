@@ -67,7 +67,8 @@ export function atPlace(answer) {
     })),
     {
       title: STANDARDS,
-      of: (one) => (one.standards_dps === null ? h("span", { class: "warn-text" }, "not stated") : shown(one.standards_dps)),
+      of: (one) =>
+        one.standards_dps === null ? h("span", { class: "warn-text" }, "not stated") : shown(one.standards_dps),
       from: (one) => (one.standards_dps === null ? "the bench file states none" : "the budget below names each"),
     },
     { title: "Combined", of: (one) => figure(one.combined_dps), from: becauseOf },
