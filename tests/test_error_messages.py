@@ -17,7 +17,7 @@ VERBS = frozenset(
     re.findall(
         r"\w+",
         """
-    abort accept add allow answer ask call change check choose clear compare confirm connect correct count
+    abort accept add allow answer ask calibrate call change check choose clear compare confirm connect correct count
     create delete divide do end exchange export find fit free get give home import inspect install keep lay leave
     let list log lower make mark measure move name open pass pause plan put raise read record reduce remove
     rename repair repeat replace report reset restart restore resume rewrite run save say send set shorten

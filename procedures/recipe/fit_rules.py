@@ -29,7 +29,7 @@ class FitRules(Table):
     effects: tuple[ModelName, ...] = Field(default=(), max_length=50)  #: beside the model
     compare: tuple[ModelName, ...] = Field(default=(), max_length=MOST_COMPARED)  #: further models, fitted, not kept
     criticise: Yes = True  #: whether a verdict is made
-    against: Yes = True  #: whether the version in force is applied as it is (as found), and the drift is computed
+    against: Yes = True  #: whether the version in force is applied without refitting, and its drift computed
     limits: FitLimits = FitLimits()
 
     @model_validator(mode="after")

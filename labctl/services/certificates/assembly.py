@@ -39,7 +39,7 @@ def assembled(
     first, last, act = facts.performed_from, facts.performed_until, facts.authorised
     measurements, uncertainty = found.measurements, found.results.uncertainty
     if first is None or last is None or act is None or measurements is None or uncertainty is None:
-        raise MissingFacts(facts.what, [])  # refused before
+        raise MissingFacts.of(facts.what, [])  # refused before
     before, left, adjustment = _states(store, facts, measurements)
     order, number = facts.order, _number(store, facts, at)
     return Certificate(

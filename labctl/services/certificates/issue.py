@@ -68,7 +68,7 @@ def _unchanged(kept: CertificateRow, request: CertificateRequest) -> Certificate
 def refuse(facts: Facts, found: Found) -> None:
     """Raise MissingFacts, or CertificateRefused for a revoked version and a standard outside its dates."""
     if missing := [*facts.missing(), *found.missing()]:
-        raise MissingFacts(facts.what, missing)
+        raise MissingFacts.of(facts.what, missing)
     act = facts.authorised
     if act is not None and act.act == "revoke":
         raise CertificateRefused(

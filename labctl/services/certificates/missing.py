@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 from instruments.laboratory import Contact
 from labctl.errors import BadInput
@@ -17,14 +17,19 @@ class MissingFacts(BadInput):
 
     slug = "missing-facts"
 
-    def __init__(self, what: str, facts: list[tuple[str, str]]) -> None:
-        self.facts = facts
+    def __init__(self, text: str, facts: Sequence[tuple[str, str]] = ()) -> None:
+        super().__init__(text)
+        self.facts = list(facts)
+
+    @classmethod
+    def of(cls, what: str, facts: Sequence[tuple[str, str]]) -> MissingFacts:
+        """Return the error that names every fact with the place where it is stated."""
         places: dict[str, list[str]] = {}
         for fact, place in facts:
             places.setdefault(place, []).append(fact)
         count = "1 fact is missing" if len(facts) == 1 else f"{len(facts)} facts are missing"
         said = "; ".join(f"{', '.join(names)}: {place}" for place, names in places.items())
-        super().__init__(f"no certificate of {what}: {count}. {said}")
+        return cls(f"no certificate of {what}: {count}. {said}", facts)
 
     @property
     def members(self) -> JsonObject:

@@ -82,7 +82,7 @@ def test_what_the_library_refuses_is_one_line(thermotron: Callable[..., Any]) ->
     with pytest.raises(RequestRejected, match=r"cannot read temprature: .*; correct the name in the bench file"):
         other.driver.identify()
     text = thermotron(temperature="id")
-    with pytest.raises(MalformedReply, match="id is 'THERMOTRON 8800', not a number"):
+    with pytest.raises(MalformedReply, match="attribute id holds 'THERMOTRON 8800', not a number"):
         text.driver.identify()
     absent = thermotron(instrument="pymeasure.instruments.thermotrons:Oven")
     with pytest.raises(LinkError, match=r"Oven cannot be imported .* install pymeasure \(`pip install pymeasure`\)"):

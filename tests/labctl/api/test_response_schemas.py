@@ -12,6 +12,7 @@ from labctl.api import create_app
 #: Routes whose answer is no JSON: what it is.
 FILES = {
     "GET /api/units/{serial}/calibration": "a calibration file: the document, or C, in a consumer's format",
+    "GET /api/units/{serial}/calibrations/{version}/certificate": "a PDF, or a DCC, as issued; the JSON has a schema",
     "GET /api/recordings/{recording}/file": "a zip",
     "POST /api/backups": "nothing (204)",
 }

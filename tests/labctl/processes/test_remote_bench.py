@@ -105,7 +105,7 @@ def test_a_campaign_is_started_followed_and_aborted_from_the_web_process(store: 
         with pytest.raises(Conflict, match=r"has already ended \(done\)"):
             service.execute(ABORT_CAMPAIGN, ToCampaign(campaign, ReasonRequest(reason="tea")))
     finally:
-        access.close()
+        service.close()
 
 
 def test_a_bench_process_that_was_never_heard_is_silent_and_unconfirmed(tmp_path: Path) -> None:

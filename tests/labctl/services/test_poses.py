@@ -93,7 +93,7 @@ def test_a_version_is_verified_by_its_own_and_by_another_units_session(lab: Lab)
     [
         (("criticise", HAND, "--version", "1", "--recording", "1"), "in a recording of poses no rate is known"),
         (("improve", HAND, "--version", "1", "--recording", "1", "--add", "bias_drift"), "of poses no rate is known"),
-        (("fit", HAND, "--recording", "1", "--model", "yang2018"), "with --model poses only"),
+        (("fit", HAND, "--recording", "1", "--model", "yang2018"), "with --model poses and without added effects"),
     ],
 )
 def test_what_poses_cannot_carry_is_refused_in_one_line(lab: Lab, command: tuple[str, ...], said: str) -> None:

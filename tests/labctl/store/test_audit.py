@@ -256,6 +256,12 @@ ACTS: dict[str, tuple[str, Callable[[TestClient], Any]]] = {
     "/api/backups": ("backup", lambda c: c.post("/api/backups", json=NOTE)),
 }  # fmt: skip
 
+#: Operations that need more than one request before they succeed, and the test that holds each to its row.
+ELSEWHERE = {
+    "/api/campaigns/{campaign}/drafts": "tests/labctl/services/drafts/test_drafts.py",
+    "/api/units/{serial}/calibrations/{version}/certificate": "tests/labctl/services/certificates/test_issue.py",
+}
+
 
 class AlwaysThere(BenchRunner):
     """A runner for which no campaign is too fast to be paused or to be answered."""
@@ -279,8 +285,8 @@ def test_every_act_over_http_leaves_its_row(location: str) -> None:
     lab_service = LabService(store, SystemClock(), AlwaysThere(store, bench, VirtualClock))
     application = create_app(lab_service)
     acting_paths = {path for path, item in application.openapi()["paths"].items() if set(item) - {"get", "head"}}
-    assert acting_paths - set(ASKING) == set(ACTS)
-    assert set(ASKING) <= acting_paths
+    assert acting_paths - set(ASKING) - set(ELSEWHERE) == set(ACTS)
+    assert set(ASKING) | set(ELSEWHERE) <= acting_paths
     with TestClient(application, headers={"Labctl-User": "A. Person"}) as client:
         prepare(store, "short", bench, VirtualClock(), clip=False).bench.close()  # one that no process runs
         store.benches.mark(bench.name, "the chamber did not answer", SystemClock().utc())

@@ -160,9 +160,9 @@ def test_too_little_is_refused_with_what_to_do(session: Session, said: str) -> N
 
 def test_another_model_another_motion_means_and_two_axes_are_refused() -> None:
     recording, _ = simulate_session(1, Session(rests=3))
-    with pytest.raises(BadInput, match="with --model poses only"):
+    with pytest.raises(BadInput, match="with --model poses and without added effects"):
         fit(recording, "yang2018")
-    with pytest.raises(BadInput, match="with --model poses only"):
+    with pytest.raises(BadInput, match="with --model poses and without added effects"):
         fit(recording, "poses", ["bias_temperature"])
 
     def changed(**head: object) -> Recording:

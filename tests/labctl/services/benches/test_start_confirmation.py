@@ -123,6 +123,7 @@ def test_an_entry_from_before_confirmations_were_asked_is_refused_when_it_is_due
     old = NewStart(
         bench_name=BENCH.name, recipe_name="short", recipe="short", clip=False, priority=0, cron=None, time_zone="UTC",
         late_limit_s=None, due_at=AT, confirmed_by=None, visits_s=None,
+        hide=None, fit=True,
     )  # fmt: skip
     number = store.starts.add(old, AT)
     Scheduler(store, clock, runner, BENCH.name).tick()
