@@ -28,7 +28,7 @@ from labctl.cli.commands import (
     server,
     trend,
 )
-from labctl.cli.commands.documents import certificate
+from labctl.cli.commands.documents import certificate, datasheet, reproduction, uncertainty
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.interrupts import process_of_one_command
 from labctl.config import os_user
@@ -65,8 +65,8 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "improve": criticism.improve,
     "ladder": criticism.ladder,
     "trend": trend.trend,
-    "reproduce": effects.reproduce,
-    "datasheet": trend.datasheet,
+    "reproduce": reproduction.reproduce,
+    "datasheet": datasheet.datasheet,
     "units": trend.units,
     "certify": calibrations.certify,
     "revoke": calibrations.revoke,
@@ -74,7 +74,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "calibration": calibrations.calibration,
     "certificate": certificate.certificate,
     "certificates": certificate.certificates,
-    "uncertainty": noise.uncertainty,
+    "uncertainty": uncertainty.uncertainty,
     "compensate": calibrations.compensate,
     "backup": database.backup,
     "check": database.check,

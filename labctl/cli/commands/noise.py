@@ -1,4 +1,4 @@
-"""`labctl allan`, `orientation` and `uncertainty`: noise at rest, the angle that a rate adds up to, the budget of U."""
+"""`labctl allan` and `orientation`: noise at rest, and the angle that a rate adds up to."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from labctl.cli.error_reporting import one_clear_line
-from labctl.cli.options import Database, Json, RecordingId, Serial
+from labctl.cli.options import Database, Json, RecordingId
 from labctl.cli.output import console, format_number, print_json, stderr
 from labctl.cli.printing.noise import print_allan
 
@@ -129,46 +129,3 @@ def _print(answer: OrientationResponse) -> None:
     console.print(f"  standing     {answer.standing_s:.1f} s; offset {format_number(answer.offset_dps)} deg/s")
     if answer.gap_s:
         console.print(f"  without readings {answer.gap_s:.1f} s", style="yellow")
-
-
-def uncertainty(
-    serial: Serial,
-    version: Annotated[
-        int | None, typer.Option("--version", metavar="N", help="Calibration version; default: the newest version.")
-    ] = None,
-    rate_dps: Annotated[
-        float | None,
-        typer.Option("--rate-dps", metavar="DPS", help="Rate about each axis in turn; default: half of the fastest."),
-    ] = None,
-    temperature_c: Annotated[
-        float | None,
-        typer.Option("--temperature-c", metavar="C", help="Temperature; default: the middle of the calibrated range."),
-    ] = None,
-    figure: Annotated[
-        Path | None,
-        typer.Option(
-            "--figure", metavar="FILE.html", help="File to write: the contributions over rate and temperature."
-        ),
-    ] = None,
-    as_json: Json = False,
-    database: Database = None,
-) -> None:
-    """Print the uncertainty budget of a corrected rate and of the coefficients, line by line (GUM)."""
-    from labctl.services.calibrations.contributions import write_figure
-    from labctl.services.calibrations.uncertainty import uncertainty_of_unit
-    from labctl.services.commands.open import open_readonly
-
-    with one_clear_line(), open_readonly(database) as store:
-        answer = uncertainty_of_unit(
-            store, serial, version, rate_dps, temperature_c, grid=as_json or figure is not None
-        )
-        if figure is not None:
-            write_figure(answer, figure)
-    if as_json:
-        print_json(answer)
-        return
-    from labctl.cli.printing.uncertainty import print_uncertainty
-
-    print_uncertainty(answer)
-    if figure is not None:
-        console.print(f"contributions -> {figure}", markup=False)

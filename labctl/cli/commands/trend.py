@@ -1,8 +1,7 @@
-"""`labctl units`, `trend`, `datasheet`: which versions are in force, a unit over the years, and its data sheet."""
+"""`labctl units` and `trend`: which versions are in force, and a unit over the years."""
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -10,7 +9,6 @@ import typer
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import Database, Json, Serial
 from labctl.cli.output import console, format_number, print_json, table
-from labctl.cli.printing.datasheet import print_datasheet
 
 if TYPE_CHECKING:
     from labctl.services.schemas.units import AppliedVersion, TrendResponse
@@ -79,28 +77,6 @@ def trend(
         print_json(answer)
     else:
         _print(answer)
-
-
-def datasheet(
-    serial: Serial,
-    out: Annotated[
-        Path | None, typer.Option("--out", metavar="FILE", help="Write the data sheet to a file, as JSON.")
-    ] = None,
-    as_json: Json = False,
-    database: Database = None,
-) -> None:
-    """Show the data sheet of a unit from its recordings; exit 1 if a specified value is not kept."""
-    from labctl.services.commands.open import open_readonly
-    from labctl.services.datasheet.sheet import datasheet as datasheet_of
-
-    with one_clear_line():
-        with open_readonly(database) as store:
-            answer = datasheet_of(store, serial)
-        if out is not None:
-            out.write_text(answer.model_dump_json(indent=2) + "\n", encoding="utf-8")
-    print_json(answer) if as_json else print_datasheet(answer)
-    if answer.passed is False:
-        raise typer.Exit(1)
 
 
 def _print(answer: TrendResponse) -> None:

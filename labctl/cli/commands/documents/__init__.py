@@ -1,1 +1,1 @@
-"""Commands that write the documents of a laboratory."""
+"""Commands that write documents: certificates, data sheets, uncertainty budgets, reproductions of papers."""
