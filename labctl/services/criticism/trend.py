@@ -52,7 +52,7 @@ def trend_unit(store: Store, serial: str, version: int | None = None, limit_dps:
             for row in store.recordings.of_unit(serial)
             if row.kind == "points" or (row.kind == "samples" and row.datasets)
         ),
-        key=_start,
+        key=lambda row: (_start(row), row.id),
     )
     points = [_point(store, row, reference, rows, measured) for row in measured]
     lines = list(_lines(points))

@@ -102,6 +102,15 @@ def test_two_recordings_have_a_drift_without_an_uncertainty_and_say_so(tmp_path:
     assert [leaves["earliest"] for leaves in found["leaves"]] == [None]
 
 
+def test_recordings_of_the_same_instant_are_in_the_order_of_their_numbers(tmp_path: Path) -> None:
+    rng, lab = np.random.default_rng(9), Lab(tmp_path)
+    for name in ("one", "other"):
+        write_recording(recording_of_day(rng, 0.0), tmp_path / name)
+        lab.run("import", str(tmp_path / name))
+    lab.run("fit", "J-1", "--effects", ",".join(EFFECTS))
+    assert [point["recording"] for point in lab.json("trend", "J-1")["points"]] == [1, 2]
+
+
 def test_one_recording_has_no_drift(tmp_path: Path) -> None:
     lab = lab_over_years(tmp_path, 1)
     found = lab.json("trend", "J-1")
