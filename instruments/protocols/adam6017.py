@@ -65,7 +65,7 @@ class WiringOptions(Strict):
     @classmethod
     def _is_another(cls, channel: int | None, info: ValidationInfo) -> int | None:
         if channel is not None and channel == info.data.get("channel"):
-            raise ValueError(f"input {channel} cannot carry both the rate and the thermometer")
+            raise ValueError(f"input {channel} is set for the rate and for the thermometer; give each its own input")
         return channel
 
     @property

@@ -146,7 +146,10 @@ class ColumnMap(_Strict):
             if target in _MADE:
                 raise ValueError(f"{target}: this column is made from [datasets], or belongs to coefficients")
             if not _usable_name(target):
-                raise ValueError(f"{target[:80]}: a name has letters, digits and _ (at most 60) and ends in its unit")
+                raise ValueError(
+                    f"{target[:80]}: not a name for a column; use letters, digits and _ (at most 60), and end "
+                    "with the unit of measurement, such as humidity_pct"
+                )
             _check_unit(target, column)
         return columns
 
@@ -189,7 +192,10 @@ def _check_unit(target: str, column: MappedColumn) -> None:
         return
     if is_lsb(column.unit):
         if column.scale is None:
-            raise ValueError(f"{target}: unit = {LSB!r} needs scale: words per {quantity} (131: one of the MPU-6050)")
+            raise ValueError(
+                f"{target}: unit = {LSB!r} also needs scale, the number of LSB for 1 {quantity}; the gyro's data sheet "
+                "states it"
+            )
         return
     if quantity in QUANTITIES and find_unit(quantity, column.unit) is None:
         raise ValueError(f"{target}: {column.unit[:40]!r} is not a known unit of measurement; use {names_of(quantity)}")

@@ -54,7 +54,7 @@ class AttendanceResponse(ResponseModel):
         description="Times at which a person is expected to be needed; questions close together count as one."
     )
     at_night: list[datetime] = Field(description="The times of `needed_at` between 20:00 and 07:00.")
-    text: str = Field(description="The times of `needed_at` as a sentence.")
+    text: str = Field(description="When the campaign needs a person, as a sentence; the times are `needed_at`.")
     warning: str = Field(default="", description="A warning about times at night; empty when there are none.")
     better_start: datetime | None = Field(
         default=None, description="The next start for which fewer of these times are at night; null: none is better."

@@ -1622,7 +1622,7 @@ export interface components {
             at_night: string[];
             /**
              * Text
-             * @description The times of `needed_at` as a sentence.
+             * @description When the campaign needs a person, as a sentence; the times are `needed_at`.
              */
             text: string;
             /**

@@ -109,7 +109,7 @@ export async function page({ query, signal }) {
             h("strong", {}, bench.name),
             bench.simulated ? chip("simulated", "accent") : null,
           )
-        : "For the simulated bench that suits the recipe best.",
+        : "Computed for the simulated bench that suits this recipe best.",
       h("a", { class: "button primary", href: "#begin" }, "Begin …"),
     ),
     query.recipe && named.name !== query.recipe && !query.toml
