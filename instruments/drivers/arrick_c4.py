@@ -16,7 +16,7 @@ from instruments.drivers import arrick_c4_checks as checks
 from instruments.drivers import probes
 from instruments.drivers.arrick_c4_link import LATE_LETTERS, C4Link
 from instruments.drivers.driver import TableDriver
-from instruments.errors import LimitError, MalformedReply, NoReply, RequestRejected, WrongInstrument
+from instruments.errors import MalformedReply, NoReply, RequestRejected, WrongInstrument
 from instruments.interfaces.table import HomeCheck, Spin, StepClock, TableLimits, Wait
 from instruments.protocols import arrick_c4_lines as lines
 from instruments.protocols.arrick_c4_moves import SPARE_S, Move, TimedRun, finite_move, plan_move
@@ -82,12 +82,7 @@ class ArrickC4:
 
     def achievable_dps(self, rate_dps: float) -> float:
         """Get the rate that the nearest whole divisor of the step clock gives, deg/s; raises LimitError."""
-        if abs(rate_dps) > self.limits.max_rate_dps * (1 + 1e-9):
-            raise LimitError(
-                self.name,
-                f"rate {rate_dps:g} deg/s is beyond the table's {self.limits.max_rate_dps:g} deg/s; "
-                "ask for less, or plan with --clip",
-            )
+        self.limits.require_rate(self.name, rate_dps)
         if rate_dps == 0:
             return 0.0
         move = plan_move(self._true, rate_dps, 1.0)

@@ -9,8 +9,12 @@ from typing import Literal, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from instruments.errors import LimitError
+
 #: What a reference rate is known from: the table's own step clock, the rate that a servo was asked for, or its encoder.
 Reference = Literal["computed", "demanded", "measured"]
+#: By this share a rate may pass a limit that it was computed from.
+ROUNDING = 1e-9
 
 
 @dataclass(frozen=True)
@@ -25,6 +29,15 @@ class TableLimits:
     )
     checks_home: bool = False  #: whether missed steps are looked for at the home switch
     reference: Reference = "computed"  #: what the rate of a data set is known from
+
+    def require_rate(self, device: str, rate_dps: float) -> None:
+        """Raise LimitError for a rate beyond the table's, deg/s; `device` is the name that the error gives."""
+        if abs(rate_dps) > self.max_rate_dps * (1 + ROUNDING):
+            raise LimitError(
+                device,
+                f"rate {rate_dps:g} deg/s is beyond the table's {self.max_rate_dps:g} deg/s; "
+                "ask for less, or plan with --clip",
+            )
 
 
 @dataclass(frozen=True)

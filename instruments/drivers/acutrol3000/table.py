@@ -12,7 +12,7 @@ from instruments.clock import Clock, sleep_until
 from instruments.drivers.acutrol3000 import checks
 from instruments.drivers.acutrol3000.link import AcutrolLink
 from instruments.drivers.driver import TableDriver
-from instruments.errors import LimitError, NoReply, RequestRejected, WrongInstrument
+from instruments.errors import NoReply, RequestRejected, WrongInstrument
 from instruments.interfaces.table import AngleReading, Spin, TableLimits
 from instruments.protocols.acutrol3000 import commands as acl
 from instruments.protocols.acutrol3000.settings import Acutrol3000Settings
@@ -60,12 +60,7 @@ class Acutrol3000:
 
     def achievable_dps(self, rate_dps: float) -> float:
         """Get the rate that is demanded for `rate_dps`, deg/s; raises LimitError."""
-        if abs(rate_dps) > self.limits.max_rate_dps * (1 + 1e-9):
-            raise LimitError(
-                self.name,
-                f"rate {rate_dps:g} deg/s is beyond the table's {self.limits.max_rate_dps:g} deg/s; "
-                "ask for less, or plan with --clip",
-            )
+        self.limits.require_rate(self.name, rate_dps)
         return round(rate_dps, acl.DECIMALS)
 
     def home(self) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import replace
 
 from instruments.clock import Clock
@@ -46,9 +47,9 @@ class TextChamber(SetpointChamber):
             self._has_controlled = False  # off is right from now on
         return found
 
+    @abstractmethod
     def _switch_off(self) -> None:
         """Switch heating and cooling off."""
-        raise NotImplementedError
 
 
 class LineChamber(TextChamber):
