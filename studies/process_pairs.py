@@ -1,6 +1,6 @@
 """Two processes of a service killed or stopped at random instants of a campaign, over pty and TCP: is it finished?
 
-`LABCTL_STUDY_PAIRS` is how many pairs. What systemd does to a supervisor that died or stands still is done here: it is
+`LABCTL_STUDY_PAIRS` is how many pairs, `LABCTL_STUDY_AT_ONCE` how many run beside each other. What systemd does to a supervisor that died or stands still is done here: it is
 killed, and started again.
 """
 
@@ -14,6 +14,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,6 +30,7 @@ from studies.databases import close_server, new_database
 from studies.process_kill import DATA_SETS, RECIPE, WHOLE_S, simulators
 
 PAIRS = int(os.environ.get("LABCTL_STUDY_PAIRS", "100"))
+AT_ONCE = int(os.environ.get("LABCTL_STUDY_AT_ONCE", "1"))  #: services beside each other
 PROCESSES = ("supervisor", "bench", "web")
 SIGNALS = (signal.SIGKILL, signal.SIGSTOP)
 #: A service manager gives a supervisor that stands still so long, s.
@@ -154,19 +156,30 @@ def _readings(location: str) -> set[Any]:
     return found
 
 
-def run() -> dict[str, float]:
-    """Let pairs of faults happen at instants spread over the length of a campaign."""
+def drawn(pairs: int) -> list[tuple[Fault, ...]]:
+    """Draw pairs of faults at instants spread over the length of a campaign."""
     rng = np.random.default_rng(11)
-    outcomes = []
-    for number in range(PAIRS):
+    found = []
+    for number in range(pairs):
         which = [PROCESSES[k] for k in rng.choice(len(PROCESSES), 2, replace=False)]
         how = [SIGNALS[k] for k in rng.integers(len(SIGNALS), size=2)]
-        when = (float(1.0 + WHOLE_S * (number + rng.uniform()) / PAIRS), float(rng.exponential(2.0)))
-        faults = tuple(Fault(*each) for each in zip(which, how, when, strict=True))
-        with tempfile.TemporaryDirectory() as name, simulators(Path(name)) as bench:
-            outcomes.append(suffer(Path(name), bench, faults))
-        if not outcomes[-1].well:
-            print(f"   not as promised: {', '.join(map(str, faults))}: {outcomes[-1]}", flush=True)
+        when = (float(1.0 + WHOLE_S * (number + rng.uniform()) / pairs), float(rng.exponential(2.0)))
+        found.append(tuple(Fault(*each) for each in zip(which, how, when, strict=True)))
+    return found
+
+
+def _suffer_alone(faults: tuple[Fault, ...]) -> Outcome:
+    with tempfile.TemporaryDirectory() as name, simulators(Path(name)) as bench:
+        outcome = suffer(Path(name), bench, faults)
+    verdict = "as promised" if outcome.well else f"NOT as promised: {outcome}"
+    print(f"   {', '.join(map(str, faults))}: {verdict}, heard after {outcome.answers_after_s:.1f} s", flush=True)
+    return outcome
+
+
+def run() -> dict[str, float]:
+    """Let the pairs of faults happen, a line for each as it is over."""
+    with ThreadPoolExecutor(AT_ONCE) as pool:
+        outcomes = list(pool.map(_suffer_alone, drawn(PAIRS)))
     close_server()
     return {
         "pairs": float(len(outcomes)),
