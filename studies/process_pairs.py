@@ -1,6 +1,8 @@
 """Two processes of a service killed or stopped at random instants of a campaign, over pty and TCP: is it finished?
 
-`LABCTL_STUDY_PAIRS` is how many pairs, `LABCTL_STUDY_AT_ONCE` how many run beside each other. What systemd does to a supervisor that died or stands still is done here: it is
+`LABCTL_STUDY_PAIRS` is how many pairs, `LABCTL_STUDY_AT_ONCE` how many run beside each other.
+
+What systemd does to a supervisor that died or stands still is done here: it is
 killed, and started again.
 """
 
