@@ -74,6 +74,10 @@ class Outcome:
         return self.state == "done" and not (self.readings_missing or self.wrong_counts or self.unconfirmed)
 
 
+class NotStarted(Exception):
+    """The service ended before it answered."""
+
+
 class Service:
     """`labctl serve` as a service manager runs it."""
 
@@ -86,7 +90,10 @@ class Service:
     def _start(self) -> None:
         self._process = subprocess.Popen(self._command, stdout=subprocess.PIPE, text=True)
         assert self._process.stdout is not None
-        reported = json.loads(self._process.stdout.readline())
+        said = self._process.stdout.readline()
+        if not said:
+            raise NotStarted(f"`labctl serve` ended with status {self._process.wait()} at its start")
+        reported = json.loads(said)
         self.pids = {"supervisor": self._process.pid, "bench": reported["bench_pid"], "web": reported["web_pid"]}
         self.http = httpx.Client(base_url=reported["url"], timeout=10.0)
 
@@ -172,7 +179,10 @@ def drawn(pairs: int) -> list[tuple[Fault, ...]]:
 
 def _suffer_alone(faults: tuple[Fault, ...]) -> Outcome:
     with tempfile.TemporaryDirectory() as name, simulators(Path(name)) as bench:
-        outcome = suffer(Path(name), bench, faults)
+        try:
+            outcome = suffer(Path(name), bench, faults)
+        except NotStarted as error:
+            outcome = Outcome(faults, "not started", str(error), 0, 0, "", 0.0)
     verdict = "as promised" if outcome.well else f"NOT as promised: {outcome}"
     print(f"   {', '.join(map(str, faults))}: {verdict}, heard after {outcome.answers_after_s:.1f} s", flush=True)
     return outcome

@@ -1,8 +1,7 @@
 """The supervisor: what `labctl serve` runs. It starts the bench process and the web process, and watches both.
 
-It computes nothing and has no database open, so that little can stop it. A process that has ended, or has not been
-sign of life for `SILENT_S`, is started again; a bench process starts with the safe state. An end of the supervisor
-itself
+It computes nothing and has no database open, so that little can stop it. A process that has ended, or has given no
+sign of life for `SILENT_S`, is started again; a bench process starts with the safe state. The end of the supervisor
 ends the web process, not the bench process: the next supervisor on the same database takes charge of it.
 """
 
@@ -18,7 +17,7 @@ from dataclasses import dataclass
 from logging import ERROR, INFO
 from pathlib import Path
 
-from labctl.errors import BenchSilent, BenchUnconfirmed, LabctlError
+from labctl.errors import BenchSilent, BenchUnconfirmed, Conflict, LabctlError
 from labctl.log import get_logger
 from labctl.processes import systemd
 from labctl.processes.bench_line import BenchLine, bench_process_of
@@ -135,16 +134,38 @@ class Supervisor:
         )
 
     def _open_bench(self) -> BenchLine:
-        """Take charge of the bench process that outlived its service, or start one."""
+        """Take charge of the bench process that outlived its service, or start one.
+
+        One whose supervisor ended while it started holds the database and does not answer yet: it is asked again.
+        """
+        trying = Elapsed()
+        while True:
+            if (found := self._find_bench()) is not None:
+                return found
+            self._folder = Path(tempfile.mkdtemp(prefix="labctl-"))
+            try:
+                return self._start_bench()
+            except Conflict:
+                holder = bench_process_of(self._request)
+                starting = holder is not None and holder.calls is not None
+                if not starting or self._waker.ending or trying.s > SILENT_S:
+                    raise
+            self._waker.wait(LOOK_S)
+
+    def _find_bench(self) -> BenchLine | None:
+        """Take charge of the bench process that outlived its service; None where there is none that answers.
+
+        Raises Conflict while another supervisor is in charge of it.
+        """
         holder = bench_process_of(self._request)
-        if holder is not None and holder.calls is not None:
-            with contextlib.suppress(BenchSilent):
-                self._folder = Path(holder.calls)
-                line = BenchLine(self._settings(self._folder), holder.pid)
-                log.info("bench_process.found", child_pid=holder.pid)
-                return line
-        self._folder = Path(tempfile.mkdtemp(prefix="labctl-"))
-        return self._start_bench()
+        if holder is None or holder.calls is None:
+            return None
+        with contextlib.suppress(BenchSilent, ProcessLookupError):
+            self._folder = Path(holder.calls)
+            line = BenchLine(self._settings(self._folder), holder.pid)
+            log.info("bench_process.found", child_pid=holder.pid)
+            return line
+        return None
 
     def _start_bench(self) -> BenchLine:
         for left_over in self._folder.iterdir():
