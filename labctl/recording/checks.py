@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from labctl.errors import BadRecording
 from labctl.recording.coefficient_forms import check_coefficients
 from labctl.recording.columns import BY_NAME, ENVIRONMENT_NEEDED, needed
-from labctl.recording.constant_rate import rate_change
 from labctl.recording.data_set_limits import refuse_large_numbers, refuse_too_many_data_sets
 from labctl.recording.info import RecordingInfo
+from labctl.recording.motions.constant_rate import rate_change
 from labctl.recording.motions.turns import check_turns, mean_rate_dps
 from labctl.recording.recording import Column
 

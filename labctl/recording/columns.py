@@ -25,6 +25,9 @@ class Column:
     motions: frozenset[Motion] = frozenset()
 
 
+#: Columns of several recordings as one: which recording a row is of, its time within it, and its data set there.
+RECORDING, WITHIN_S, OWN_DATASET = "recording", "recording_t_s", "recording_dataset"
+
 _BOTH = frozenset({"samples", "points"})
 _ON_TABLE: frozenset[Motion] = frozenset({"rates", "profile"})
 _IN_POSES: frozenset[Motion] = frozenset({"poses"})

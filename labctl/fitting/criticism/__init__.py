@@ -11,7 +11,7 @@ from labctl.fitting.criticism.criticism import (
 )
 from labctl.fitting.criticism.diagnostics import residual_maps
 from labctl.fitting.criticism.effect_size import SizeReference, size_for_z, size_in_noise_units, size_reference
-from labctl.fitting.criticism.reduction import ReducedRecording, decimate
+from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.criticism.residuals import (
     Residuals,
     has_one_rising_leg,
@@ -43,7 +43,6 @@ __all__ = [
     "Verdict",
     "best_shapes",
     "criticise",
-    "decimate",
     "effect_visibilities",
     "has_one_rising_leg",
     "leading_signal",

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from labctl.fitting.criticism.candidate_shape import CandidateShape
 from labctl.fitting.criticism.reduction import ReducedRecording
-from labctl.fitting.data.channels import OWN_DATASET, RECORDING, WITHIN_S
 from labctl.fitting.numeric.arrays import Array
+from labctl.recording.columns import OWN_DATASET, RECORDING, WITHIN_S
 
 #: Knots of a smooth function of a channel: a coarse and a fine one compete.
 KNOTS = (5, 9)

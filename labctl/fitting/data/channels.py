@@ -13,12 +13,11 @@ from labctl.fitting.data.temperature.channel import with_stand_in
 from labctl.fitting.data.temperature.history import TemperatureHistory, history_of
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording
+from labctl.recording.columns import RECORDING, WITHIN_S
 
 BODY_AXES = ("x", "y", "z")
 #: A wave, "cos" or "sin", and how often it comes per turn of the table.
 Carrier = tuple[str, int]
-#: Columns of several recordings as one: which recording a row is of, its time within it, and its data set there.
-RECORDING, WITHIN_S, OWN_DATASET = "recording", "recording_t_s", "recording_dataset"
 #: Duration of a data set, s, where the recording does not give it.
 USUAL_DURATION_S = 60.0
 

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.errors import BadInput
-from labctl.fitting.data.channels import OWN_DATASET, RECORDING, WITHIN_S
 from labctl.fitting.data.covered import Covered
 from labctl.fitting.data.temperature.channel import with_temperature
 from labctl.recording import Recording, RecordingInfo, Standard, to_points
+from labctl.recording.columns import OWN_DATASET, RECORDING, WITHIN_S
 
 #: Numbers that go on counting from recording to recording.
 COUNTED = ("dataset", "run", "mounting")

@@ -13,12 +13,13 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
-from labctl.fitting.data.channels import OWN_DATASET, RECORDING, WITHIN_S, Channels
+from labctl.fitting.data.channels import Channels
 from labctl.fitting.data.levels import level_centres, rate_levels
 from labctl.fitting.data.rate_profile import Response
 from labctl.fitting.data.shifts import shift_columns
 from labctl.fitting.data.temperature.levels import temperature_levels
 from labctl.fitting.numeric.arrays import Array
+from labctl.recording.columns import OWN_DATASET, RECORDING, WITHIN_S
 
 #: The surface has at most this share of as many columns as there are data sets, and leaves at least so many free.
 MOST_SHARE, MOST_SHARE_WITH_LEVELS, LEAST_FREE = 0.5, 0.7, 8

@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import helmert
 
-from labctl.fitting.data.channels import RECORDING, Channels
+from labctl.fitting.data.channels import Channels
 from labctl.fitting.data.joined import recordings_in
 from labctl.fitting.numeric.arrays import Array
+from labctl.recording.columns import RECORDING
 
 ShiftKind = Literal["turn_on", "day_to_day", "mounting"]
 

@@ -7,11 +7,12 @@ from typing import Literal
 
 import numpy as np
 
-from labctl.fitting.data.channels import RECORDING, Channels
+from labctl.fitting.data.channels import Channels
 from labctl.fitting.effects import Column, Reference, Term, kind_of
 from labctl.fitting.models.temperature import Constant, TemperatureBasis, basis_from_dict
 from labctl.fitting.numeric.arrays import Array
 from labctl.json_types.models import ErrorModelJson, TermJson
+from labctl.recording.columns import RECORDING
 
 Argument = Literal["rate", "output"]
 #: Effects of these origins belong to the unit and are exported with its calibration.

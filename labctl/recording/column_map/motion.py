@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from labctl.recording.column_map.movement import Movement, poses
 from labctl.recording.columns import BY_NAME, needed
-from labctl.recording.constant_rate import rate_change
 from labctl.recording.info import Motion, RecordingInfo
+from labctl.recording.motions.constant_rate import rate_change
 from labctl.recording.recording import Columns
 
 Array = NDArray[np.float64]

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from labctl.errors import BadInput
 from labctl.services.cache import cached_group
+from labctl.services.criticism.decimated_readings import reading_beside
 from labctl.services.criticism.versions import content_digest, version_of
 from labctl.services.recordings.loading import chosen_rows, readings_question
 from labctl.services.schemas.base import ResponseModel
@@ -57,9 +58,10 @@ def _cached_criticism(
     """Return one of the answers of a criticism; the first request computes and caches all of them."""
 
     def work() -> Sequence[ResponseModel]:
-        from labctl.services.criticism.evaluation import evaluate  # noqa: PLC0415  slow to import
+        with reading_beside(store, measured) as decimated:
+            from labctl.services.criticism.evaluation import evaluate  # noqa: PLC0415  slow to import
 
-        return evaluate(store, row, measured, competing)
+            return evaluate(store, row, measured, competing, decimated)
 
     question = {
         "serial": row.serial, "version": row.version, "calibration": content_digest(row), "model": row.answer["model"],

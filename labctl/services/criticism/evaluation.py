@@ -14,6 +14,7 @@ from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.inversion import NotConverged
 from labctl.json_types.criticism import Experiment
 from labctl.progress import report_stage
+from labctl.services.criticism.decimated_readings import Decimated
 from labctl.services.criticism.measurements import Measurements
 from labctl.services.criticism.report_text import answer_of, with_warnings
 from labctl.services.criticism.residuals import residual_columns
@@ -25,13 +26,17 @@ from labctl.store import CalibrationRecord, RecordingRow, Store
 
 
 def evaluate(
-    store: Store, calibration: CalibrationRecord, recordings: tuple[RecordingRow, ...], competing: Sequence[Formula]
+    store: Store,
+    calibration: CalibrationRecord,
+    recordings: tuple[RecordingRow, ...],
+    competing: Sequence[Formula],
+    decimated: Decimated | None = None,
 ) -> tuple[CriticismResponse, ResidualsResponse]:
     """Return the criticism of a version against recordings, and its residuals. Raises BadInput, NotEnoughData.
 
-    `competing` formulas are added to the catalogue.
+    `competing` formulas are added to the catalogue. `decimated` gives readings that are being read already.
     """
-    catalogue, measured = catalogue_with(competing), Measurements(store, recordings)
+    catalogue, measured = catalogue_with(competing), Measurements(store, recordings, decimated)
     report_stage("inspecting the recording")
     warnings = measured.warnings
     try:

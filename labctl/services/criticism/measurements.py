@@ -9,16 +9,16 @@ from functools import cached_property
 import numpy as np
 
 from labctl.errors import BadInput
-from labctl.fitting.criticism import decimate
 from labctl.fitting.data.covered import Covered
 from labctl.fitting.data.fit_data import refuse_poses
 from labctl.fitting.data.joined import joined_coverage, joined_recording
 from labctl.progress import report_stage
 from labctl.recording import Recording
 from labctl.recording.output_steps import per_reading, quantisation_of
+from labctl.services.criticism.decimated_readings import Decimated, decimated_columns_of, is_decimated
 from labctl.services.recordings.coverage import covered_of
 from labctl.services.recordings.inspection import inspect_stored
-from labctl.services.recordings.loading import is_profile, motion_of, points_of, readings_question, source_of
+from labctl.services.recordings.loading import motion_of, points_of, readings_question, source_of
 from labctl.services.schemas.warnings import DataWarning, RecordingInspection
 from labctl.store import RecordingRow, Store
 
@@ -29,6 +29,7 @@ class Measurements:
 
     store: Store
     rows: tuple[RecordingRow, ...]  #: by number, rising
+    decimated: Decimated | None = None  #: gives readings that are being read beside this process
 
     @property
     def row(self) -> RecordingRow:
@@ -99,7 +100,7 @@ class Measurements:
         """The readings at no more than criticism needs; the means where there are no readings. Raises BadInput."""
         report_stage("reading the recording" if len(self.rows) == 1 else f"reading {self.named}")
         return joined_recording(
-            {row.id: load_reduced_readings(self.store, row, self.of_each[row.id]) for row in self.rows}
+            {row.id: load_reduced_readings(self.store, row, self.of_each[row.id], self.decimated) for row in self.rows}
         )
 
     def question(self) -> dict[str, object]:
@@ -113,24 +114,23 @@ def recordings_text(recordings: tuple[int, ...]) -> str:
     return f"recordings {', '.join(first)} and {last}" if first else f"recording {last}"
 
 
-def load_reduced_readings(store: Store, row: RecordingRow, points: Recording) -> Recording:
+def load_reduced_readings(store: Store, row: RecordingRow, points: Recording, decimated: Decimated | None) -> Recording:
     """Return a recording's readings, decimated data set by data set; `points`, its means, where it has none.
 
-    Raises BadInput for a table of coefficients, which holds no measurement.
+    `decimated` gives them where they are read already. Raises BadInput for a table of coefficients, which holds no
+    measurement.
     """
     if row.kind == "coefficients":
         raise BadInput(
             f"recording {row.id} is a table of coefficients: a model is compared with readings or means; name a "
             "recording of these"
         )
-    # turns are integrals over all readings, and of a rate that changes decimated readings are those of another
-    if row.kind != "samples" or points.info.motion == "turns" or is_profile(row):
+    if row.kind == "samples":
+        refuse_poses(points.info)
+    if not is_decimated(row):
         return points
-    refuse_poses(points.info)
-    info = points.info.model_copy(update={"kind": "samples"})
-    parts = [decimate(Recording(info, columns, None)).columns for _, columns in store.recordings.iter_datasets(row.id)]
-    columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    columns = dict(decimated_columns_of(store, row) if decimated is None else decimated(row))
     for name, values in quantisation_of(points).items():  # decimated readings do not show their steps any more
         numbers = np.asarray(points.columns["dataset"], dtype=np.int64)
         columns[name] = per_reading(np.asarray(columns["dataset"], dtype=np.int64), numbers, values)
-    return Recording(info, columns, points.environment)
+    return Recording(points.info.model_copy(update={"kind": "samples"}), columns, points.environment)

@@ -9,10 +9,11 @@ import numpy as np
 
 from labctl.fitting import FitResult
 from labctl.fitting.criticism import ReducedRecording, Residuals
-from labctl.fitting.data.channels import OWN_DATASET, RECORDING, Channels
+from labctl.fitting.data.channels import Channels
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.numeric.arrays import Array, over
 from labctl.recording import Recording
+from labctl.recording.columns import OWN_DATASET, RECORDING
 from labctl.services.schemas.criticism import ResidualColumns
 
 

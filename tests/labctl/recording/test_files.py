@@ -11,7 +11,7 @@ import pytest
 
 from labctl.errors import BadRecording
 from labctl.recording import Recording, RecordingInfo, read_recording, to_points, write_recording
-from labctl.recording.constant_rate import rate_change
+from labctl.recording.motions.constant_rate import rate_change
 
 HEAD = """format = "labctl-recording/1"
 serial = "G-1"

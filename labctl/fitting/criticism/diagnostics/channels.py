@@ -12,10 +12,10 @@ from labctl.fitting.criticism.channel_functions import smooth_channels
 from labctl.fitting.criticism.diagnostics.axis import BAND, AxisView
 from labctl.fitting.criticism.diagnostics.thinning import drawn_rows
 from labctl.fitting.criticism.reduction import ReducedRecording
-from labctl.fitting.data.channels import OWN_DATASET, RECORDING
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.json_numbers import plain, plain_list
 from labctl.json_types.views import ChannelLine, DataSetColumns, MeanLine, PreviousRateLine, TimeLine
+from labctl.recording.columns import OWN_DATASET, RECORDING
 
 #: Points of a running mean, and how many levels of a channel are still shown one by one.
 POINTS = 24

@@ -10,9 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.fitting.criticism.reduction import LEAST_INDEPENDENT_SHARE, OUTLIER, STEP_LINES, decimate
+from labctl.fitting.criticism.reduction import LEAST_INDEPENDENT_SHARE, OUTLIER, STEP_LINES
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording
+from labctl.recording.decimation import decimate
 from labctl.recording.points import dataset_starts
 
 #: At most this many readings of a data set are used, from its beginning.

@@ -6,7 +6,6 @@ could use. Slow regressors are evaluated at a few nodes per data set and brought
 """
 
 from labctl.fitting.criticism.reduction.basis import LEAST_INDEPENDENT_SHARE, STEP_LINES
-from labctl.fitting.criticism.reduction.decimation import decimate
 from labctl.fitting.criticism.reduction.outliers import OUTLIER
 from labctl.fitting.criticism.reduction.points import reduce_points
 from labctl.fitting.criticism.reduction.profile import reduce_profile
@@ -15,7 +14,7 @@ from labctl.fitting.criticism.reduction.samples import reduce_samples
 from labctl.fitting.data.temperature.channel import with_temperature
 from labctl.recording import Recording
 
-__all__ = ["LEAST_INDEPENDENT_SHARE", "OUTLIER", "STEP_LINES", "ReducedRecording", "decimate", "reduce_recording"]
+__all__ = ["LEAST_INDEPENDENT_SHARE", "OUTLIER", "STEP_LINES", "ReducedRecording", "reduce_recording"]
 
 
 def reduce_recording(recording: Recording, *, outliers: bool = True) -> ReducedRecording:

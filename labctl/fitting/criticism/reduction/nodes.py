@@ -7,14 +7,15 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.fitting.criticism.reduction.decimation import FASTEST_HZ
 from labctl.fitting.criticism.reduction.rectangular import Padded
-from labctl.fitting.data.channels import OWN_DATASET, RECORDING, Channels, body_rates
+from labctl.fitting.data.channels import Channels, body_rates
 from labctl.fitting.data.earth import up_rate_dps
 from labctl.fitting.data.temperature.channel import with_stand_in
 from labctl.fitting.data.temperature.history import history_of
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording
+from labctl.recording.columns import OWN_DATASET, RECORDING
+from labctl.recording.decimation import FASTEST_HZ
 
 #: Nodes per data set, at most.
 NODES = 12

@@ -7,13 +7,13 @@ from collections.abc import Mapping
 import numpy as np
 
 from labctl.fitting.criticism.reduction.basis import WAVES, orthonormal_basis
-from labctl.fitting.criticism.reduction.decimation import FASTEST_HZ, decimated_columns
 from labctl.fitting.criticism.reduction.nodes import nodes_of
 from labctl.fitting.criticism.reduction.outliers import inlier_mask, white_level_dps
 from labctl.fitting.criticism.reduction.rectangular import pad, piece_labels
 from labctl.fitting.criticism.reduction.reduced_recording import ReducedRecording
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording
+from labctl.recording.decimation import FASTEST_HZ, decimated_columns
 from labctl.recording.output_steps import with_quantisation
 from labctl.recording.quantisation import QUANTISATION
 

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from labctl.services.calibrations.fitting import fit_unit
+from labctl.services.computation import forked
 from labctl.services.criticism.criticise import criticise_unit
 from labctl.services.schemas.calibrations import FitRequest
 from labctl.store import open_store
@@ -37,6 +38,7 @@ def test_a_criticism_reads_its_recording_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int | None
 ) -> None:
     """With experiments for what cannot be distinguished, which need the recording's campaign too."""
+    monkeypatch.setattr(forked, "can_fork", lambda: False)  # what a fork reads is not counted here
     calls: Counter[str] = Counter()
     with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
         store.recordings.add_import(single_axis(5, earth_rate_tilt=0.0012), AT)
@@ -46,3 +48,19 @@ def test_a_criticism_reads_its_recording_once(
         answer = criticise_unit(store, "FOG-0001", 1, number)
     assert answer.verdict == "ambiguous"
     assert calls == {"_heads": 1, "points": 1, "iter_datasets": 1}
+
+
+def test_readings_that_a_fork_has_read_give_the_same_criticism(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    answers = []
+    with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
+        store.recordings.add_import(single_axis(5, earth_rate_tilt=0.0012), AT)
+        fit_unit(store, "FOG-0001", FitRequest(model="ojeda2000"), AT)
+        for forks in (False, True):
+            calls: Counter[str] = Counter()
+            monkeypatch.setattr(forked, "can_fork", lambda forks=forks: forks)
+            monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / str(forks)))
+            with monkeypatch.context() as counting:
+                counting.setattr(Recordings, "iter_datasets", counted("iter_datasets", calls))
+                answers.append(criticise_unit(store, "FOG-0001", 1, None))
+            assert calls["iter_datasets"] == (1 if forks else 2)  # the inspection of the data reads them too
+    assert answers[0] == answers[1]

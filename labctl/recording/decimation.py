@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.fitting.data.channels import OWN_DATASET, RECORDING
 from labctl.recording import Recording
+from labctl.recording.columns import OWN_DATASET, RECORDING
 from labctl.recording.points import dataset_starts
 
 #: Faster readings are averaged down to this many per second.
