@@ -9,7 +9,7 @@ import numpy as np
 
 from labctl.recording import Columns, Recording, RecordingInfo
 from labctl.recording.decimation import decimate
-from labctl.services.computation.forked import Forked
+from labctl.services.forked import Forked
 from labctl.services.recordings.loading import is_profile, motion_of
 from labctl.store import RecordingRow, Store, open_store
 

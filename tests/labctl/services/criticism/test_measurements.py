@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
+from labctl.services import forked
 from labctl.services.calibrations.fitting import fit_unit
-from labctl.services.computation import forked
 from labctl.services.criticism.criticise import criticise_unit
 from labctl.services.schemas.calibrations import FitRequest
 from labctl.store import open_store

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from labctl.errors import BadInput
-from labctl.services.computation import forked
-from labctl.services.computation.forked import Forked, can_fork
+from labctl.services import forked
+from labctl.services.forked import Forked, can_fork
 
 
 @pytest.fixture(params=[False, True], ids=["here", "in a fork"])
