@@ -124,7 +124,7 @@ def _worse(found: Sequence[Compared], peers: Sequence[Peer]) -> Iterator[str]:
     yield "## Where labctl is worse, or disagrees"
     lines = [
         f"- {each.recording.name}, {row.quantity}: {figures(row.labctl)} by labctl, {figures(row.independent)} by the "
-        + "independent analysis"
+        "independent analysis"
         + (f" (difference {row.difference:.1f} u)." if row.agreement == "no" else ": labctl is worse.")
         for each in found
         for row in each.rows

@@ -52,8 +52,8 @@ def _in(store: Store, readings: Recording, of: str) -> Findings:
     after = better.error
     again = criticise_unit(store, serial, None, None)
     found.story.append(
-        f"With {added} added, the RMS error is {_said(after.rms_dps)} deg/s, and {_said(after.heldout_rms_dps)} deg/s at "
-        f"temperatures left out of the fit. The criticism of this model reports: {' '.join(again.text)}"
+        f"With {added} added, the RMS error is {_said(after.rms_dps)} deg/s, and {_said(after.heldout_rms_dps)} deg/s "
+        f"at temperatures left out of the fit. The criticism of this model reports: {' '.join(again.text)}"
     )
     found.values += [
         Value("improved", of, after.rms_dps, f"{added}, as criticism named it"),
