@@ -16,13 +16,14 @@ from labctl.services.reproduction.sources import Measured, Rest, shipped, simula
 
 OSU = (
     "OSU-FOG-2024 is a real fibre-optic gyro of another maker, measured on a stepper table and heated from 37 to 49 "
-    "deg C. Its recording ships with labctl; it contains means at constant rates, so there are no readings at rest."
+    "deg C. The recording of this gyro ships with labctl; the recording contains means at constant rates, but no "
+    "readings at rest."
 )
 RD2100 = (
     "RD2100 is a simulated unit like that of the paper, read at 10 Hz with the recipe ojeda2000 (21 rates, 25 to 45 "
-    "deg C). Its error is nearly a polynomial of the same orders as the fitted surface. The ratios of its errors "
-    "before and after correction therefore depend only on the noise; the ratios of the real gyro show how well the "
-    "method works."
+    "deg C). The error of the simulated unit is nearly a polynomial of the same orders as the fitted surface. The "
+    "ratio of its errors before and after correction therefore depends only on the noise; the ratio for the real "
+    "gyro shows how well the method works."
 )
 RECORD = "labctl campaign start ojeda2000: the rates +-100 deg/s every 10 at 25 to 45 deg C every 2"
 

@@ -23,10 +23,10 @@ TABLE = (
     "ships with labctl."
 )
 SIMULATED = (
-    "ENV-05S is a simulated unit like that of the report, measured at 13 rates. The report does not state its "
-    "deviation from the nominal values, the curve of its offset over temperature and its self-heating, so labctl's "
-    "values (3 K for the self-heating) are assumptions. The chamber is 3 K colder, so that the unit has the "
-    "temperatures of the report."
+    "ENV-05S is a simulated unit like that of the report, measured at 13 rates. The report does not state the "
+    "unit's deviation from the nominal values, the curve of its offset over temperature and its self-heating, so "
+    "labctl's values (3 K for the self-heating) are assumptions. The chamber is simulated 3 K colder, so that the "
+    "unit has the temperatures of the report."
 )
 AT_REST = (
     "The drift is computed from 22 min at rest at 23 deg C from power-on. These commands compute the same drift: "
