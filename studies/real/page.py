@@ -29,9 +29,9 @@ readings, so an error of the readings is not visible in the difference. *Agreeme
 at most 2 u; for error figures it is *same* if the two differ by at most 5 %."""
 NOTES = """\
 - The choice of the quiet sections that count as rests changes elements of the matrix. Neither labctl's uncertainty
-  nor that of the independent analysis includes the effect of this choice. If the independent analysis of mpu9150-2 uses the rests that
-  labctl finds, it gives 7.5 +- 1.6 for the element that disagrees (labctl 7.9 +- 2.4, published 8.4). One more
-  rest of 1.7 s changes an element of mpu9150-1 by 2 in 1e-3.
+  nor that of the independent analysis includes the effect of this choice. If the independent analysis of
+  mpu9150-2 uses the rests that labctl finds, it gives 7.5 +- 1.6 for the element that disagrees (labctl 7.9 +- 2.4,
+  published 8.4). One more rest of 1.7 s changes an element of mpu9150-1 by 2 in 1e-3.
 - At rest labctl's U is 1.5 to 6 times that of the independent analysis. labctl treats slow variations of the
   output as drift that lasts for minutes; the independent analysis assumes that sections of 2 min, or bursts, are
   independent. These data cannot show which assumption is right.
