@@ -16,34 +16,36 @@ DISTRIBUTIONS = ("numpy", "scipy", "imucal", "allantools")
 HEAD = """\
 # Real gyros
 
-Every public recording that labctl may carry, what labctl says of it, and an independent analysis beside it. The
-tables are printed by `python -m studies real`; `python -m studies.real.write` writes this page. The files are
-in `examples/published`, where README.md names authors and licences.
-labctl is asked on its command line, as in [from a file to a
-calibration](../how-to/from-a-file-to-a-calibration.md). The independent analyses, `studies/real/independent`,
-import numpy and scipy only and have formulas of their own.
+This page shows how good the results of labctl are on real data. labctl fits and criticises every public recording
+of a real gyro that it may include, and an independent analysis computes the same quantities. `python -m studies
+real` prints the tables; `python -m studies.real.write` writes this page. The recordings are in
+`examples/published`; README.md there names the authors and licences. labctl was used by its commands, as in [from
+a file to a calibration](../how-to/from-a-file-to-a-calibration.md). The independent analyses
+(`studies/real/independent`) import only numpy and scipy and have formulas of their own.
 
-Values are value +- U (k = 2); where no U stands, an analysis states none. *Difference* is labctl's value minus
-the other in labctl's standard uncertainties. Both come from the same readings, so an error of the data shows in
-neither. Agreement: *yes* within 2 u; of errors *same* within 5 %."""
+Values are value +- U (k = 2); where U is missing, the analysis does not state it. *Difference* is labctl's value
+minus that of the independent analysis, divided by labctl's standard uncertainty u. Both analyses use the same
+readings, so an error of the readings is not visible in the difference. *Agreement* is *yes* if the difference is
+at most 2 u; for error figures it is *same* if the two differ by at most 5 %."""
 NOTES = """\
-- Which quiet stretches of a session count as rests moves elements of the matrix, and is in no uncertainty,
-  neither labctl's nor the other's: with the rests that labctl finds, the independent analysis of mpu9150-2 has
-  7.5 +- 1.6 in the place of the element that disagrees (labctl 7.9 +- 2.4, published 8.4), and one more rest of
-  1.7 s changes an element of mpu9150-1 by 2 in 1e-3.
-- At rest labctl's U is 1.5 to 6 times that of the independent analysis: it takes slow wandering for drift that
-  lasts for minutes, the other takes stretches of 2 min, or bursts, for independent. These data do not tell
-  which is right.
-- Where the autopilots' cubic has less error than labctl's parabola, the bias is no parabola by more than the
-  criticism finds significant: `labctl fit PAN-2020 --effects bias,bias_temperature:3` leaves 0.0069 deg/s in
-  the place of 0.0073.
-- In poses no criticism is possible, and of sessions with one turn about each axis neither a criticism nor a
-  held-out error."""
+- The choice of the quiet sections that count as rests changes elements of the matrix. Neither labctl's uncertainty
+  nor that of the independent analysis includes the effect of this choice. If the independent analysis of
+  mpu9150-2 uses the rests that labctl finds, it gives 7.5 +- 1.6 for the element that disagrees (labctl 7.9 +- 2.4,
+  published 8.4). One more rest of 1.7 s changes an element of mpu9150-1 by 2 in 1e-3.
+- At rest labctl's U is 1.5 to 6 times that of the independent analysis. labctl treats slow variations of the
+  output as drift that lasts for minutes; the independent analysis assumes that sections of 2 min, or bursts, are
+  independent. These data cannot show which assumption is right.
+- Where the autopilots' cubic has less error than labctl's parabola, the bias differs from a parabola by less than
+  the criticism considers significant: `labctl fit PAN-2020 --effects bias,bias_temperature:3` gives a held-out
+  error of 0.0069 deg/s in place of 0.0073 deg/s.
+- For recordings in poses no criticism is possible. For recordings with one turn about each axis neither a
+  criticism nor a held-out error is possible."""
 THERMAL = """\
-The autopilots' formulas fit cubics to the samples (the same numbers as the programs' own functions, to 1e-11
-deg/s). Each eighth of the temperatures is left out in turn; the error is that of means over 17 s, or of bursts,
-all methods on the same ones. The coldest eighth of the warm-up spans 11 K, and a cubic that has not seen it
-strays. Simulated loops with a lag or a hysteresis, leg by leg, are in [fitting](fitting.md)."""
+The formulas of the autopilots PX4 and ArduPilot fit cubics in temperature to the samples (the results agree with
+those of the programs' own functions to 1e-11 deg/s). Each eighth of the temperature range is left out in turn. The
+error is that of means over 17 s, or of bursts, the same for all methods. The coldest eighth of the warm-up spans
+11 K, and a cubic that was fitted without it extrapolates badly. [Fitting](fitting.md) has results for simulated
+temperature loops with a lag or a hysteresis."""
 
 
 def tables() -> str:
@@ -121,13 +123,16 @@ def _peers(peers: Sequence[Peer]) -> Iterator[str]:
 def _worse(found: Sequence[Compared], peers: Sequence[Peer]) -> Iterator[str]:
     yield "## Where labctl is worse, or disagrees"
     lines = [
-        f"- {each.recording.name}, {row.quantity}: {figures(row.labctl)} beside {figures(row.independent)}"
-        + (f" ({row.difference:.1f} u)." if row.agreement == "no" else ": labctl worse.")
+        f"- {each.recording.name}, {row.quantity}: {figures(row.labctl)} by labctl, {figures(row.independent)} by the "
+        "independent analysis"
+        + (f" (difference {row.difference:.1f} u)." if row.agreement == "no" else ": labctl is worse.")
         for each in found
         for row in each.rows
         if row.agreement in {"no", "labctl worse"}
     ]
-    lines += [f"- {p.data}, {p.quantity}: {p.labctl} beside {p.theirs} ({p.peer})." for p in peers if "worse" in p.says]
+    lines += [
+        f"- {p.data}, {p.quantity}: {p.labctl} by labctl, {p.theirs} by {p.peer}." for p in peers if "worse" in p.says
+    ]
     yield "\n".join([*lines, NOTES])
 
 

@@ -33,8 +33,9 @@ def _in(store: Store, readings: Recording, of: str) -> Findings:
     answer = criticise_unit(store, serial, None, None)
     error = fitted.error
     stalled = (
-        f"The missing effect: yang2018 leaves {_said(error.rms_dps)} deg/s RMS of {_said(error.raw_rms_dps)}, but the "
-        f"noise floor is {_said(error.noise_floor_dps)} deg/s. The criticism of it: {' '.join(answer.text)}"
+        f"An effect is missing from the model yang2018: it reduces the RMS error from {_said(error.raw_rms_dps)} to "
+        f"{_said(error.rms_dps)} deg/s, but the noise floor is {_said(error.noise_floor_dps)} deg/s. The criticism of "
+        f"the model reports: {' '.join(answer.text)}"
     )
     found = Findings(
         story=[stalled],
@@ -51,8 +52,8 @@ def _in(store: Store, readings: Recording, of: str) -> Findings:
     after = better.error
     again = criticise_unit(store, serial, None, None)
     found.story.append(
-        f"With {added} the model leaves {_said(after.rms_dps)} deg/s RMS, and {_said(after.heldout_rms_dps)} deg/s at "
-        f"temperatures left out of the fit. The criticism of that: {' '.join(again.text)}"
+        f"With {added} added, the RMS error is {_said(after.rms_dps)} deg/s, and {_said(after.heldout_rms_dps)} deg/s "
+        f"at temperatures left out of the fit. The criticism of this model reports: {' '.join(again.text)}"
     )
     found.values += [
         Value("improved", of, after.rms_dps, f"{added}, as criticism named it"),

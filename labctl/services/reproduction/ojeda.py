@@ -15,13 +15,15 @@ from labctl.services.reproduction.ojeda_surface import Surface, surface_of
 from labctl.services.reproduction.sources import Measured, Rest, shipped, simulated
 
 OSU = (
-    "OSU-FOG-2024 is a real fibre-optic gyro of another maker on a stepper table, heated from 37 to 49 deg C; shipped "
-    "with labctl as dwell means, so without readings at rest."
+    "OSU-FOG-2024 is a real fibre-optic gyro of another maker, measured on a stepper table and heated from 37 to 49 "
+    "deg C. The recording of this gyro ships with labctl; the recording contains means at constant rates, but no "
+    "readings at rest."
 )
 RD2100 = (
-    "RD2100 is a simulated unit like the paper's, read at 10 Hz by recipe ojeda2000: 21 rates, 25 to 45 deg C. Its "
-    "error is nearly a polynomial of the surface's own orders, so its ratios say how low the noise is; those of the "
-    "real gyro say what the method does."
+    "RD2100 is a simulated unit like that of the paper, read at 10 Hz with the recipe ojeda2000 (21 rates, 25 to 45 "
+    "deg C). The error of the simulated unit is nearly a polynomial of the same orders as the fitted surface. The "
+    "ratio of its errors before and after correction therefore depends only on the noise; the ratio for the real "
+    "gyro shows how well the method works."
 )
 RECORD = "labctl campaign start ojeda2000: the rates +-100 deg/s every 10 at 25 to 45 deg C every 2"
 
@@ -62,7 +64,7 @@ def _of(measured: Measured, axis: str | None) -> Findings:
         found.missing.append(
             Missing(
                 f"Figure 1 and eqs. 1 and 15 of {measured.name}",
-                "the recording holds means of data sets, or no readings at rest",
+                "the recording contains means of data sets, or no readings at rest",
                 "readings of one data set at rate 0, 10 s or more",
             )
         )

@@ -18,15 +18,20 @@ from labctl.services.reproduction.sources import Measured, measured_from, shippe
 from labctl.services.schemas.recordings import OrientationResponse
 
 BENCH = "gyrostar-sim"
-TABLE = "WEISS-ENV05S is the report's own table, shipped with labctl as coefficients: no readings were published."
+TABLE = (
+    "WEISS-ENV05S is the table of coefficients that the report prints; the report contains no readings. The table "
+    "ships with labctl."
+)
 SIMULATED = (
-    "ENV-05S is a simulated unit like the report's, measured at 13 rates; its lot, its curve of the offset and its "
-    "self-heating by 3 K are labctl's choice. Chamber temperatures are 3 K lower, so that the unit has the report's."
+    "ENV-05S is a simulated unit like that of the report, measured at 13 rates. The report does not state the "
+    "unit's deviation from the nominal values, the curve of its offset over temperature and its self-heating, so "
+    "labctl's values (3 K for the self-heating) are assumptions. The chamber is simulated 3 K colder, so that the "
+    "unit has the temperatures of the report."
 )
 AT_REST = (
-    "The drift is that of 22 min at rest at 23 deg C from power-on, which `labctl orientation` follows too: "
-    "labctl simulate gyrostar-at-rest --bench gyrostar-sim --out rest; labctl import rest; "
-    "labctl orientation GYROSTAR-0001 --version 0 --warm-up-s 600 --stop-every-s 120."
+    "The drift is computed from 22 min at rest at 23 deg C from power-on. These commands compute the same drift: "
+    "labctl simulate gyrostar-at-rest --bench gyrostar-sim --out rest; labctl import rest; labctl orientation "
+    "GYROSTAR-0001 --version 0 --warm-up-s 600 --stop-every-s 120."
 )
 OPTIONS = OrientationOptions(warm_up_s=paper.WARM_UP_S, stop_every_s=paper.STOP_EVERY_S)
 RECORD_TABLE = "rates of both signs at the report's temperatures: labctl campaign start gyrostar"

@@ -15,13 +15,14 @@ from labctl.services.reproduction.yang_errors import Judged, at_shown, left_out_
 BENCH, RECIPE, BETWEEN = "yang-paper-sim", "yang-23-rates", "yang-between"
 UNIT = "YANG-2018, simulated"
 WHAT = (
-    "YANG-2018 is a simulated unit with the paper's printed K and B at 25 deg C, and a soft limit that leaves the "
-    "printed own-axis remainder. How K and B change with temperature is not printed in numbers: labctl's choice."
+    "YANG-2018 is a simulated unit with the paper's printed matrix K and bias B at 25 deg C, and a nonlinearity (a "
+    "soft limit of the output) of such a size that the remaining error of each axis is the printed one. The paper "
+    "does not print numbers for the change of K and B with temperature, so labctl's values are an assumption."
 )
 HOW = (
-    "Calibration: recipe yang-23-rates (the ten temperatures of Table 1, Table 2 and +-350 deg/s, three positions). "
-    "Errors are those of a second campaign, recipe yang-between, at nine temperatures half-way between, which no fit "
-    "has seen; 25 deg C is one of them."
+    "The unit is calibrated with the recipe yang-23-rates (the ten temperatures of Table 1, the rates of Table 2 "
+    "and +-350 deg/s, three positions). The errors are those of a second campaign, with the recipe yang-between, at "
+    "nine temperatures half-way between these, which were not used in the fit; one of them is 25 deg C."
 )
 #: Readings per second: the noise of a data-set mean is that of 125, and the page is made sooner.
 RATE_HZ = 4.0
