@@ -22,7 +22,8 @@ def refuses_a_rate_beyond_its_limit(stand: Stand) -> None:
         require(not stand.driver.is_moving(), "the table moves after a rate beyond its limit was refused")
         return
     raise Failed(
-        f"spin({1.01 * limit_dps:g}) is beyond max_rate_dps = {limit_dps:g}; raise LimitError before a byte is sent"
+        f"spin({1.01 * limit_dps:g}) was accepted, but {1.01 * limit_dps:g} deg/s is beyond max_rate_dps = "
+        f"{limit_dps:g} deg/s; raise LimitError before a byte is sent"
     )
 
 
@@ -54,7 +55,10 @@ def refuses_a_set_point_beyond_its_limits(stand: Stand) -> None:
             stand.driver.set_temperature_c(wrong_c)
         except LimitError:
             continue
-        raise Failed(f"set_temperature_c({wrong_c:g}) is beyond the limits; raise LimitError before a byte is sent")
+        raise Failed(
+            f"set_temperature_c({wrong_c:g}) was accepted, but {wrong_c:g} deg C is beyond the limits "
+            "of the driver; raise LimitError before a byte is sent"
+        )
     now_c = stand.driver.read().setpoint_c
     require(now_c == before_c, f"the set point is {now_c:g} deg C after refusals, and was {before_c:g}")
 

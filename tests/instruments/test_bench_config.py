@@ -31,7 +31,7 @@ def test_two_units_may_share_a_bench() -> None:
 @pytest.mark.parametrize("what", ["name", "serial", "port"])
 def test_two_units_are_never_taken_for_one(what: str) -> None:
     same = two_units()["gyros"][0][what]
-    with pytest.raises(ValidationError, match=f"two gyros have the {what} '{same}'; each needs its own"):
+    with pytest.raises(ValidationError, match=f"two gyros have the {what} '{same}'; give each gyro a different one"):
         BenchFile.model_validate(two_units(**{what: same}))
 
 

@@ -53,7 +53,8 @@ class Acutrol3000:
         text = self._link.ask(acl.IDENTIFY)
         if not any(word in text.lower() for word in acl.IDENTITY):
             raise WrongInstrument(
-                self.name, f"{self._link.url} answered {text!r}, not an ACUTROL 3000; check the address"
+                self.name,
+                f"{self._link.url} answered {text!r}, which is not the answer of an ACUTROL 3000; check the address",
             )
         checks.check_factory_limits(self.name, self.settings, self._numbers(f":Limit:Absolute? {self._axis}", 2))
         return text
@@ -192,8 +193,8 @@ class Acutrol3000:
             if not math.isclose(found, wanted, rel_tol=1e-4):
                 raise RequestRejected(
                     self.name,
-                    f"limits {name.lower()} to {found:g} where {wanted:g} was set; correct max_rate_dps and "
-                    "acceleration_dps2 in the bench file by :Limit:Absolute?",
+                    f"limits the {name.lower()} to {found:g}, but labctl set {wanted:g}; query :Limit:Absolute? "
+                    "of the controller, then correct max_rate_dps and acceleration_dps2 in the bench file",
                 )
 
     def _await_rate(self, rate_dps: float, deadline_s: float) -> None:
@@ -212,7 +213,7 @@ class Acutrol3000:
         deadline_s = self._clock.now_s() + self._tolerated_s(self._ramp_s(self.settings.max_rate_dps))
         while self.is_moving():
             if self._clock.now_s() > deadline_s:
-                raise NoReply(self.name, "the table still turns after Off; use its stop switch")
+                raise NoReply(self.name, "the table still turns after the command Off; press its stop switch")
             self._clock.sleep(POLL_S)
 
     def _demand_time(self, deadline_s: float, what: str) -> None:

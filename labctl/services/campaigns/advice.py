@@ -80,7 +80,7 @@ FAILURES: tuple[Failure, ...] = (
         f"Check that the chamber heats and cools and that its door is closed, {RESUME}.",
     ),
     Failure(
-        r"set point .* read back",
+        r"set point .* (?:read back|was written, but)",
         "The chamber did not accept the set point that labctl sent.",
         f"Check the controller's panel for a profile, a lock or a limit, {RESUME}.",
     ),
@@ -115,7 +115,7 @@ FAILURES: tuple[Failure, ...] = (
         f"Check the unit's power, cable and baud rate, {RESUME}.",
     ),
     Failure(
-        r"nothing heard|no answer|gave no answer|no intact |no whole line|does not answer|link .* broke|"
+        r"nothing heard|no answer|gave no (?:complete )?answer|no intact |no whole line|does not answer|link .* broke|"
         r"cannot be opened|no Modbus TCP|reply belongs to another request|not reached again|"
         r"link is gone|came that are no reply|answered instead of unit|reply to request|line was never silent|"
         r"no Modbus instrument|, no Modbus;",
@@ -123,7 +123,8 @@ FAILURES: tuple[Failure, ...] = (
         f"Check the instrument's power and cable, run `labctl bench check`, {RESUME}.",
     ),
     Failure(
-        r"check address and driver|not a C4|, serial |is set otherwise|readings/s on |has serial number|on USB adapter",
+        r"check (?:the )?address(?: and|, or the) driver|not a C4|not the answer of a C4|, serial |is set otherwise|"
+        r"is not configured as|readings/s on |has serial number|on USB adapter",
         "The instrument that answered is not the instrument in the bench file.",
         f"Compare the bench file with the bench, {RESUME}.",
     ),

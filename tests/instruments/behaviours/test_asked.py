@@ -195,7 +195,7 @@ def of_table() -> list[Behaviour]:
         Behaviour(C4, "refuses everything", faults=lambda faults: faults.arm("refusal"), says=(
             WrongInstrument, other.format("'e'"))),
         Behaviour(C4, "refuses a move", RefusesMoves, (
-            RequestRejected, r"answered 'e' where 'a' was expected, so it did not .*; home the table")),
+            RequestRejected, r"answered 'e' instead of 'a', so it did not .*; home the table")),
         Behaviour(C4, "unplugged (EIO)", lambda wire: Unplugged(wire, errno.EIO), (
             LinkError, r"the link sim://arrick broke \(\[Errno 5\] Input/output error\); check the cable, then")),
         Behaviour(C4, "unplugged during a run", lambda wire: Unplugged(wire, errno.EIO, 4.0), (

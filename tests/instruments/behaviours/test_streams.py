@@ -191,7 +191,9 @@ def of_each(driver: str) -> list[Behaviour]:
     ]  # fmt: skip
 
 
-SET_OTHERWISE = r"the unit on sim://\S+ is set otherwise than needed: {}.*; set the unit in its service mode"
+SET_OTHERWISE = (
+    r"the unit on sim://\S+ is not configured as the bench file requires:  {}.*; configure the unit in its service mode"
+)
 STANDS = (
     MalformedReply,
     r"the counter on sim://\S+ stands at \d+ in \d+ readings in a row; check that the counter's field is the right",

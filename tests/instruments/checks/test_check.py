@@ -29,9 +29,9 @@ EXPECTED = {
     "that are there",
     "held": "port {0} cannot be opened (Resource temporarily unavailable); check which other process has it open: run "
     "`fuser -v {0}`, and end that one",
-    "angle": "the unit on {0} is set otherwise than needed: gyro output unit INCREMENTAL ANGLE in deg, needed ANGULAR "
-    "RATE or "
-    "AVERAGE ANGULAR RATE; set the unit in its service mode (commands u, m, d) or correct the bench file",
+    "angle": "the unit on {0} is not configured as the bench file requires: gyro output unit INCREMENTAL ANGLE in "
+    "deg, needed ANGULAR RATE or "
+    "AVERAGE ANGULAR RATE; configure the unit in its service mode (commands u, m, d), or correct the bench file",
     "moved": "port {0} is on USB adapter B2, bench file or campaign says A1; two adapters may have changed places: "
     "give the "
     "port's path in /dev/serial/by-id",

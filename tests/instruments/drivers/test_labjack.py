@@ -182,15 +182,19 @@ def test_codes_at_the_rails_are_not_valid(labjack: Callable[..., Any]) -> None:
 def test_another_device_and_another_rate_are_refused(labjack: Callable[..., Any]) -> None:
     s = labjack()
     s.registers.product = 9.0
-    with pytest.raises(WrongInstrument, match=r"fog: sim://labjack-t7/fog is product 9, no LabJack T4 or T7"):
+    with pytest.raises(
+        WrongInstrument, match=r"fog: sim://labjack-t7/fog reports product number 9, which is not a LabJack T4 or T7"
+    ):
         s.gyro.identify()
     other = labjack()
     other.registers._cells[lj.SCAN_RATE.number] = float32("big", lambda _: 980.0, lambda _value, _t_s: True)
-    with pytest.raises(WrongInstrument, match=r"scans 980 times per second, bench file 1000; set sample_rate_hz = 980"):
+    with pytest.raises(
+        WrongInstrument, match=r"scans 980 times per second, but the bench file states 1000; set sample_rate_hz = 980"
+    ):
         other.gyro.start()
     bent = labjack()
     bent.registers.constants[1] *= 1.001
-    with pytest.raises(WrongInstrument, match="differ by 1000 ppm, limit 20 ppm; check its calibration"):
+    with pytest.raises(WrongInstrument, match="differ by 1000 ppm, limit 20 ppm; check the calibration"):
         bent.gyro.identify()
 
 

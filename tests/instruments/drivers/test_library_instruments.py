@@ -186,7 +186,7 @@ def test_instruments_of_msl_equipment(monkeypatch: pytest.MonkeyPatch) -> None:
     driver.close()
     properties = {"manufacturer": "OMEGA", "model": "iTHX-W3", "serial": "4440", "timeout": 2}
     assert asked == [("TCP::192.168.1.100::2000", properties), "disconnected"]
-    with pytest.raises(WrongInstrument, match="names serial number '4441'"):
+    with pytest.raises(WrongInstrument, match="gives serial number '4441'"):
         reference(**settings | {"serial": "4441"}).identify()
 
 

@@ -48,9 +48,13 @@ def test_a_unit_that_is_set_otherwise_is_refused(stand: Make, device: dict[str, 
     s = unit(stand, device)
     with pytest.raises(WrongInstrument) as refused:
         s.gyro.identify()
-    assert str(refused.value).startswith("mems: the unit on sim://stim300/mems is set otherwise than needed: ")
+    assert str(refused.value).startswith(
+        "mems: the unit on sim://stim300/mems is not configured as the bench file requires:  "
+    )
     assert says in str(refused.value)
-    assert str(refused.value).endswith("set the unit in its service mode (commands u, m, d) or correct the bench file")
+    assert str(refused.value).endswith(
+        "configure the unit in its service mode (commands u, m, d), or correct the bench file"
+    )
 
 
 def test_average_rates_are_rates(stand: Make) -> None:

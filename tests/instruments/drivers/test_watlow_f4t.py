@@ -25,7 +25,7 @@ def test_it_says_what_it_is(f4t: Any) -> None:
 
 def test_another_part_number_is_another_instrument(f4t: Any) -> None:
     f4t.simulated.part_number[:3] = [ord(letter) for letter in "PM6"]
-    with pytest.raises(WrongInstrument, match="part number 'PM61A1A1A1A1A1A' is not an F4T's"):
+    with pytest.raises(WrongInstrument, match="part number 'PM61A1A1A1A1A1A' is not that of an F4T"):
         f4t.driver.identify()
 
 
@@ -69,7 +69,7 @@ def test_a_set_point_that_reads_back_otherwise_is_an_error(f4t: Any, monkeypatch
     f4t.simulated._cells[2782] = f4t.simulated._cells[2782].__class__(
         f4t.simulated._cells[2782].get, lambda _words, _t_s: True, words=2
     )
-    with pytest.raises(RequestRejected, match="40 deg C was written but 25 deg C read back"):
+    with pytest.raises(RequestRejected, match="40 deg C was written, but the controller reports 25 deg C"):
         f4t.driver.set_temperature_c(40.0)
 
 
