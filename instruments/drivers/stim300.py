@@ -209,7 +209,8 @@ class Stim300:
             return
         raise WrongInstrument(
             self.name,
-            f"the unit on {settings.port} has serial number {serial}, bench file or campaign says {wanted}; connect "
+            f"the unit on {settings.port} has serial number {serial}, but the bench file or the "
+            f"campaign names {wanted}; connect "
             "the "
             "right unit, or correct port, serial or own_serial",
         )

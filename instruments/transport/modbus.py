@@ -136,7 +136,8 @@ class Registers:
             advice = "check the sensor, the word order and that the bench file names the right driver"
         raise MalformedReply(
             self._link.device,
-            f"{register} reads {value:g} {register.unit}, possible are {register.low:g} to {register.high:g}; {advice}",
+            f"{register} reads {value:g} {register.unit}, outside the possible range of {register.low:g} to "
+            f"{register.high:g}; {advice}",
         )
 
     def _check_writable(self, register: Register, value: float) -> None:

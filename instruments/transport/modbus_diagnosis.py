@@ -56,4 +56,4 @@ def _other_unit(found: int, address: int) -> str:
 
 
 def _bytes(received: bytes, advice: str) -> str:
-    return f"{len(received)} bytes came that are no reply; {advice}"
+    return f"{len(received)} bytes arrived that are not a Modbus reply; {advice}"

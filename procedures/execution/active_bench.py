@@ -31,14 +31,19 @@ class ActiveBench:
     def table(self) -> RateTable:
         """The rate table, for steps that need one. Raises StepFailed."""
         if self.rate_table is None:
-            raise StepFailed("this bench has no rate table; name one that has, or choose a recipe with [turns]")
+            raise StepFailed(
+                "this bench has no rate table; name a bench that has one, or choose a recipe with "
+                "[turns] (turns by hand)"
+            )
         return self.rate_table
 
     @property
     def chamber(self) -> Chamber:
         """The chamber, for steps that need one. Raises StepFailed."""
         if self.air_chamber is None:
-            raise StepFailed("this bench has no chamber; name one that has, or choose a recipe with [turns]")
+            raise StepFailed(
+                "this bench has no chamber; name a bench that has one, or choose a recipe with [turns] (turns by hand)"
+            )
         return self.air_chamber
 
     @property

@@ -54,8 +54,8 @@ class EncoderLog:
             return None
         if len(self.readings) < LEAST:
             raise StepFailed(
-                f"{self._table.name}: its encoder was read {len(self.readings)} times during a data set, and a rate "
-                f"needs {LEAST}; take longer data sets, or check the link"
+                f"{self._table.name}: its encoder was read {len(self.readings)} times during a data set, but a "
+                f"mean rate needs {LEAST} angles; take longer data sets, or check the link"
             )
         t_s = np.array([one.t_s for one in self.readings])
         angle_deg = np.array([one.angle_deg for one in self.readings])

@@ -92,7 +92,8 @@ class Recipe(Table):
         if info.data.get("turns") is not None:
             if value != (() if listed else cls.model_fields[info.field_name or ""].default):
                 raise ValueError(
-                    "this key is for a table and a chamber, and a recipe with [turns] drives neither: remove the key"
+                    "this key is for a table or a chamber, but a recipe with [turns] (turns by hand) drives "
+                    "neither; remove the key"
                 )
         elif listed and "turns" in info.data and not value:
             raise PydanticCustomError("too_short", "Tuple should have at least 1 item after validation, not 0")

@@ -150,10 +150,10 @@ def test_a_simulated_gyro_whose_driver_has_no_profile_is_told_to_name_one(monkey
     record = read_bench("single-axis-sim").model_dump()
     (gyro,) = record["gyros"]
     gyro |= {"driver": "kvh-new", "sample_rate_hz": None}
-    with pytest.raises(ValueError, match="gyro driver 'kvh-new': no profile of a simulated unit is known"):
+    with pytest.raises(ValueError, match="gyro driver 'kvh-new' has no profile of a simulated unit"):
         open_bench(BenchFile.model_validate(record), VirtualClock())
     record["simulation"]["units"] = {"fog": {"profile": "rd2100"}}
-    with pytest.raises(ValueError, match="gyro driver 'kvh-new': no usual rate is known"):
+    with pytest.raises(ValueError, match="gyro driver 'kvh-new' has no default number of readings per second"):
         open_bench(BenchFile.model_validate(record), VirtualClock())
     gyro["sample_rate_hz"] = 10.0
     opened = open_bench(BenchFile.model_validate(record), VirtualClock())

@@ -95,7 +95,7 @@ def test_a_driver_with_its_simulator(outside: Callable[[str], Outside]) -> None:
     bench.write_text(whole.replace('profile = "rd2100"', ""), encoding="utf-8")
     nameless = user.labctl("labctl bench check acme-gyro/bench.toml", status=2).stderr
     assert nameless.count("\n") == 1
-    assert "no profile of a simulated unit is known; set one in [simulation.units] of the bench file" in nameless
+    assert "has no profile of a simulated unit; set one in [simulation.units] of the bench file" in nameless
     bench.write_text(whole.replace('name = "g1"', 'name = "g1"\nmirored = true'), encoding="utf-8")
     misspelt = user.labctl("labctl bench check acme-gyro/bench.toml", status=2).stderr
     assert "gyros.0.mirored: driver acme-g1 has no such setting (there are driver, port, " in misspelt

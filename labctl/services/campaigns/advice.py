@@ -110,14 +110,15 @@ FAILURES: tuple[Failure, ...] = (
         LOOK,
     ),
     Failure(
-        r"readings lost or damaged|readings marked bad|not one of about|the counter on .* stands at",
+        r"readings lost or damaged|readings marked bad|not one of about|none of about|the (?:sample "
+        r")?counter on .* stands at",
         "The readings of a unit were missing, damaged or marked bad.",
         f"Check the unit's power, cable and baud rate, {RESUME}.",
     ),
     Failure(
         r"nothing heard|no answer|gave no (?:complete )?answer|no intact |no whole line|does not answer|link .* broke|"
         r"cannot be opened|no Modbus TCP|reply belongs to another request|not reached again|"
-        r"link is gone|came that are no reply|answered instead of unit|reply to request|line was never silent|"
+        r"link is gone|(?:came|arrived) that are no|answered instead of unit|reply to request|line was never silent|"
         r"no Modbus instrument|, no Modbus;",
         "An instrument did not answer.",
         f"Check the instrument's power and cable, run `labctl bench check`, {RESUME}.",

@@ -72,7 +72,7 @@ def fine(found: Any) -> bool:
 def modbus(driver: str, what: str, unit: int) -> list[Behaviour]:
     """Return what any Modbus instrument may do; `what` is its first request."""
     cannot, refused = f"cannot {what}", f"refused to {what}: Modbus exception"
-    bytes_ = r"\d+ bytes came that are no reply; check line settings and cable"
+    bytes_ = r"\d+ bytes arrived that are not a Modbus reply; check line settings and cable"
     serial = driver == F4
     late = (NoReply, f"no answer to {what}; check power, cable and address {unit} {TRIES}")
     return [
@@ -143,15 +143,18 @@ FOUND = [
 ]
 SERIAL = [
     Behaviour(F4, "wrong checksum", faults=lambda faults: faults.arm("wrong_crc"), says=(
-        MalformedReply, rf"cannot read .*, \d+ bytes came that are no reply; check line settings and cable {TRIES}")),
+        MalformedReply, rf"cannot read .*, \d+ bytes arrived that are not a Modbus reply; check "
+        rf"line settings and cable {TRIES}")),
     Behaviour(F4, "another baud rate", through(another_baud_rate), (
-        MalformedReply, rf"cannot read .*, \d+ bytes came that are no reply; check line settings and cable {TRIES}")),
+        MalformedReply, rf"cannot read .*, \d+ bytes arrived that are not a Modbus reply; check "
+        rf"line settings and cable {TRIES}")),
     Behaviour(F4, "echo of the adapter", Echoes, gives=fine),
     Behaviour(F4, "echo of the adapter and no device", answers(lambda request, _: request), (
         NoReply, f"no answer to read .*; check power, cable and address 1 {TRIES}")),
     Behaviour(F4, "zero byte before each reply", answers(lambda _, reply: b"\0" + reply), gives=fine),
     Behaviour(F4, "flood", lambda wire: Flood(wire, b"UUUU"), (
-        MalformedReply, r"the line was never silent for .* s in 20 s without a request; find the second master")),
+        MalformedReply, r"labctl sent no request for 20 s, but the line was never silent for .* s; "
+        r"find a second Modbus master")),
     Behaviour(F4, "late once", answers(lambda _, reply: reply, 0.9), gives=fine),
 ]  # fmt: skip
 

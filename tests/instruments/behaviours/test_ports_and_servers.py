@@ -161,5 +161,6 @@ def test_a_host_where_nobody_listens() -> None:
         port = server.getsockname()[1]
     line = said_by("chamber", identity, tcp_port=port)
     assert line.startswith(
-        f"chamber: no Modbus TCP at 127.0.0.1:{port}; check address, cable and that it is switched on"
+        f"chamber: no Modbus TCP instrument answers at 127.0.0.1:{port}; check address, cable and that the instrument "
+        "is switched on"
     )

@@ -32,9 +32,10 @@ EXPECTED = {
     "angle": "the unit on {0} is not configured as the bench file requires: gyro output unit INCREMENTAL ANGLE in "
     "deg, needed ANGULAR RATE or "
     "AVERAGE ANGULAR RATE; configure the unit in its service mode (commands u, m, d), or correct the bench file",
-    "moved": "port {0} is on USB adapter B2, bench file or campaign says A1; two adapters may have changed places: "
+    "moved": "port {0} is on USB adapter B2, but the bench file or the campaign names A1; two "
+    "adapters may be exchanged: "
     "give the "
-    "port's path in /dev/serial/by-id",
+    "path of the port in /dev/serial/by-id",
     "mute": "no intact datagram on {0} within 1.5 s: nothing came; check power, cable and bit rate 460800, "
     "datagram 0x94 and crlf",
     "fast": "sends 110 readings/s on {0}, and the bench file says 100, limit +-4 %; set sample_rate_hz = 110 or "

@@ -90,7 +90,8 @@ def test_the_serial_number_of_the_bench_file_is_held_against_the_units(stand: Ma
     assert unit(stand, serial=written).gyro.identify().serial == written
     other = unit(stand, {"serial": "N25582405002003"}, serial=written)
     with pytest.raises(
-        WrongInstrument, match=f"has serial number N25582405002003, bench file or campaign says {written}; connect the"
+        WrongInstrument,
+        match=f"has serial number N25582405002003, but the bench file or the campaign names {written}; connect the",
     ):
         other.gyro.identify()
 

@@ -51,7 +51,9 @@ def test_the_narrower_limits_count(make_rig: Callable[..., Any]) -> None:
 
 @pytest.mark.parametrize("temperature_c", [-40.1, 120.1, 1e6, float("nan"), float("inf")])
 def test_a_set_point_beyond_the_limits_is_not_sent(f4: Any, temperature_c: float) -> None:
-    with pytest.raises(LimitError, match=r"chamber: set point .* outside the limits, -40 to 120 deg C .*nothing was written"):
+    with pytest.raises(
+        LimitError, match=r"chamber: set point .* outside the limits, -40 to 120 deg C .*nothing was written"
+    ):
         f4.driver.set_temperature_c(temperature_c)
     assert f4.simulated.writes == []
 

@@ -240,7 +240,7 @@ def test_a_reply_that_does_not_fit_is_no_reply(make_bench: Callable[..., Bench],
         ("0063 0000 0005 01 03 02 FF23", r"the reply to request 99 came, not to request 3; find the second master"),
         ("{t} 0001 0005 01 03 02 FF23", r"protocol number 1 came, Modbus TCP has 0; check host and tcp_port"),
         (b"HTTP/1.0 400 Bad Request\r\n\r\n".hex(), r"an HTTP server answered, no Modbus instrument; check host"),
-        ("{t} 0000 0005 01 03", r"8 bytes came that are no reply; check line settings and cable"),
+        ("{t} 0000 0005 01 03", r"8 bytes arrived that are not a Modbus reply; check line settings and cable"),
     ],
 )
 def test_what_came_instead_of_a_reply_is_said_in_one_line(
@@ -329,7 +329,9 @@ def test_a_register_to_read_is_not_written(bench: Bench) -> None:
 
 
 def test_a_value_that_cannot_be_is_named_with_its_range(bench: Bench) -> None:
-    with pytest.raises(MalformedReply, match=r"air \(register 100\) reads -221 counts, possible are 0 to 10"):
+    with pytest.raises(
+        MalformedReply, match=r"air \(register 100\) reads -221 counts, outside the possible range of 0 to 10"
+    ):
         bench.registers.get(Register(100, "air", "int16", "counts", low=0, high=10))
 
 
@@ -366,7 +368,7 @@ def test_foreign_text_stays_on_one_line() -> None:
 
 
 def test_a_real_host_that_refuses_is_named() -> None:
-    with pytest.raises(LinkError, match=r"chamber: no Modbus TCP at 127\.0\.0\.1:1; check address"):
+    with pytest.raises(LinkError, match=r"chamber: no Modbus TCP instrument answers at 127\.0\.0\.1:1; check address"):
         Ports(VirtualClock()).modbus_tcp("127.0.0.1", 1, device="chamber", timeout_s=1.0)
 
 

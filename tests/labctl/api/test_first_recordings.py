@@ -78,7 +78,7 @@ def asymmetry(client: TestClient, recording: int) -> float:
 @pytest.mark.parametrize(
     ("body", "says"),
     [
-        ({"recipe": "short", "hide": ["gremlins"]}, "effect 'gremlins' cannot be hidden (there are"),
+        ({"recipe": "short", "hide": ["gremlins"]}, "effect 'gremlins' cannot be hidden; choose one of"),
         ({"recipe": "short", "hide": ["scale_factor_asymmetry=much"]}, "is not a finite number"),
         ({"recipe": "/etc/passwd"}, "send its text, or one of"),
     ],

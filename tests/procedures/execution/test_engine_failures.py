@@ -216,7 +216,7 @@ def test_a_chamber_that_does_not_arrive_fails_with_where_it_was(rig: Any) -> Non
 def test_a_set_point_that_is_not_taken_is_a_failure(rig: Any) -> None:
     rig.chamber.misread_c = 0.3
     outcome = rig.run()
-    assert "set point 25.3 deg C was read back, not 25" in outcome.reason
+    assert "set point 25.3 deg C was read back instead of 25 deg C" in outcome.reason
 
 
 def test_a_short_silence_is_noted_and_forgiven(rig: Any) -> None:

@@ -97,7 +97,9 @@ def test_a_unit_is_known_on_every_bench_and_a_bench_file_may_name_another(store:
 
 
 def test_a_bench_file_that_names_another_unit_than_answers_is_refused(store: Store) -> None:
-    with pytest.raises(WrongInstrument, match=f"has serial number {OWN['a']}, bench file or campaign says N1; connect"):
+    with pytest.raises(
+        WrongInstrument, match=f"has serial number {OWN['a']}, but the bench file or the campaign names N1; connect"
+    ):
         begin(store, with_gyro(stims(), "a", own_serial="N1"))
 
 
@@ -130,7 +132,7 @@ def test_a_port_on_another_adapter_than_the_file_names_is_not_opened(store: Stor
     bench = load_bench("single-axis-sim")
     bench = bench.model_copy(update={"table": bench.table.model_copy(update={"adapter": "A7"})})
     with pytest.raises(
-        WrongInstrument, match=r"table: port \S+ is on USB adapter without a serial number, bench file or"
+        WrongInstrument, match=r"table: port \S+ is on USB adapter without a serial number, but the bench file or"
     ):
         begin(store, bench)
     plugged[bench.table.port or ""] = "A7:1.2"  # the third port of it
@@ -141,7 +143,9 @@ def test_a_resumed_campaign_takes_only_the_units_that_it_began_with(store: Store
     begin(store, stims())
     exchanged = stims(a=OWN["b"], b=OWN["a"])
     resumed = prepare_resume(store, 1, exchanged, lambda _: VirtualClock(), ResumeRequest(by="Ann"))
-    with pytest.raises(WrongInstrument, match=f"has serial number {OWN['b']}, bench file or campaign says {OWN['a']}"):
+    with pytest.raises(
+        WrongInstrument, match=f"has serial number {OWN['b']}, but the bench file or the campaign names {OWN['a']}"
+    ):
         resumed.bench.gyros["a"].identify()
     resumed.bench.close()
 

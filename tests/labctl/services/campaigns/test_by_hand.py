@@ -146,7 +146,7 @@ def test_a_turn_is_asked_shown_repeated_and_done_over_http(client: TestClient) -
     assert (placed["kind"], placed["position"]) == ("mount", "z")
     refused = confirm(placed, again=True)
     assert (refused.status_code, refused.json()["type"]) == (409, "urn:labctl:problem:stale-prompt")
-    assert "only a turn is asked again" in refused.json()["detail"]
+    assert "only a turn can be repeated" in refused.json()["detail"]
     confirm(placed).raise_for_status()
     confirm(until(client, lambda now: now["prompt"] and now["prompt"]["kind"] == "power_on")["prompt"])
     turned = until(client, lambda now: now["turn"] and now["turn"]["came_deg"].get("mems", 0) > 350)

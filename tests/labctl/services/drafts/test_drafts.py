@@ -311,7 +311,7 @@ def test_hidden_effects_of_a_later_start_are_checked_when_it_is_entered(store: S
     ("change", "said"),
     [
         (('effects = ["bias", "scale_factor"]', ""), "name a model"),
-        (("[fit.limits]", "against = false\n[fit.limits]"), "drift_dps needs the version in force"),
+        (("[fit.limits]", "against = false\n[fit.limits]"), "drift_dps compares with the version in force"),
         (("drift_dps = 0.1", "drift_dps = -1"), "greater than 0"),
         (("compare", "compere"), "did you mean 'compare'"),
     ],
