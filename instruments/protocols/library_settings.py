@@ -61,7 +61,7 @@ class LibraryChamberSettings(LibraryOptions, ChamberSettings):
     def _can_be_off(self) -> LibraryChamberSettings:
         if self.safe_state == "off" and not self.stop:
             raise ValueError(
-                'safe_state = "off" also needs the key stop: the name of the method that switches heating and cooling off'
+                'safe_state = "off" also needs the key stop: the method that switches heating and cooling off'
             )
         return self
 

@@ -114,8 +114,8 @@ def check_coefficients(path: Path, info: RecordingInfo, columns: Mapping[str, ob
     lacking = [f"u_{name}" for name in coefficients if f"u_{name}" not in columns]
     if stated and lacking:
         raise BadRecording(
-            f"{path}: column {lacking[0]!r} is missing, and {stated[0]!r} is there; give the standard uncertainty of "
-            "every coefficient, or of none"
+            f"{path}: column {lacking[0]!r} is missing, although column {stated[0]!r} is present; give the "
+            "standard uncertainty of every coefficient, or of none"
         )
     for name in stated:
         _check_u(path, name, columns)

@@ -103,7 +103,10 @@ def orientation(
         if Path(source).is_file():
             answer = orientation_of_file(Path(source), calibration, out, options)
         elif calibration is not None or out is not None:
-            raise BadInput(f"{source}: no such file; --calibration and --out are for a table, --version for a unit")
+            raise BadInput(
+                f"{source}: there is no such file; leave out --calibration and --out, which need a "
+                f"file, if {source} is the serial number of a unit"
+            )
         else:
             with open_readonly(database) as store:
                 answer = orientation_of_unit(store, source, recording, version, options)

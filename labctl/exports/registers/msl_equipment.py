@@ -48,8 +48,7 @@ def write(calibration: Calibration, options: Mapping[str, str]) -> Written:
     """Return the entry; raises BadInput for a fact that is not given, and for a model that no table can hold."""
     if lacking := [name for name in NEEDED if not options.get(name, "").strip()]:
         raise BadInput(
-            f"format {NAME}: {', '.join(lacking)} of the register's entry are not known; give --option KEY=VALUE for "
-            "each"
+            f"format {NAME}: the entry in the register needs {', '.join(lacking)}; give --option KEY=VALUE for each"
         )
     needs_thermometer(calibration, NAME, "its error is the same at every temperature; use python, c or json")
     part = static_part(calibration, NAME, carries="the table is over output and temperature alone")
@@ -136,7 +135,9 @@ def _day(options: Mapping[str, str], name: str) -> str:
     try:
         return date.fromisoformat(options[name].strip()).isoformat()
     except ValueError:
-        raise BadInput(f"format {NAME}: option {name} = {options[name]!r} is no date; write it as 2027-03-01") from None
+        raise BadInput(
+            f"format {NAME}: option {name} = {options[name]!r} is not a date; write it as 2027-03-01"
+        ) from None
 
 
 FORMAT = Format(

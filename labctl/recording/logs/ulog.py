@@ -63,12 +63,13 @@ def read(path: Path, options: ULogOptions) -> RawTable:
     if topic is None:
         names = ", ".join(sorted({name for name, _ in data})[:12])
         raise BadRecording(
-            f"{path}: none of {', '.join(TOPICS)} is in this log (it has {names or 'no topic'}); log one of them "
+            f"{path}: the log has none of the topics {', '.join(TOPICS)} (it has {names or 'no topic'}); log "
+            "one of them "
             "(SDLOG_PROFILE: sensor comparison, or high rate), or take another log"
         )
     if (topic, options.instance) not in data:
         raise BadInput(
-            f"{path}: {topic} has no instance {options.instance} (there are {listed}); choose one with "
+            f"{path}: {topic} has no instance {options.instance} (instances: {listed}); choose one with "
             "--option instance=N, and --option topic=NAME"
         )
     columns = _gyro(path, topic, data[topic, options.instance])

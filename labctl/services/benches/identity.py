@@ -77,10 +77,9 @@ def _refuse_other_adapter(
     owner = _owner(before, ADAPTER, found)
     swapped = f", which {owner} was on: two adapters may have changed places" if owner else ""
     raise Conflict(
-        f"{name}: port {section.port} is on USB adapter {found}{swapped}; in campaign {before.id} it was {was}. Give "
-        "the "
-        f"right port by its path in /dev/serial/by-id, or, if this is right, set adapter = '{found}' in its section of "
-        "the bench file"
+        f"{name}: port {section.port} is on USB adapter {found}{swapped}; in campaign {before.id} the adapter "
+        f"was {was}. Give the correct port by its path in /dev/serial/by-id, or, if the adapter was replaced, "
+        f"set adapter = '{found}' in the section of the instrument in the bench file"
     )
 
 

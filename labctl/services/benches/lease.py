@@ -63,13 +63,13 @@ class BenchHold:
     def check(self) -> None:
         """Raise BenchBusy when the bench may not be driven."""
         if not self.held:
-            raise BenchBusy(f"bench {self._bench} may not be driven from here: {self.why_not}")
+            raise BenchBusy(f"this process may not drive bench {self._bench}: {self.why_not}")
 
     def take(self) -> None:
         """Take the bench. Raises Conflict naming the holder; waits a term for one that may be dead."""
         found = self._store.leases.holder(self._bench)
         if found is not None and not self._gone(found):
-            raise Conflict(f"{described(found)}; wait until that process ends, or stop it")
+            raise Conflict(f"{described(found)}; wait until that process ends, or stop that process")
         begun_s, now = self._clock.now_s(), self._clock.utc()
         mine = LeaseRow(
             self._bench, self._owner, socket.gethostname(), this_machine(), os.getpid(), since=now,
@@ -77,7 +77,7 @@ class BenchHold:
             url=self._store.leases.address.url, calls=self._store.leases.address.calls,
         )  # fmt: skip
         if not self._store.leases.claim(mine, replacing=found):
-            raise Conflict(f"bench {self._bench}: another process has just taken it; try again")
+            raise Conflict(f"bench {self._bench}: another process has just reserved the bench; try again")
         _HELD_HERE.add(self._owner)
         self._renewed_s, self._why_lost = begun_s, ""
         log.info("lease.taken", bench=self._bench, instead_of="" if found is None else described(found))

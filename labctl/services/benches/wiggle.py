@@ -86,7 +86,7 @@ class _Test:
         for name, gyro in gyros.items():
             outputs = nominal_outputs(tuple(gyro.channels), gyro.identify().output)
             if not outputs:
-                raise BadInput(f"{name}: it has no gyro channel to compare; leave it out of the bench file")
+                raise BadInput(f"{name}: the unit has no gyro channel to compare; leave the unit out of the bench file")
             self._outputs[name] = outputs
             gyro.start()
             gyro.read_latest()
@@ -102,7 +102,10 @@ class _Test:
             mean = np.mean(rates, axis=0)
             scatter = float(np.std(rates, axis=0, ddof=1).max())
             if scatter > LEAST_DPS:
-                raise BadInput(f"{name}: it moved while it was to be at rest ({scatter:.2g} deg/s); start again")
+                raise BadInput(
+                    f"{name}: the unit moved ({scatter:.2g} deg/s) during the time in which it must "
+                    "be at rest; start again, and leave it at rest"
+                )
             self._rest[name] = AtRest(mean, scatter)
 
     def moved(self) -> list[str]:

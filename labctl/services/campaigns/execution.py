@@ -152,7 +152,10 @@ def run_here(
         SafeStateRetry(store, bench_file, lambda: clock).attempt()
         for text in _left_on(store, bench_file):
             if not bench_file.is_simulated:
-                raise Conflict(f"bench {bench_file.name}: {text}; inspect and clear it before a campaign starts")
+                raise Conflict(
+                    f"bench {bench_file.name}: {text}; inspect the bench, then run `labctl bench "
+                    "clear` before a campaign starts"
+                )
             if say is not None:
                 say(text)
         refuse_unconfirmed(store, bench_file.name)

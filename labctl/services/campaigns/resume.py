@@ -59,8 +59,8 @@ def with_original_simulation(row: CampaignRow, bench_file: BenchFile) -> BenchFi
     except ValidationError as error:
         first = error.errors()[0]
         raise Conflict(
-            f"campaign {row.id} was simulated by another labctl: simulation.{'.'.join(map(str, first['loc']))}: "
-            f"{first['msg']}; abort it, and start a new one"
+            f"campaign {row.id} was simulated by another version of labctl, whose settings are not valid here: "
+            f"simulation.{'.'.join(map(str, first['loc']))}: {first['msg']}; abort the campaign, and start a new one"
         ) from error
 
 
@@ -144,8 +144,8 @@ def _same_units(row: CampaignRow, bench_file: BenchFile) -> BenchFile:
     here = {gyro.serial for gyro in bench_file.gyros}
     if set(row.recordings) != here:
         raise Conflict(
-            f"campaign {row.id} measures {', '.join(sorted(row.recordings))}, bench {bench_file.name} carries "
-            f"{', '.join(sorted(here))}; name the campaign's own bench with --bench"
+            f"campaign {row.id} measures the units {', '.join(sorted(row.recordings))}, but bench "
+            f"{bench_file.name} has the units {', '.join(sorted(here))}; name the bench of the campaign with --bench"
         )
     return pinned(with_drivers(bench_file), reported_in(row))
 

@@ -116,8 +116,7 @@ class InWorkers(Pool):
             if not ready:
                 raise ComputationEnded(
                     f"the computation was ended after {self.limits.deadline_s:g} s, the limit of one computation; "
-                    "send less at a time:"
-                    " a recording of fewer data sets, or fewer effects that compete"
+                    "request less at a time: a recording with fewer data sets, or fewer effects to compare"
                 )
             try:
                 message = receiving.recv() if receiving.poll() else None

@@ -120,8 +120,8 @@ def load_reduced_readings(store: Store, row: RecordingRow, points: Recording) ->
     """
     if row.kind == "coefficients":
         raise BadInput(
-            f"recording {row.id} is a table of coefficients: a model is compared with readings or means; name a "
-            "recording of these"
+            f"recording {row.id} is a table of coefficients, but a model is compared with measurements; name a "
+            "recording of readings or means"
         )
     # turns are integrals over all readings, and of a rate that changes decimated readings are those of another
     if row.kind != "samples" or points.info.motion == "turns" or is_profile(row):

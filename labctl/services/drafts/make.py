@@ -32,7 +32,8 @@ def make_drafts(store: Store, campaign: int, request: DraftsRequest, at: datetim
     row = store.campaigns.get(campaign)
     if row.state is not CampaignState.DONE:
         raise Conflict(
-            f"campaign {campaign} is {row.state}: its drafts are made when it is done; resume it, or wait for its end"
+            f"campaign {campaign} is in the state {row.state}, but its drafts (proposed calibrations) are made "
+            "when it is done; wait for its end, or resume the campaign"
         )
     asked = row.recipe.get("fit")
     if asked is not None:

@@ -73,9 +73,9 @@ def plan_steps(
     plan = make_plan(recipe, limits_of(on), clip=request.clip)
     if request.visibility and plan.expected_s > LONGEST_LOOK_S:
         raise BadInput(
-            f"visibility: the plan takes {plan.expected_s / 86_400:.0f} days; what it can detect can be computed "
-            "only for shorter plans; leave it out, or plan at most "
-            f"{LONGEST_LOOK_S / 86_400:.0f} days"
+            f"visibility: the plan takes {plan.expected_s / 86_400:.0f} days, but the effects that a plan can "
+            f"detect are computed only up to {LONGEST_LOOK_S / 86_400:.0f} days; leave visibility out, or "
+            "shorten the plan"
         )
     answer = plan_answer(plan, on, look if request.visibility else None, start)
     columns = timeline_columns([step_json(step) for step in plan.steps])

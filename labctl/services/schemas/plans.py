@@ -18,7 +18,10 @@ def never_a_path(recipe: str) -> str:
     """Refuse what would be looked for as a file: a request names a shipped recipe or brings its own text."""
     if "\n" in recipe or recipe in shipped_recipes():
         return recipe
-    raise RecipeError(f"no recipe {shown(recipe)}: send its text, or one of {', '.join(shipped_recipes())}")
+    raise RecipeError(
+        f"there is no recipe {shown(recipe)}; send the text of a recipe, or one of the names "
+        f"{', '.join(shipped_recipes())}"
+    )
 
 
 RecipeSource = Annotated[

@@ -136,9 +136,7 @@ class Database:
         the connection, when it does not come free within 20 s, and DatabaseUnreachable.
         """
         if self.writer is not None:
-            raise StoreError(
-                f"{self._shown}: another process writes to it; send a marked transaction, or wait until it ends"
-            )
+            raise StoreError(f"{self._shown}: another process is writing to the database; wait until that process ends")
         number, ended = 0, False
         with self._turn.take():
             try:

@@ -143,18 +143,18 @@ FOUND = [
 ]
 SERIAL = [
     Behaviour(F4, "wrong checksum", faults=lambda faults: faults.arm("wrong_crc"), says=(
-        MalformedReply, rf"cannot read .*, \d+ bytes arrived that are not a Modbus reply; check "
-        rf"line settings and cable {TRIES}")),
+        MalformedReply, (rf"cannot read .*, \d+ bytes arrived that are not a Modbus reply; check "
+        rf"line settings and cable {TRIES}"))),
     Behaviour(F4, "another baud rate", through(another_baud_rate), (
-        MalformedReply, rf"cannot read .*, \d+ bytes arrived that are not a Modbus reply; check "
-        rf"line settings and cable {TRIES}")),
+        MalformedReply, (rf"cannot read .*, \d+ bytes arrived that are not a Modbus reply; check "
+        rf"line settings and cable {TRIES}"))),
     Behaviour(F4, "echo of the adapter", Echoes, gives=fine),
     Behaviour(F4, "echo of the adapter and no device", answers(lambda request, _: request), (
         NoReply, f"no answer to read .*; check power, cable and address 1 {TRIES}")),
     Behaviour(F4, "zero byte before each reply", answers(lambda _, reply: b"\0" + reply), gives=fine),
     Behaviour(F4, "flood", lambda wire: Flood(wire, b"UUUU"), (
-        MalformedReply, r"labctl sent no request for 20 s, but the line was never silent for .* s; "
-        r"find a second Modbus master")),
+        MalformedReply, (r"labctl sent no request for 20 s, but the line was never silent for .* s; "
+        r"find a second Modbus master"))),
     Behaviour(F4, "late once", answers(lambda _, reply: reply, 0.9), gives=fine),
 ]  # fmt: skip
 

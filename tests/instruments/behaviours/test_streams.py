@@ -196,8 +196,10 @@ SET_OTHERWISE = (
 )
 STANDS = (
     MalformedReply,
-    r"the sample counter on sim://\S+ stands at \d+ in \d+ successive readings; check that the "
-    r"field of the counter is the right",
+    (
+        r"the sample counter on sim://\S+ stands at \d+ in \d+ successive readings; check that the "
+        r"field of the counter is the right"
+    ),
 )
 SPECIAL = [
     Behaviour(STIM, "sends increments", changes=device(output_unit="incremental"), says=(
@@ -208,8 +210,8 @@ SPECIAL = [
         WrongInstrument, SET_OTHERWISE.format("datagram 0xA5, bench file 0x94"))),
     Behaviour(STIM, "is another unit", changes=lambda record: (
         gyro(serial="N25582018000013")(record), device(serial="N25582018000014")(record)), says=(
-        WrongInstrument, r"the unit on \S+ has serial number N25582018000014, but the bench file or "
-        r"the campaign names N2")),
+        WrongInstrument, (r"the unit on \S+ has serial number N25582018000014, but the bench file or "
+        r"the campaign names N2"))),
     Behaviour(STIM, "hears nothing", Deaf, (
         NoReply, r"sends datagrams on sim://\S+ but does not answer the commands C and I within 1.5 s; check")),
     Behaviour(STIM, "wrong checksum in each", every(STIM, flipped), (NoReply, WHERE[STIM].format(STRANGE))),

@@ -210,7 +210,7 @@ def test_this_machine_needs_no_key(loopback: Ask, host: str) -> None:
 def test_a_name_that_was_bent_to_this_machine_is_refused(loopback: Ask, host: str) -> None:
     answer = loopback(host=host)
     assert answer.status_code == 403
-    assert "is not accepted; use an address of this list" in answer.json()["detail"]
+    assert "is not accepted; use one of these addresses" in answer.json()["detail"]
 
 
 @pytest.mark.parametrize(

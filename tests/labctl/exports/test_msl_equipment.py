@@ -88,6 +88,6 @@ def test_the_entry_has_the_elements_of_the_schema_in_order(fog: Calibration) -> 
 def test_facts_that_a_calibration_does_not_know_are_asked_for(fog: Calibration) -> None:
     with pytest.raises(BadInput, match=", ".join(NEEDED)):
         write(fog, {})
-    with pytest.raises(BadInput, match="option started = 'yesterday' is no date"):
+    with pytest.raises(BadInput, match="option started = 'yesterday' is not a date"):
         write(fog, {**OPTIONS, "started": "yesterday"})
     assert set(NEEDED) <= set(FORMAT.options)

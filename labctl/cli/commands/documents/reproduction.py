@@ -46,7 +46,9 @@ def reproduce(
             with open_readonly(database) as store:
                 answer = reproduce_unit(store, paper, serial, recording, axis, out)
         elif recording is not None or axis is not None:
-            raise BadInput("--recording and --axis are for a unit's recording; name its serial number too")
+            raise BadInput(
+                "--recording and --axis choose from the data of a unit; give the serial number of the unit too"
+            )
         else:
             answer = reproduce_own(paper, out)
     if as_json:

@@ -121,7 +121,7 @@ def test_nothing_and_several_are_told(moves: list[str], says: str) -> None:
 
 
 def test_a_unit_that_moves_while_it_is_to_rest_and_a_silent_one_are_refused() -> None:
-    with pytest.raises(BadInput, match=r"a: it moved while it was to be at rest \(.* deg/s\); start again"):
+    with pytest.raises(BadInput, match=r"a: the unit moved \(.* deg/s\); start again"):
         run({"a": ["a"]}, noise_dps=8.0)
 
 

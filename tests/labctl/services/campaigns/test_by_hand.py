@@ -191,4 +191,4 @@ def test_which_recipe_needs_what_is_said_in_one_line(tmp_path: Path) -> None:
     assert (checked.exit_code, "table" in checked.output, "mems" in checked.output) == (0, False, True)
     simulated = runner.invoke(app, ["simulate", "by-hand", "--out", str(tmp_path / "out")])
     assert simulated.exit_code == 2
-    assert "turns by hand are not simulated from the plan alone" in simulated.stderr
+    assert "turns by hand cannot be simulated without a campaign" in simulated.stderr

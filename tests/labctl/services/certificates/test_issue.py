@@ -127,7 +127,9 @@ def test_issuing_again_answers_what_was_issued(store: Store) -> None:
     assert issue(store, SERIAL, 1, request(), AT + timedelta(days=9)) == first
     assert {name: certificate_file(store, SERIAL, 1, name).content for name in FORMATS} == kept
     assert rows_of(store) == 1
-    with pytest.raises(CertificateRefused, match="another item; to replace it: --amend"):
+    with pytest.raises(
+        CertificateRefused, match="another item; to replace that certificate, give the reason with --amend"
+    ):
         issue(store, SERIAL, 1, request(item={**ORDER["item"], "condition": "Scratched."}), AT)
 
 
