@@ -30,7 +30,9 @@ async def version_motion(
     serial: str,
     version: int,
     service: ServiceDep,
-    recording: Annotated[int | None, Query(description="Recording; default: the unit's newest.")] = None,
+    recording: Annotated[
+        int | None, Query(description="Number of the recording; default: the unit's newest recording.")
+    ] = None,
     other_unit: Annotated[
         bool, Query(description="Accept a recording of another unit than the one in the address.")
     ] = False,

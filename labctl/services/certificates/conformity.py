@@ -23,8 +23,8 @@ def conformity(ordered: OrderedConformity, left: StateOfItem, results: tuple[Res
     if acceptance <= 0:
         raise NoAcceptance(
             f"conformity to {ordered.specification}: the guard band, U = {expanded:.3g} deg/s, is not smaller than the "
-            f'limit, {ordered.limit_dps:g} deg/s; measure with a smaller uncertainty, or agree on rule = "simple" with the '
-            "customer"
+            f"limit, {ordered.limit_dps:g} deg/s; measure with a smaller uncertainty, or agree with the customer on "
+            'rule = "simple"'
         )
     passed = largest <= acceptance
     rule = "guard band w = U" if ordered.rule == "guard-band" else "simple acceptance, no guard band (w = 0)"

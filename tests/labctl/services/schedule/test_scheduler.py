@@ -215,7 +215,7 @@ def test_what_was_cancelled_does_not_begin(lab: Lab) -> None:
     assert cancel_start(lab.store, start, lab.clock.utc()).state == "cancelled"
     lab.live(timedelta(hours=4))
     assert lab.begun == []
-    with pytest.raises(Conflict, match="has already ended \(state: cancelled\)"):
+    with pytest.raises(Conflict, match=r"has already ended \(state: cancelled\)"):
         cancel_start(lab.store, start, lab.clock.utc())
 
 
