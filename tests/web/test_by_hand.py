@@ -57,7 +57,7 @@ def test_a_turn_is_shown_refused_wanted_again_and_done(service: Service, visit: 
         asked.get_by_role("button", name="It is done").click()
 
     turn, angle = page.get_by_role("region", name="The turn now"), page.get_by_role("status", name="Angle so far")
-    expect(question.get_by_role("heading")).to_have_text("Keep z up, and turn the unit by 360 deg about z")
+    expect(question.get_by_role("heading")).to_have_text("Keep axis z pointing up, and turn the unit by 360 deg about this axis")
     expect(question).not_to_contain_text("The table")
     expect(angle).to_have_text(re.compile(r"^30\d deg of 360 deg about z, counter-clockwise\.$"))
     expect(page.locator(".gauges")).not_to_contain_text("Chamber")
