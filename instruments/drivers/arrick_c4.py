@@ -76,7 +76,7 @@ class ArrickC4:
         self._command(lines.IDENTIFY)
         text = self._link.read_line()
         if not text.startswith(lines.IDENTITY_PREFIX):
-            advice = lines.ECHO_ADVICE if lines.is_echo(text) else "check the port's name and the baud rate"
+            advice = lines.ECHO_ADVICE if lines.is_echo(text) else "check the name of the port and the baud rate"
             raise WrongInstrument(
                 self.name,
                 f"{self.settings.port} answered {text!r}, which is not the answer of a C4 controller; {advice}",

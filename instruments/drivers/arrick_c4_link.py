@@ -20,7 +20,7 @@ LINE_END = b"\r\n"
 #: More of them belong to no earlier move.
 MOST_LATE_LETTERS = 20
 LINE_IS_BUSY = (
-    "letters come that answer nothing; find what else sends on this line, or switch the controller off and on"
+    "letters arrive that answer no command; find what else sends on this line, or switch the controller off and on"
 )
 
 

@@ -180,5 +180,5 @@ class LibraryInstrument:
 
     def _broken(self, error: Exception) -> LinkError:
         return LinkError(
-            self.device, f"the link {self._settings.address_url} is gone ({one_line(error)}); check cable and power"
+            self.device, f"the link {self._settings.address_url} was lost ({one_line(error)}); check cable and power"
         )

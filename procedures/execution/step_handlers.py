@@ -183,8 +183,9 @@ def measure_clock(context: ExecutionContext, step: MeasureClock) -> dict[str, fl
     found = table.measure_clock(step.rate_dps, step.short_s, lambda wait_s: _watched_wait(context, wait_s))
     beyond = abs(found.deviation_ppm) > found.limit_ppm
     text = (
-        f"{table.name}: the step rate is {found.deviation_ppm:+.0f} ppm off step_clock_hz = {found.nominal_hz:g}, "
-        f"u {found.u_ppm:.0f} ppm, limit {found.limit_ppm:.0f} ppm; rates are by the measured clock"
+        f"{table.name}: the step rate is {found.deviation_ppm:+.0f} ppm off step_clock_hz = "
+        f"{found.nominal_hz:g} Hz, u = {found.u_ppm:.0f} ppm, limit {found.limit_ppm:.0f} ppm; rates are "
+        "computed from the measured clock"
     )
     if beyond:
         text += f": set step_clock_hz = {found.nominal_hz * found.ratio:.0f} in the bench file"

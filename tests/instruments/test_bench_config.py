@@ -53,7 +53,7 @@ def test_an_unknown_driver_is_refused_with_its_place_what_is_installed_and_what_
         (error,) = caught.value.errors()
         assert (error["loc"], error["input"]) == (place, "watlow-f5")
         here = known.format(version=DRIVERS.plugin("stim300").version)
-        assert error["msg"].startswith(f"no driver 'watlow-f5' is installed (there are {here} (labctl ")
+        assert error["msg"].startswith(f"no driver 'watlow-f5' is installed (installed: {here} (labctl ")
         assert "install the package that has it in its group labctl.drivers, or correct the name" in error["msg"]
         assert ("did you mean 'watlow-f4t'" in error["msg"] or "did you mean 'watlow-f4'" in error["msg"]) is (
             device == "chamber"
@@ -124,7 +124,7 @@ def test_settings_are_those_of_the_drivers_own_model(monkeypatch: pytest.MonkeyP
         (
             {"channel": 1, "chanel": 2},
             ("chamber", "chanel"),
-            f"driver acme-heater has no such setting (there are {KNOWN}, channel)",
+            f"driver acme-heater has no such setting; choose one of {KNOWN}, channel",
         ),
     ],
 )

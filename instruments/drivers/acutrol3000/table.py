@@ -78,7 +78,9 @@ class Acutrol3000:
             angle_deg, rate_dps = self._numbers(f":Read:Position? {self._axis};Rate? {self._axis}", 2)
             if abs((angle_deg + 180) % 360 - 180) <= HOME_DEG and abs(rate_dps) <= self.settings.still_dps:
                 return
-            self._demand_time(deadline_s, f"is at {angle_deg:.4f} deg, not home (limit {HOME_DEG:g} deg)")
+            self._demand_time(
+                deadline_s, f"stands at {angle_deg:.4f} deg after homing instead of at 0 deg (limit {HOME_DEG:g} deg)"
+            )
             self._clock.sleep(POLL_S)
 
     def spin(self, rate_dps: float, steady_s: float) -> Spin:

@@ -201,8 +201,8 @@ class LabJackGyro:
     def _silent(self, silent_s: float) -> NoReply:
         return NoReply(
             self.name,
-            f"no scan from {self.settings.stream_url} for {silent_s:.1f} s; check network, power, and that no other "
-            "program has the stream",
+            f"no scan from {self.settings.stream_url} for {silent_s:.1f} s; check network, power, and that no "
+            "other program uses the stream",
         )
 
     def _decode(self, data: bytes) -> Readings:

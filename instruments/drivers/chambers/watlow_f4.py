@@ -86,8 +86,8 @@ class WatlowF4(Watlow):
     def _hindrance(self) -> str:
         if self._is_manual(self._mode()):
             return (
-                "the controller is in manual mode, a set point would have no effect; set the controller to auto at "
-                "its panel"
+                "the controller is in manual mode, so a set point would have no effect; set the controller to "
+                "auto at its panel"
             )
         return super()._hindrance()
 

@@ -100,7 +100,7 @@ class RtuLine:
                 return b""  # the beginning of an echo: more is to come
         kept = data.lstrip(STRAY_BYTES)
         if kept and len(kept) < len(data):
-            self._remark("stray bytes come before replies; check termination and bias of the RS-485 line")
+            self._remark("stray bytes arrive before replies; check termination and bias of the RS-485 line")
         return kept
 
     def _note_latency(self, since_s: float) -> None:

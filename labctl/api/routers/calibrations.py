@@ -60,7 +60,7 @@ Formulas = Annotated[
 
 
 @router.head("/calibration", include_in_schema=False)
-@router.get("/calibration", summary="The calibration to use", response_class=Response)
+@router.get("/calibration", summary="The calibration in force", response_class=Response)
 async def calibration(
     serial: str,
     service: ServiceDep,

@@ -54,7 +54,7 @@ def ports(as_json: Json = False, database: Database = None) -> None:  # noqa: AR
         said = [f"now {port.device}" if port.device != port.path else "", adapter, port.trouble]
         console.print(f"{port.path}  {'; '.join(filter(None, said))}", markup=False, soft_wrap=True)
     if not found:
-        console.print("this computer has no serial port: plug the adapters in", markup=False)
+        console.print("this computer has no serial port: plug in the USB adapters", markup=False)
 
 
 @app.command("new")
@@ -146,7 +146,10 @@ def status(as_json: Json = False, database: Database = None) -> None:
         print_json(benches)
     else:
         for bench in benches:
-            said = [bench.unconfirmed, *(f"not made safe; campaigns left there: {left}" for left in bench.left)]
+            said = [
+                bench.unconfirmed,
+                *(f"not in its safe state; campaigns that did not end: {left}" for left in bench.left),
+            ]
             if bench.attempts:
                 said.insert(
                     1, f"labctl tried {bench.attempts} more times to set the safe state, last at {bench.attempted_at}"

@@ -161,7 +161,7 @@ def calibration(
         else:
             out.write_bytes(file.content)
     for loss in file.losses:
-        typer.echo(f"format {format_} does not carry: {loss.text}", err=True)
+        typer.echo(f"format {format_} cannot express: {loss.text}", err=True)
 
 
 def compensate(

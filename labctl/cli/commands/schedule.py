@@ -45,7 +45,9 @@ def list_(
         )  # fmt: skip
     console.print(rows)
     if answers and not served:
-        stderr.print("no service uses this database, so no start is carried out; run `labctl serve`", style="yellow")
+        stderr.print(
+            "no service uses this database, so no scheduled start will begin; run `labctl serve`", style="yellow"
+        )
 
 
 @app.command("show")

@@ -21,7 +21,10 @@ NODES = 64
 AXES = ("x", "y", "z")
 TOLERANCE = "tolerance_dps"
 #: Options that both controllers' formats have.
-COMMON_OPTIONS = {TOLERANCE: "refuse a file that loses more than this, deg/s; default: write it and say what is lost"}
+COMMON_OPTIONS = {
+    TOLERANCE: "largest part of the correction that may be lost, deg/s; default: no limit, and "
+    "labctl reports what is lost"
+}
 
 
 @dataclass(frozen=True)
@@ -66,7 +69,7 @@ def bias_cubic(calibration: Calibration, format_name: str, consumer: str, refere
     needs_thermometer(
         calibration, format_name, f"a bias that is the same at every temperature needs no {consumer} thermal parameters"
     )
-    part = static_part(calibration, format_name, carries=f"{consumer} corrects by temperature alone")
+    part = static_part(calibration, format_name, carries=f"{consumer} corrects by the temperature only")
     low, high = calibration.temperature_c
     if not high > low:
         raise BadInput(

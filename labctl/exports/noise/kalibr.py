@@ -29,7 +29,7 @@ def write(calibration: Calibration, options: Mapping[str, str]) -> Written:
             f"0; record the unit at rest for longer, or give option {WALK}"
         )
     losses = (
-        *correction_losses(calibration, "Kalibr's file has noise alone"),
+        *correction_losses(calibration, "the file of Kalibr contains noise figures only"),
         Loss("lower noise of other axes (one number for all; the largest is written)",
              float(noise.white.max() / noise.white.min()), "times"),
     )  # fmt: skip

@@ -27,11 +27,11 @@ OUTPUTS, TEMPERATURES, MOST = 21, 11, 201
 NEEDED = {
     "id": "number of the gyro in the register",
     "team": "team that keeps the register",
-    "entered_by": "person who enters it",
+    "entered_by": "person who enters the gyro in the register",
     "manufacturer": "maker of the gyro",
     "laboratory": "laboratory that calibrated it",
     "report": "number of the certificate",
-    "started": "first day of the calibration, as 2027-03-01",
+    "started": "first day of the calibration, such as 2027-03-01",
     "stopped": "last day of the calibration",
 }
 OTHER = {
@@ -50,8 +50,12 @@ def write(calibration: Calibration, options: Mapping[str, str]) -> Written:
         raise BadInput(
             f"format {NAME}: the entry in the register needs {', '.join(lacking)}; give --option KEY=VALUE for each"
         )
-    needs_thermometer(calibration, NAME, "its error is the same at every temperature; use python, c or json")
-    part = static_part(calibration, NAME, carries="the table is over output and temperature alone")
+    needs_thermometer(
+        calibration,
+        NAME,
+        "the error of this calibration is the same at every temperature; use format python, c or json",
+    )
+    part = static_part(calibration, NAME, carries="the table of this format depends on output and temperature only")
     m = whole_number(options, "outputs", (2, MOST), OUTPUTS, NAME) if part.has_rates else 1
     n = whole_number(options, "temperatures", (2, MOST), TEMPERATURES, NAME)
     table = table_of(part, part.outputs(m), part.temperatures(n))

@@ -58,7 +58,7 @@ class BenchHold:
     @property
     def why_not(self) -> str:
         """Why the bench may not be driven."""
-        return self._why_lost or f"its lease could not be renewed for {STOP_S:g} s"
+        return self._why_lost or f"its reservation of the bench could not be renewed for {STOP_S:g} s"
 
     def check(self) -> None:
         """Raise BenchBusy when the bench may not be driven."""
@@ -117,7 +117,7 @@ class BenchHold:
             else:
                 self._renewed_s = None
                 found = self._store.leases.holder(self._bench)
-                self._note_loss(described(found) if found else "another process has taken its lease")
+                self._note_loss(described(found) if found else "another process has taken its reservation of the bench")
         except Exception as error:  # noqa: BLE001  the next try may do better; until then `held` counts the time
             self._note_loss(str(error) or type(error).__name__)
 
@@ -132,7 +132,7 @@ class BenchHold:
 
     def loss(self) -> str:
         """Return why the bench may no longer be driven; an empty text while it may."""
-        return "" if self.held else f"the bench may no longer be driven from here: {self.why_not}"
+        return "" if self.held else f"this process may no longer drive the bench: {self.why_not}"
 
     def keep(self) -> None:
         """Renew from now on, in a thread, until `close`."""

@@ -152,18 +152,19 @@ def _rates(readings: Readings, outputs: Mapping[str, Nominal]) -> Rates:
 
 
 def _said(asked: str, found: list[str]) -> str:
-    return f"{asked} was asked for; {' and '.join(found) or 'nothing'} moved"
+    return f"unit {asked} was to be turned; {' and '.join(found) or 'nothing'} moved"
 
 
 def _unit(bench: BenchFile, name: str, found: list[str], moved: Mapping[str, list[str]]) -> WiggleUnit:
     settings = {gyro.name: gyro for gyro in bench.gyros}
     port = settings[name].port or settings[name].host or ""
     if found == [name]:
-        text = f"it is on {port}"
+        text = f"the unit is on {port}"
     elif not found:
-        text = f"nothing moved within {WITHIN_S:g} s: turn it further than a quarter turn, and check its port {port}"
+        text = f"no unit moved within {WITHIN_S:g} s: turn the unit by more than a quarter turn, and check its "
+        f"port {port}"
     elif len(found) > 1:
-        text = f"{' and '.join(found)} moved: turn it alone, and start again"
+        text = f"{' and '.join(found)} moved: turn only the named unit, and start again"
     else:
         (other,) = found
         there = settings[other].port or settings[other].host

@@ -95,7 +95,7 @@ FAILURES: tuple[Failure, ...] = (
         f"Let chamber and unit return to room temperature, find out why the limit was passed, {RESUME}.",
     ),
     Failure(
-        r"the air left its set point|is off the air's",
+        r"the air left its set point|is off the air's|differs from the air",
         "The temperature was not steady while readings were taken.",
         f"Check the chamber's door, air flow and controller, {RESUME}.",
     ),
@@ -116,10 +116,12 @@ FAILURES: tuple[Failure, ...] = (
         f"Check the unit's power, cable and baud rate, {RESUME}.",
     ),
     Failure(
-        r"nothing heard|no answer|gave no (?:complete )?answer|no intact |no whole line|does not answer|link .* broke|"
+        r"nothing heard|no answer|gave no (?:complete )?answer|no intact |no whole line|no complete "
+        r"line|does not answer|link .* broke|"
         r"cannot be opened|no Modbus TCP|reply belongs to another request|not reached again|"
-        r"link is gone|(?:came|arrived) that are no|answered instead of unit|reply to request|line was never silent|"
-        r"no Modbus instrument|, no Modbus;",
+        r"link is gone|the link (?:.* )?was lost|(?:came|arrived) that are no|answered instead of "
+        r"unit|reply to request|line was never silent|"
+        r"no Modbus instrument|not a Modbus instrument|, no Modbus;|instead of a Modbus reply",
         "An instrument did not answer.",
         f"Check the instrument's power and cable, run `labctl bench check`, {RESUME}.",
     ),

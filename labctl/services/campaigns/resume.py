@@ -93,7 +93,7 @@ def prepare_resume(
     t_s = max(standing.last_t_s, (clock.utc() - row.started_at).total_seconds() if row.started_at else 0.0)
     gap_s = t_s - standing.last_t_s
     added = standing.added_runs + int(new_session)
-    power = "the power failed meanwhile" if lost else "the units stayed on"
+    power = "the power failed during the interruption" if lost else "the units stayed on"
     changed = _other_drivers(row, bench_file)
     reason = f"resumed by {request.by} after {gap_s:.0f} s without supervision; {power}{changed}"
     bench = opened or open_bench(bench_file, clock)

@@ -72,7 +72,7 @@ class ServiceControl:
             return abort_abandoned(context.store, asked.campaign, reason, context.now())
         answer = runner.abort(asked.campaign, reason)
         if missing := self._recorded(context, asked.campaign, reason, runner.safe_within_s):
-            text = f"it was aborted, but that is not in the audit trail{missing}"
+            text = f"the campaign was aborted, but that is not in the audit trail{missing}"
             return answer.model_copy(update={"unrecorded": text})
         return answer
 

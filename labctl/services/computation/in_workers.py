@@ -160,5 +160,5 @@ def _end_in_words(code: int | None) -> str:
     if code is None or code >= 0:
         return f"ended (status {code})"
     name = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"
-    short = ", as the system does where memory is short" if -code == signal.SIGKILL else ""
+    short = ", as the operating system does when memory is short" if -code == signal.SIGKILL else ""
     return f"was killed ({name}{short})"

@@ -46,7 +46,7 @@ def make_drafts(store: Store, campaign: int, request: DraftsRequest, at: datetim
 
 def _make(store: Store, draft: DraftRow, rules: FitRules, at: datetime) -> None:
     if why := store.drafts.dropped(draft.recording):
-        fail_draft(store, draft, rules, f"the unit took no further part in the campaign: {why}", at)
+        fail_draft(store, draft, rules, f"the unit was excluded from the campaign: {why}", at)
         return
     version = draft.version  # of a draft that was kept, and not yet reported on
     if version is None:

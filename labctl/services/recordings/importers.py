@@ -166,7 +166,7 @@ def _nothing_beside(name: str) -> BadInput:
 
 
 def _no_map(name: str) -> BadInput:
-    return BadInput(f"--map: importer {name} determines the columns itself; leave the map out")
+    return BadInput(f"--map: importer {name} determines the columns by itself; leave --map out")
 
 
 def _importer_and_options(name: str, options: Mapping[str, str]) -> tuple[Importer[Any] | TableImporter[Any], Any]:

@@ -26,8 +26,8 @@ from labctl.services.schemas.criticism import ResidualColumns
 from labctl.services.schemas.warnings import WARNINGS, DataWarning
 
 ACCEPT = (
-    "Fit data that are certainly wrong, and keep a fit that is worse than no correction; the response still lists "
-    "the warnings."
+    "Fit the data although labctl found errors in them, and keep the fit even if it is worse than no "
+    "correction; the response still lists the warnings."
 )
 
 

@@ -10,7 +10,7 @@ from pydantic import Field
 from labctl.services.schemas.base import Request, ResponseModel
 
 DueSource = Literal["user", "recipe", "configuration"]
-DUE_FROM = "Where the interval is from; null: none is given, and there is no date."
+DUE_FROM = "Source of the number of days; null: no number is given, and there is no due date."
 WHEN = "Time of the verdict, which is the time of the certification."
 NO_VERDICT = (
     "Verdict of the newest criticism of the version on the recording that it was fitted to; null: none, see "

@@ -82,15 +82,15 @@ def modbus(driver: str, what: str, unit: int) -> list[Behaviour]:
         Behaviour(driver, "in pieces", lambda wire: Late(wire, 0.0, 3, 0.002), gives=fine),
         Behaviour(driver, "garbage", through(noise(3)), (MalformedReply, f"{cannot}, .*; (check|find|set) .* {TRIES}")),
         Behaviour(driver, "unplugged (EIO)", Unplugged, (
-            LinkError, f"{cannot}, the link is gone; check cable and power {TRIES}")),
+            LinkError, f"{cannot}, the link was lost; check cable and power {TRIES}")),
         Behaviour(driver, "does not know the function", faults=exception(1), says=(
             RequestRejected, f"{refused} 1, it does not know the function; check driver and address")),
         Behaviour(driver, "has no such register", faults=exception(2), says=(
             RequestRejected, f"{refused} 2, it has no such register, .*; check model and driver")),
         Behaviour(driver, "fails inside", faults=exception(4), says=(
-            RequestRejected, f"{refused} 4, it failed inside; read its panel")),
+            RequestRejected, f"{refused} 4, the instrument has an internal failure; read its panel")),
         Behaviour(driver, "is busy for ever", faults=exception(6), says=(
-            RequestRejected, f"{refused} 6, it is busy; end at its panel")),
+            RequestRejected, f"{refused} 6, the instrument is busy; end its present task")),
         Behaviour(driver, "is busy twice", faults=lambda faults: faults.arm("modbus_exception", value=6, count=2),
                   gives=fine),
         Behaviour(driver, "memory parity error", faults=exception(8), says=(
@@ -113,11 +113,15 @@ def http(request: bytes, reply: bytes) -> bytes:
 
 
 TCP = [
-    ("HTTP server instead of Modbus", http, "an HTTP server answered, no Modbus instrument; check host and tcp_port"),
+    (
+        "HTTP server instead of Modbus",
+        http,
+        "an HTTP server answered, not a Modbus instrument; check host and tcp_port",
+    ),
     (
         "SSH server instead of Modbus",
         lambda request, _: b"SSH-2.0-OpenSSH_9.2p1\r\n",
-        r"text came \(SSH-2.0-OpenSSH_9.2p1\), no Modbus; check host and",
+        r"text arrived \(SSH-2.0-OpenSSH_9.2p1\) instead of a Modbus reply; check host and",
     ),
     (
         "reply to another request",
@@ -181,7 +185,7 @@ class RefusesMoves(Wire):
 def of_table() -> list[Behaviour]:
     """Return what the controller of the table may do."""
     silent = r"sim://arrick gave no answer in 1.0 s; check power, cable and baud rate"
-    other = r"sim://arrick answered {}, not a C4; check the port's name and the baud rate$"
+    other = r"sim://arrick answered {}, not a C4; check the name of the port and the baud rate$"
     return [
         Behaviour(C4, "mute", Deaf, (NoReply, silent)),
         Behaviour(C4, "always slower than the time-out", lambda wire: Late(wire, 90.0), (NoReply, silent)),

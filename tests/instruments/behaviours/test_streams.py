@@ -151,11 +151,11 @@ def gyro(**keys: Any) -> Any:
     return lambda record: record["gyros"][0].update(keys)
 
 
-NOTHING, STRANGE = "nothing came; check power, cable and ", r"\d+ bytes came that are none; check "
+NOTHING, STRANGE = "no bytes arrived; check power, cable and ", r"\d+ bytes arrived that are not readings; check "
 WHERE = {
     STIM: r"no intact datagram on sim://\S+ (within|for) [\d.]+ s: {}bit rate 460800, datagram 0x94 and crlf",
-    DSP: r"no whole line on sim://\S+ for [\d.]+ s: {}baud rate 38400 and options.pattern",
-    RD: r"no whole line on sim://\S+ for [\d.]+ s: {}baud rate 9600 and options.pattern",
+    DSP: r"no complete line on sim://\S+ for [\d.]+ s: {}baud rate 38400 and options.pattern",
+    RD: r"no complete line on sim://\S+ for [\d.]+ s: {}baud rate 9600 and options.pattern",
     FORMAT: r"no intact Xsens MTi reading on sim://\S+ for [\d.]+ s: {}baud rate 115200 and that the unit sends",
 }
 BROKE = (
@@ -207,7 +207,7 @@ SPECIAL = [
     Behaviour(STIM, "sends 250 a second", changes=device(sample_rate_hz=250), says=(
         WrongInstrument, SET_OTHERWISE.format("sample rate 250"))),
     Behaviour(STIM, "sends another datagram", changes=device(datagram=0xA5), says=(
-        WrongInstrument, SET_OTHERWISE.format("datagram 0xA5, bench file 0x94"))),
+        WrongInstrument, SET_OTHERWISE.format("the datagram is 0xA5 instead of 0x94"))),
     Behaviour(STIM, "is another unit", changes=lambda record: (
         gyro(serial="N25582018000013")(record), device(serial="N25582018000014")(record)), says=(
         WrongInstrument, (r"the unit on \S+ has serial number N25582018000014, but the bench file or "

@@ -161,7 +161,9 @@ def test_numbers_go_on_where_the_devices_count_begins_anew() -> None:
     assert np.diff(scans.add(packets)[0]).tolist() == [1] * 7
 
 
-@pytest.mark.parametrize(("status", "text"), [(2942, "cannot be scanned so fast"), (2943, "more than 65535 scans")])
+@pytest.mark.parametrize(
+    ("status", "text"), [(2942, "cannot be scanned at this rate"), (2943, "more than 65535 scans")]
+)
 def test_a_stream_that_ended_says_why(labjack: Callable[..., Any], status: int, text: str) -> None:
     s = labjack()
     s.gyro.start()

@@ -121,7 +121,7 @@ def test_bytes_of_another_baud_rate_are_told(stand: Make, monkeypatch: pytest.Mo
     s.gyro.read(1.0)
     altered(s, monkeypatch, lambda data: bytes(each & 0x9B for each in data))
     with pytest.raises(
-        NoReply, match=r"no intact KVH 1750 reading on sim://\S+ for 2.\d s: \d+ bytes came .* baud rate 921600"
+        NoReply, match=r"no intact KVH 1750 reading on sim://\S+ for 2.\d s: \d+ bytes arrived .* baud rate 921600"
     ):
         read_on(s, 4.0)
 

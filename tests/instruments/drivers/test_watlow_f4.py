@@ -137,7 +137,7 @@ def test_a_profile_of_somebody_is_not_ended(f4: Any, mode: int) -> None:
     f4.simulated.mode = mode
     f4.simulated.setpoint = 400
     for act in (lambda: f4.driver.set_temperature_c(40.0), f4.driver.make_safe):
-        with pytest.raises(RequestRejected, match="a profile runs or is held"):
+        with pytest.raises(RequestRejected, match="a profile is running or held"):
             act()
     assert f4.simulated.mode == mode
     assert TERMINATE_FRAME not in sent(f4)

@@ -112,7 +112,7 @@ def test_control_that_is_switched_off_is_left_to_the_person(f4t: Any, mode: int,
 def test_a_profile_of_somebody_is_not_ended(f4t: Any, state: int) -> None:
     f4t.simulated.profile_state = state
     for act in (lambda: f4t.driver.set_temperature_c(40.0), f4t.driver.make_safe):
-        with pytest.raises(RequestRejected, match="a profile runs or is held"):
+        with pytest.raises(RequestRejected, match="a profile is running or held"):
             act()
     assert f4t.simulated.profile_state == state
 

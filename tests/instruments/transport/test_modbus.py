@@ -238,8 +238,11 @@ def test_a_reply_that_does_not_fit_is_no_reply(make_bench: Callable[..., Bench],
     [
         ("{t} 0000 0005 02 03 02 FF23", r"unit 2 answered instead of unit 1; set address in the bench file"),
         ("0063 0000 0005 01 03 02 FF23", r"the reply to request 99 came, not to request 3; find the second master"),
-        ("{t} 0001 0005 01 03 02 FF23", r"protocol number 1 came, Modbus TCP has 0; check host and tcp_port"),
-        (b"HTTP/1.0 400 Bad Request\r\n\r\n".hex(), r"an HTTP server answered, no Modbus instrument; check host"),
+        (
+            "{t} 0001 0005 01 03 02 FF23",
+            r"the reply has protocol number 1 instead of 0 (Modbus TCP); check host and tcp_port",
+        ),
+        (b"HTTP/1.0 400 Bad Request\r\n\r\n".hex(), r"an HTTP server answered, not a Modbus instrument; check host"),
         ("{t} 0000 0005 01 03", r"8 bytes arrived that are not a Modbus reply; check line settings and cable"),
     ],
 )

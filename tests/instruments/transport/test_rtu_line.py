@@ -159,7 +159,9 @@ def test_stray_bytes_before_a_reply_are_told_and_survived(stray: bytes) -> None:
     line.registers.put(SETPOINT, 300)
     assert line.held == 300
     assert line.clock.now_s() < 0.5
-    assert line.registers.remarks == ("stray bytes come before replies; check termination and bias of the RS-485 line",)
+    assert line.registers.remarks == (
+        "stray bytes arrive before replies; check termination and bias of the RS-485 line",
+    )
     line.registers.close()
 
 

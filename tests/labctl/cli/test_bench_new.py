@@ -123,7 +123,7 @@ def test_a_port_on_which_something_unknown_comes_gets_no_byte() -> None:
 
     found = find_on_port(os.ttyname(theirs), Talking())
     assert found.driver == ""
-    assert "bytes came that no driver recognises, so nothing was sent" in found.why_not
+    assert "bytes arrived that no driver recognises, so labctl sent nothing" in found.why_not
     with pytest.raises(BlockingIOError):
         os.read(ours, 1)
     os.close(ours)
@@ -162,7 +162,7 @@ def test_ports_are_listed_with_the_name_for_a_bench_file(lab: Lab, monkeypatch: 
     (port,) = lab.json("bench", "ports")
     assert port == {
         "device": "/dev/null", "path": "/dev/serial/by-id/usb-A9", "adapter": "A9", "product": "FT232R",
-        "trouble": "process 8 (minicom) has it open: end it",
+        "trouble": "process 8 (minicom) has the port open: end that process",
     }  # fmt: skip
     assert (
         "/dev/serial/by-id/usb-A9  now /dev/null; USB adapter A9 (FT232R); process 8"

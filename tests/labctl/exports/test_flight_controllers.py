@@ -68,7 +68,7 @@ def test_the_controllers_formula_is_within_the_stated_bounds(
     warm = np.linspace(*calibration.temperature_c, 301)
     still = at_true_rate(calibration, 0.0, warm)
     left = np.rad2deg(law(np.deg2rad(still), warm))
-    at_rest = stated(text, "Differs from the calibration in what it carries")
+    at_rest = stated(text, "Rates corrected by this file differ from those of the calibration")
     assert written.differs_dps is not None
     assert 0.9 * written.differs_dps <= np.abs(left).max() <= at_rest
     raw, hot = whole_range(calibration)

@@ -97,7 +97,7 @@ def test_data_that_are_certainly_wrong_speak_against_their_version(lab: Lab, tmp
     lab.run("import", str(tmp_path / "wrong"))
     lab.run("fit", SIMULATED, "--model", "ojeda2000", "--accept-warnings")
     said = lab.run("certify", SIMULATED, "1", *BY, "--reason", "fits", status=2).stderr
-    assert "recording 2: axis z: the output falls when the table turns faster" in said
+    assert "recording 2: axis z: the output decreases when the table turns faster" in said
     assert "and fit again" in said
     act = lab.json("certify", SIMULATED, "1", *BY, *OVERRIDE_OPTIONS)
     assert "data" in {each["what"] for each in act["objections"]}

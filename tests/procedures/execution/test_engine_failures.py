@@ -153,7 +153,7 @@ def test_a_chamber_that_reads_back_another_safe_set_point_is_not_safe(rig: Any) 
 def test_a_table_that_does_not_come_to_rest_is_not_safe(rig: Any) -> None:
     rig.when_step("safe_state", lambda: setattr(rig.table, "is_moving", lambda: True))
     outcome = rig.run()
-    assert "it still moves 30 s after it was stopped" in outcome.reason
+    assert "the table still moves 30 s after it was stopped" in outcome.reason
 
 
 def test_a_second_ctrl_c_during_the_safe_state_does_not_skip_it(rig: Any) -> None:

@@ -79,18 +79,16 @@ def test_exchanged_units_are_refused_in_one_line(store: Store) -> None:
     with pytest.raises(Conflict) as told:
         begin(store, stims(a=OWN["b"], b=OWN["a"]))
     assert str(told.value) == (
-        f"a: the unit says serial number {OWN['b']}, which b had: the two are exchanged; in campaign 2 unit UNIT-A "
-        "said "
-        f"{OWN['a']}. Connect the right unit, give this one a `serial` of its own, or, if it is right, set own_serial "
-        "= "
-        f"'{OWN['b']}' in the bench file"
+        f"a: the unit reports serial number {OWN['b']}, which b had: the two are exchanged, but in "
+        f"campaign 2 unit UNIT-A reported {OWN['a']}. Connect the right unit; or, for another unit, "
+        f"give it a different `serial`; or, if this is the right unit, set own_serial = '{OWN['b']}' in the bench file"
     )
 
 
 def test_a_unit_is_known_on_every_bench_and_a_bench_file_may_name_another(store: Store) -> None:
     begin(store, stims())
     other = stims(a="N25580000000009").model_copy(update={"name": "other"})
-    with pytest.raises(Conflict, match=r"a: the unit says serial number N25580000000009; in campaign 1"):
+    with pytest.raises(Conflict, match=r"a: the unit reports serial number N25580000000009, but in campaign 1"):
         begin(store, other)
     begin(store, with_gyro(other, "a", own_serial="N25580000000009"))
     begin(store, other)  # it is the known one by now

@@ -57,7 +57,10 @@ def test_every_guard_is_told_in_its_own_words(kind: str, change: dict[str, Any])
         (BadData("fog", "not one of about 500 readings came; check cable, power and baud rate"), "readings"),
         (NoReply("table", "/dev/ttyUSB0 gave no answer in 2.0 s; check power, cable and baud rate"), "did not answer"),
         (NoReply("imu", "no intact Xsens MTi reading on /dev/ttyUSB0 for 2.1 s: nothing came"), "did not answer"),
-        (NoReply("imu", "cannot read air, text came (SSH-2.0), no Modbus; check host"), "did not answer"),
+        (
+            NoReply("imu", "cannot read air, text arrived (SSH-2.0) instead of a Modbus reply; check host"),
+            "did not answer",
+        ),
         (NoReply("imu", "the counter on /dev/ttyUSB0 stands at 7 in 50 readings in a row"), "readings"),
         ("Ann declined: turn the units: no wrench", "cannot be done"),
         ("resumed 5 times without finishing a step; inspect the bench", "never finished a step"),

@@ -191,7 +191,7 @@ def test_the_issue_is_in_the_audit_trail(store: Store) -> None:
 
 def test_as_found_is_by_the_version_in_force_before(store: Store) -> None:
     first = json.loads(_document(store, 1))
-    assert first["as_found"]["basis"] == "the output by its nominal scale, without correction"
+    assert first["as_found"]["basis"] == "the output converted with its nominal scale factor, without correction"
     version = add_version(store)
     second = json.loads(_document(store, version))
     assert second["as_found"]["basis"] == "the calibration in force before, version 1"

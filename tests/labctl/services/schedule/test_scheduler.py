@@ -135,7 +135,7 @@ def test_a_limit_on_lateness_is_kept(lab: Lab) -> None:
     lab.clock.sleep(2 * 3600 + 5400)  # 1.5 h late
     lab.scheduler.tick()
     assert [lab.outcomes(start)[0] for start in (patient, hasty, strict)] == ["refused", "missed", "missed"]
-    assert lab.message(hasty) == "missed: 1 h 30 min late, the limit is 1 h 00 min"
+    assert lab.message(hasty) == "missed: the start was 1 h 30 min late, and the limit is 1 h 00 min"
     assert len(lab.begun) == 1
 
 
