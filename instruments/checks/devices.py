@@ -163,15 +163,19 @@ def _judge_stream(gyro: StreamingGyro, report: DeviceReport) -> None:
     period = gyro.period
     if period.measured_s is not None:
         off_ppm, u_ppm = 1e6 * (period.nominal_s / period.measured_s - 1.0), 1e6 * period.u_share
-        text = f"its clock differs by {off_ppm:+.0f} ppm from the clock of this computer (u = {u_ppm:.2g} ppm, "
-        f"measured over {LISTEN_S:g} s)"
+        text = (
+            f"its clock differs by {off_ppm:+.0f} ppm from the clock of this computer (u = {u_ppm:.2g} ppm, "
+            f"measured over {LISTEN_S:g} s)"
+        )
         report.add([Finding("clock", text, value=off_ppm, unit="ppm")])
     if (steps := gyro.counter_step) is not None:
         found, meant = steps
         text = f"counter step {found}"
         if found != meant:
-            text += f", but the bench file gives {meant}: correct sample_rate_hz or datagram in the bench file, "
-            "or configure the unit"
+            text += (
+                f", but the bench file gives {meant}: correct sample_rate_hz or datagram in the bench file, "
+                "or configure the unit"
+            )
         report.add([Finding("counter", text, "good" if found == meant else "bad", value=float(found))])
 
 

@@ -128,8 +128,9 @@ class Registers:
             return value
         other: WordOrder = "big" if self._word_order == "little" else "little"
         if register.kind == "float32" and register.is_plausible(exchanged := register.decode(words, other)):
-            advice = f"with its two words exchanged the value is {exchanged:g}: set word_order = '{other}' in "
-            "the bench file"
+            advice = (
+                f"with its two words exchanged the value is {exchanged:g}: set word_order = '{other}' in the bench file"
+            )
         elif register.below and value < register.low:
             advice = f"this value is {register.below}: check the sensor and its wires at the controller"
             raise MalformedReply(self._link.device, f"{register} reads {value:g} {register.unit}; {advice}")

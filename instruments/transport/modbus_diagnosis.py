@@ -31,8 +31,10 @@ def explain_tcp(received: bytes, sent: bytes, address: int) -> str:
         return f"the reply has protocol number {protocol} instead of 0 (Modbus TCP); {ADDRESS}"
     if received[:2] != sent[:2]:
         number, asked = (int.from_bytes(each[:2], "big") for each in (received, sent))
-        return f"the reply to request {number} arrived instead of that to request {asked}; find the second "
-        "Modbus master on this link"
+        return (
+            f"the reply to request {number} arrived instead of that to request {asked}; find the second "
+            "Modbus master on this link"
+        )
     if received[TCP_PREFIX_BYTES] != address:
         return _other_unit(received[TCP_PREFIX_BYTES], address)
     return _bytes(received, LINE)
@@ -44,8 +46,9 @@ def other_server(received: bytes) -> str:
         return f"an HTTP server answered, not a Modbus instrument; {ADDRESS}"
     beginning = received[:LEAST_TEXT]
     if len(beginning) == LEAST_TEXT and beginning.isascii() and beginning.decode().isprintable():
-        return f"text arrived ({one_line(received[:LONGEST_TEXT].decode('latin-1'))}) instead of a Modbus "
-        f"reply; {ADDRESS}"
+        return (
+            f"text arrived ({one_line(received[:LONGEST_TEXT].decode('latin-1'))}) instead of a Modbus reply; {ADDRESS}"
+        )
     return ""
 
 

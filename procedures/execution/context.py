@@ -78,8 +78,10 @@ class ExecutionContext:
     def notice_leaving(self, _t_s: float, chamber_c: float, _gyro_c: object) -> None:
         """Note that a soaked temperature no longer holds, once the air has left its band."""
         if self.soaked and abs(chamber_c - self.soaked.temperature_c) > self.soaked.band_c:
-            text = f"the air has left the temperature {self.soaked.temperature_c:g} deg C of the soak and is at "
-            f"{chamber_c:.2f} deg C"
+            text = (
+                f"the air has left the temperature {self.soaked.temperature_c:g} deg C of the soak and is at "
+                f"{chamber_c:.2f} deg C"
+            )
             self.recorder.event(Event("soak_owed", text))
             self.soaked = None
 

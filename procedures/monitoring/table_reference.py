@@ -103,7 +103,10 @@ def rate_event(table: RateTable, found: TableAngles) -> Event | None:
     used = (
         "the encoder is the reference, so this difference does not affect a calibration"
         if found.is_reference
-        else 'the demanded rate is the reference, so this difference becomes part of the scale factor: set reference = "measured" in the bench file'
+        else (
+            "the demanded rate is the reference, so this difference becomes part of the scale factor: set "
+            'reference = "measured" in the bench file'
+        )
     )
     text = (
         f"{table.name}: table_rate_ratio {off_ppm:+.0f} ppm (u {u_ppm:.0f} ppm, limit {limit_ppm:.0f} ppm): its "

@@ -69,8 +69,10 @@ class BenchLimits:
             return str(error)
         if abs(real_dps - rate_dps) <= max_error_fraction * abs(rate_dps):
             return None
-        return f"the nearest rate that the table can run is {real_dps:g} deg/s, more than "
-        f"{100 * max_error_fraction:g} % off"
+        return (
+            f"the nearest rate that the table can run is {real_dps:g} deg/s, more than "
+            f"{100 * max_error_fraction:g} % off"
+        )
 
     def temperature_complaint(self, temperature_c: float) -> str | None:
         """Return why the chamber or a unit cannot stand a temperature, or None."""

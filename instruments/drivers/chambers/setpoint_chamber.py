@@ -143,8 +143,10 @@ class SetpointChamber(ABC):
     def _hindrance(self) -> str:
         """Return why a set point would have no effect, and what to do; an empty text where it has one."""
         if self._profile_runs():
-            return "a profile is running or held on the controller, so a set point would have no effect; end "
-            "the profile at the panel of the controller"
+            return (
+                "a profile is running or held on the controller, so a set point would have no effect; end "
+                "the profile at the panel of the controller"
+            )
         return ""
 
     def _refuse_without_effect(self) -> None:

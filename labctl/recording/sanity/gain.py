@@ -143,8 +143,10 @@ def _size(summary: Summary, axis: str, signed: list[tuple[str, float, Response]]
         return
     where = f"axis {axis}" if len(signed) == 1 else f"axis {axis}, position {position}"
     if size < max(SIGNIFICANT * one.u, 1e-9):
-        said = f"the output does not follow the table: gain {gain:.3g} (output rate divided by table rate), u = "
-        f"{one.u:.2g}"
+        said = (
+            f"the output does not follow the table: gain {gain:.3g} (output rate divided by table rate), u = "
+            f"{one.u:.2g}"
+        )
         do = "check that the table turned, that this axis is along it, and which column is the output"
         yield Finding("no_response", "certain", where, said, gain, "1", EXPECTED, do)
         return

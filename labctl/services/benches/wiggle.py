@@ -161,8 +161,9 @@ def _unit(bench: BenchFile, name: str, found: list[str], moved: Mapping[str, lis
     if found == [name]:
         text = f"the unit is on {port}"
     elif not found:
-        text = f"no unit moved within {WITHIN_S:g} s: turn the unit by more than a quarter turn, and check its "
-        f"port {port}"
+        text = (
+            f"no unit moved within {WITHIN_S:g} s: turn the unit by more than a quarter turn, and check its port {port}"
+        )
     elif len(found) > 1:
         text = f"{' and '.join(found)} moved: turn only the named unit, and start again"
     else:

@@ -18,8 +18,9 @@ def retries_exhausted(standing: ResumePoint) -> str | None:
     """Return why a campaign is not resumed automatically any more, or None."""
     if standing.tries < MAX_RESUMES:
         return None
-    return f"resumed {standing.tries} times without finishing a step; inspect the bench, then run `labctl "
-    "campaign resume`"
+    return (
+        f"resumed {standing.tries} times without finishing a step; inspect the bench, then run `labctl campaign resume`"
+    )
 
 
 def _nothing() -> None:

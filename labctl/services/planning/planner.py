@@ -55,8 +55,10 @@ def _lacking(positions: Sequence[str], bench: BenchFile) -> str:
     """Say which axes a recipe turns that no unit of the bench records, if any; it would run, and show little."""
     recorded = {axis for gyro in bench.gyros for axis in gyro.axes}
     if lacking := sorted({position.lstrip("-") for position in positions} - recorded):
-        return f"the recipe turns the units about {', '.join(lacking)}, but no unit of bench {bench.name} "
-        "measures that axis"
+        return (
+            f"the recipe turns the units about {', '.join(lacking)}, but no unit of bench {bench.name} "
+            "measures that axis"
+        )
     return ""
 
 

@@ -118,8 +118,11 @@ class _Check:
         if found is None:
             self.find("schema", "this is not a labctl database, or its content is lost: there are no tables")
         else:
-            hint = "any other labctl command migrates the database" if found in migrate.KNOWN else "use a newer "
-            "version of labctl"
+            hint = (
+                "any other labctl command migrates the database"
+                if found in migrate.KNOWN
+                else "use a newer version of labctl"
+            )
             self.find(
                 "schema",
                 f"the schema of the database is number {found}, that of this version of labctl "

@@ -106,7 +106,10 @@ def _record(context: ExecutionContext, step: Turn, refused: str, results: dict[s
     else:
         for name, result in results.items():
             came = result.came_deg
-            text = f"{asked}: the unit turned by {came:.1f} deg" if came is not None else f"{asked}: {name} has "
-            "no such axis"
+            text = (
+                f"{asked}: the unit turned by {came:.1f} deg"
+                if came is not None
+                else f"{asked}: {name} has no such axis"
+            )
             context.recorder.event(Event("turn.taken", text, "info", name, came, step.turn_deg, "deg"))
     return _Found(refused, figures)

@@ -77,7 +77,7 @@ def test_what_came_out_is_said(turned: dict[str, float], asked: float, position:
 
 
 def test_a_turn_that_is_too_fast_for_the_unit_is_refused() -> None:
-    assert "the unit measures only up to 400; turn the unit more slowly" in judged({"x": 2600.0}, 2600).refused
+    assert "the unit measures only up to 400 deg/s; turn the unit more slowly" in judged({"x": 2600.0}, 2600).refused
 
 
 def test_lost_readings_are_counted_of_all_that_should_have_come() -> None:

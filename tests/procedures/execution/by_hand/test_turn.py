@@ -94,7 +94,7 @@ def test_no_reading_is_missing_between_the_rests_and_the_turn() -> None:
         ("axis", "deg about axis y, not about axis x"),
         ("direction", "deg in the wrong direction, clockwise"),
         ("nudge", "the unit moved during the rest after the turn"),
-        ("fast", "the unit measures only up to 400; turn the unit more slowly"),
+        ("fast", "the unit measures only up to 400 deg/s; turn the unit more slowly"),
         ("nothing", "the unit turned by only 0 deg about axis x instead of 360 deg"),
     ],
 )
