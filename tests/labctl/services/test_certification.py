@@ -88,7 +88,7 @@ def test_a_table_of_coefficients_has_no_verdict_and_a_reason(lab: Lab) -> None:
     lab.run("fit", TABLE, "--model", "weiss1995")
     act = lab.json("certify", TABLE, "1", *BY, "--reason", "published")
     assert (act["verdict"], act["verdict_at"], act["override"]) == (None, None, False)
-    assert act["verdict_reason"] == "recording 2 is a table of coefficients: no measurements to judge by"
+    assert act["verdict_reason"] == "recording 2 is a table of coefficients and has no measurements to compare with"
     assert "verdict: none: recording 2 is a table" in lab.run("certifications", TABLE).stdout
 
 

@@ -22,10 +22,10 @@ export const ORIGINS = {
 export const VIEWS = {
   map: "the map over rate and temperature",
   time: "the course in time",
-  angle: "the waves in the table angle",
-  frequency: "the waves in time",
+  angle: "the periodic errors over the table angle",
+  frequency: "the periodic errors over time",
   time_in_set: "the mean course of a data set",
-  legs: "from below against from above",
+  legs: "heating compared with cooling",
   previous_rate: "against the rate before",
   repeats: "points measured again",
   worst: "the worst data sets",
