@@ -202,7 +202,8 @@ class BenchFile(Strict):
         stated = [(each.quantity, each.name) for each in self.standards]
         if twice := next((one for one in stated if stated.count(one) > 1), None):
             raise ValueError(
-                f"two [[standards]] have the quantity {twice[0]!r} and the name {twice[1]!r}; remove one, or name both"
+                f"two [[standards]] have the quantity {twice[0]!r} and the name {twice[1]!r}; remove one, or "
+                "give each a different name"
             )
         return self
 

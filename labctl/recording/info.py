@@ -93,5 +93,5 @@ class RecordingInfo(BaseModel):
     @model_validator(mode="after")
     def _axes_once(self) -> RecordingInfo:
         if len(set(self.axes)) != len(self.axes):
-            raise ValueError(f"an axis is repeated in axes = {list(self.axes)}")
+            raise ValueError(f"an axis is repeated in axes = {list(self.axes)}; name each axis once")
         return self

@@ -118,7 +118,9 @@ def read_recipe(source: str | Path) -> Recipe:
         raise RecipeError(f"recipe {path}: not TOML: {error}; correct it") from error
     except FileNotFoundError:
         known = ", ".join(shipped_recipes())
-        raise RecipeError(f"no recipe {str(source)!r}: give a file, or one of {known}") from None
+        raise RecipeError(
+            f"there is no recipe {str(source)!r}; give a recipe file, or one of the names {known}"
+        ) from None
     except (OSError, UnicodeDecodeError) as error:
         raise RecipeError(f"recipe {path}: cannot be read: {error}; check path and permissions") from error
     return parse_recipe(text, where=str(path))

@@ -113,7 +113,7 @@ class Acutrol3000:
         if not moved:
             raise RequestRejected(
                 self.name,
-                f"stopped during a run at {spin.rate_dps:g} deg/s{self._cause()}; check the load, then home it",
+                f"stopped during a run at {spin.rate_dps:g} deg/s{self._cause()}; check the load, then home the table",
             )
 
     def stop(self) -> None:
@@ -135,7 +135,8 @@ class Acutrol3000:
         if self._rate_dps and not moves and (cause := self._cause()):
             raise RequestRejected(
                 self.name,
-                f"stopped during a run at {self._rate_dps:g} deg/s{cause}; check load and interlocks, then home it",
+                f"stopped during a run at {self._rate_dps:g} deg/s{cause}; check load and interlocks, then home "
+                "the table",
             )
         return moves
 

@@ -73,7 +73,7 @@ class MappedColumn(_Strict):
     @model_validator(mode="after")
     def _scale_with_lsb(self) -> MappedColumn:
         if self.scale == 0:
-            raise ValueError("scale is 0; write words per unit, such as 131 (LSB per deg/s)")
+            raise ValueError("scale is 0; write the number of converter counts per unit, such as 131 (LSB per deg/s)")
         if self.scale is not None and not is_lsb(self.unit):
             raise ValueError(f"scale is only for unit = {LSB!r}, but the unit is {self.unit!r}; leave scale out")
         return self

@@ -80,7 +80,8 @@ def _opened(path: Path) -> Iterator[Any]:
         raise
     except Exception as error:
         raise BadRecording(
-            f"{path}: not a whole bag ({type(error).__name__}: {' '.join(str(error).split())[:200]}); run `rosbag "
+            f"{path}: not a complete ROS bag ({type(error).__name__}: {' '.join(str(error).split())[:200]}); "
+            "run `rosbag "
             "reindex` or `ros2 bag reindex` on it, or record again"
         ) from error
 

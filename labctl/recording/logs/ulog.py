@@ -89,7 +89,7 @@ def _parsed(path: Path) -> Any:
         raise
     except Exception as error:  # the parser raises whatever broken bytes lead it to
         raise BadRecording(
-            f"{path}: not a whole ULog file ({type(error).__name__}: {str(error)[:200]}); take the log off the "
+            f"{path}: not a complete ULog file ({type(error).__name__}: {str(error)[:200]}); take the log off the "
             "card again"
         ) from error
 

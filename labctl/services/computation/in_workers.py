@@ -131,7 +131,7 @@ class InWorkers(Pool):
     def _died(self, job: Job, worker: ForkServerProcess) -> Exception:
         """Return the error of a worker that ended without a result."""
         if job.is_abandoned:
-            return Cancelled("its clients have left")
+            return Cancelled("its clients have disconnected")
         if self._closed:
             return ComputationEnded(ENDS)
         with _processes:

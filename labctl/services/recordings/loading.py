@@ -83,7 +83,7 @@ def newest_row(store: Store, serial: str, recording: int | None, *, other_unit: 
     store.units.get(serial)
     rows = store.recordings.of_unit(serial) if recording is None else [store.recordings.get(recording)]
     if not rows:
-        raise NotFound(f"unit {serial!r} has no recording; `labctl import DIR` or a campaign creates one")
+        raise NotFound(f"unit {serial!r} has no recording; `labctl import DIR` or a campaign creates a recording")
     row = next((row for row in rows if _measured(row)), rows[0])
     if row.serial != serial and not other_unit:
         raise NotFound(

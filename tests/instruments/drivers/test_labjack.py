@@ -226,7 +226,7 @@ def test_silence(labjack: Callable[..., Any]) -> None:
 
 @pytest.mark.parametrize(
     ("options", "text"),
-    [({"inputs": [0, 1]}, "2 inputs for 1 axes"), ({"thermometer_input": 0}, "an input carries two signals")],
+    [({"inputs": [0, 1]}, "2 inputs for 1 axes"), ({"thermometer_input": 0}, "one input is given for two signals")],
 )
 def test_wrong_wiring_is_refused(labjack: Callable[..., Any], options: dict[str, Any], text: str) -> None:
     with pytest.raises(ValidationError, match=text):

@@ -266,7 +266,7 @@ def test_nobody_answers(rig: Any) -> None:
     rig.operator = HumanOperator()
     outcome = rig.run(rig.recipe(on_failure={"operator_timeout_s": 900}))
     assert outcome.state == CampaignState.FAILED
-    assert "no answer within 900 s: turn the units" in outcome.reason
+    assert "no answer within 900 s to the request: turn the units" in outcome.reason
     assert rig.operator.pending is None
 
 

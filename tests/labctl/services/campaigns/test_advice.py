@@ -53,7 +53,7 @@ def test_every_guard_is_told_in_its_own_words(kind: str, change: dict[str, Any])
     [
         (SoakFailed("the soak at 60 deg C did not settle within 7200 s: it drifts"), "did not settle"),
         (SoakFailed("chamber: 31.2 deg C after 7200 s, not within 0.5 deg C of 60 deg C; limit 7200 s"), "set point"),
-        (Unanswered("no answer within 600 s: turn the units"), "not answered in time"),
+        (Unanswered("no answer within 600 s to the request: turn the units"), "not answered in time"),
         (BadData("fog", "not one of about 500 readings came; check cable, power and baud rate"), "readings"),
         (NoReply("table", "/dev/ttyUSB0 gave no answer in 2.0 s; check power, cable and baud rate"), "did not answer"),
         (NoReply("imu", "no intact Xsens MTi reading on /dev/ttyUSB0 for 2.1 s: nothing came"), "did not answer"),

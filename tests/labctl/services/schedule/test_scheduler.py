@@ -161,7 +161,7 @@ def test_a_cron_line_that_may_not_be_late_goes_on_the_next_day(lab: Lab) -> None
 
 
 def test_a_refused_start_says_why_and_does_not_block_the_others(lab: Lab) -> None:
-    lab.refusal = PlanRefused("short", ["rate 900 deg/s is beyond the table's 400 deg/s"], "ask for less")
+    lab.refusal = PlanRefused("short", ["rate 900 deg/s is beyond the limit of the table, 400 deg/s"], "ask for less")
     first, second = lab.enter(at="now"), lab.enter(at="now")
     lab.scheduler.tick()
     assert lab.outcomes(first) == lab.outcomes(second) == ["refused"]

@@ -204,7 +204,9 @@ def test_a_person_who_is_gone_ends_the_campaign_at_the_time_limit() -> None:
     there = HandBench(operator=Person(lambda _, __: None))
     outcome = there.run()
     assert outcome.state == "failed"
-    assert outcome.reason.startswith("no answer within 20 s: turn the units by 360 deg counter-clockwise")
+    assert outcome.reason.startswith(
+        "no answer within 20 s to the request: turn the units by 360 deg counter-clockwise"
+    )
     assert there.operator.pending is None
 
 
