@@ -207,8 +207,8 @@ class Compensator:
             )
             raise BadInput(
                 f"sample {row + 1}: {what} (the range calibrated for {self.calibration.serial} version "
-                f"{self.calibration.version}); with outside = 'clamp' the sample is corrected as at the edge of "
-                "the range and flagged"
+                f"{self.calibration.version}); set outside = 'clamp' to correct such a sample as at the "
+                "edge of the range and flag it"
             )
         return np.asarray(cold | fast)
 

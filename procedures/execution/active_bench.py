@@ -62,6 +62,6 @@ class ActiveBench:
             self.rate_table.stop()
 
     def drop(self, gyro: str, reason: str) -> Gyro:
-        """Let a unit take no further part; returns it."""
+        """Exclude a unit from the rest of the campaign; returns it."""
         self.dropped[gyro] = reason
         return self.gyros.pop(gyro)

@@ -65,7 +65,7 @@ class ExecutionContext:
         return device in self.bench.gyros and len(self.bench.gyros) > 1
 
     def drop(self, gyro: str, reason: str) -> None:
-        """Let a unit take no further part; the others go on."""
+        """Exclude a unit from the rest of the campaign; the others go on."""
         unit = self.bench.drop(gyro, reason)
         self.monitor.forget(gyro)
         with contextlib.suppress(InstrumentError, OSError):  # its stream is closed once more in the safe state

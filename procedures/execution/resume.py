@@ -29,7 +29,7 @@ class Restart:
     gap_s: float = math.inf  #: for how long nothing was recorded; infinite where a soak was owed already
     power_lost: bool = False  #: the units were off meanwhile
     added_runs: int = 0  #: powered sessions more than the plan has, this one among them
-    dropped: Mapping[str, str] = field(default_factory=dict)  #: units that took no further part, and why
+    dropped: Mapping[str, str] = field(default_factory=dict)  #: units that were excluded, and why
     skipped: frozenset[int] = frozenset()  #: steps that were left out before
 
 

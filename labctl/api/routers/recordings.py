@@ -109,7 +109,7 @@ async def preview(
     modified_ms: ModifiedField = None,
 ) -> LogPreview:
     """The proposed map of a log, or what it becomes by the map that is sent; its first rows, traces, and everything
-    that is wrong. Nothing of it is kept."""
+    that is wrong. Nothing is stored."""
     given, options = sent_map(column_map), parsed_options(option or ())
     return await with_files(
         request,

@@ -16,7 +16,7 @@ RAD_PER_DEG = math.pi / 180.0
 COMMON = frozenset({"clock", "table_rate", "turn_angle"})
 OWN_THERMOMETER = "cancels: the unit's own thermometer is read in the calibration and in use"
 NOT_STATED = "not stated, so its contribution is not in U; add the standard to [[standards]] of the bench file"
-NOT_KEPT = "the version was made by an older labctl, which did not store its standards: fit it again"
+NOT_KEPT = "the version was made by an older version of labctl, which did not store its standards: fit it again"
 NO_TIME_BASE = (
     "not stated, so its contribution is not in U; if the certificate of table_rate includes the time base, "
     "state the standard with u = 0"

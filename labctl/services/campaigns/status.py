@@ -163,7 +163,7 @@ def describe_interrupted(answer: CampaignResponse) -> str:
 
 def outlives_its_process(row: CampaignRow) -> bool:
     """Return whether a campaign's bench is still there, as it was, when the process that drove it is gone."""
-    # the simulation may be another labctl's, whose settings are not known any more
+    # the simulation may be that of another version of labctl, whose settings are not known any more
     return not BenchFile.model_validate({**row.bench, "simulation": None}).is_simulated
 
 

@@ -71,7 +71,7 @@ class ImproveRequest(Request):
 
 
 class ModelResponse(ResponseModel):
-    """Which effects a calibration is made of; null: made by an older labctl, which did not say."""
+    """Which effects a calibration is made of; null: made by an older version of labctl, which did not say."""
 
     name: str
     effects: list[str]

@@ -169,7 +169,7 @@ class CampaignPlanResponse(ResponseModel):
     campaign: int
     recipe: str
     text: str = Field(
-        description="Text of the recipe that was run, TOML; empty: an older labctl ran the campaign "
+        description="Text of the recipe that was run, TOML; empty: an older version of labctl ran the campaign "
         "and did not store the text."
     )
     bench: str

@@ -287,7 +287,7 @@ class LogTrace(ResponseModel):
 
 
 class LogPreview(ResponseModel):
-    """A log, its column map, and the recording that it would become; nothing of it was kept."""
+    """A log, its column map, and the recording that it would become; nothing was imported."""
 
     file: str
     importer: str

@@ -132,7 +132,7 @@ class UncertaintyGrid(ResponseModel):
 
 
 class UncertaintyResponse(ResponseModel):
-    """The uncertainty of a corrected rate on later days; the noise of a single reading comes on top."""
+    """The uncertainty of a corrected rate on later days; the noise of a single reading is not included."""
 
     serial: str
     version: int

@@ -116,7 +116,7 @@ class Database:
     def outlast(self, work: Callable[[], ResultT]) -> ResultT:
         """Do something again for as long as the server does not answer, at most `patience_s`.
 
-        Returns what `work` does. Raises DatabaseUnreachable after that time; then, too, nothing of it was kept.
+        Returns what `work` does. Raises DatabaseUnreachable after that time; then, too, nothing was stored.
         """
         end_s = self._clock.now_s() + self._backend.patience_s
         while True:

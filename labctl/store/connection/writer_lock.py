@@ -42,7 +42,7 @@ def _describe(holder: Holder) -> str:
             f"campaign {holder.campaign} runs in process {holder.pid}'s terminal: Ctrl-C there ends it safely. "
             "Wait for its end: only a campaign under `labctl serve` can be paused or aborted by another command"
         )
-    who = f"the service at {holder.url}" if holder.url else f"another labctl (process {holder.pid})"
+    who = f"the service at {holder.url}" if holder.url else f"process {holder.pid} of labctl"
     return f"{who} is writing to this database; wait until it ends, or send the request to that process"
 
 

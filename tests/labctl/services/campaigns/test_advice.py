@@ -64,7 +64,10 @@ def test_every_guard_is_told_in_its_own_words(kind: str, change: dict[str, Any])
         (NoReply("imu", "the counter on /dev/ttyUSB0 stands at 7 in 50 readings in a row"), "readings"),
         ("Ann declined: turn the units: no wrench", "cannot be done"),
         ("resumed 5 times without finishing a step; inspect the bench", "never finished a step"),
-        ("taken up 5 times without finishing a step; look at the bench", "never finished a step"),  # of an older labctl
+        (
+            "taken up 5 times without finishing a step; look at the bench",
+            "never finished a step",
+        ),  # of an older version of labctl
         ("not resumed: bench b was not confirmed safe: table to rest", "not confirmed safe"),
         ("ended by an error of the program", "fault in labctl itself"),
         ("ZeroDivisionError: division by zero", "fault in labctl itself"),
