@@ -17,8 +17,8 @@ VERBS = frozenset(
     re.findall(
         r"\w+",
         """
-    abort accept add allow answer ask calibrate call change check choose clear compare configure confirm connect correct count
-    create delete divide do end exchange export find fit free get give home import inspect install keep lay leave
+    abort accept add allow answer ask calibrate call change check choose clear compare configure confirm connect correct
+    count create delete divide do end exchange export find fit free get give home import inspect install keep lay leave
     let list log lower make mark measure move name open pass pause plan press put query raise read record reduce remove
     rename repair repeat replace report request reset restart restore resume rewrite run save say send set shorten
     show sort start state stop subtract switch take tick try turn unlock update use wait write
