@@ -84,9 +84,9 @@ def modbus(driver: str, what: str, unit: int) -> list[Behaviour]:
         Behaviour(driver, "unplugged (EIO)", Unplugged, (
             LinkError, f"{cannot}, the link was lost; check cable and power {TRIES}")),
         Behaviour(driver, "does not know the function", faults=exception(1), says=(
-            RequestRejected, f"{refused} 1, it does not know the function; check driver and address")),
+            RequestRejected, f"{refused} 1, the instrument does not know the function; check driver and address")),
         Behaviour(driver, "has no such register", faults=exception(2), says=(
-            RequestRejected, f"{refused} 2, it has no such register, .*; check model and driver")),
+            RequestRejected, f"{refused} 2, the instrument has no such register, .*; check model and driver")),
         Behaviour(driver, "fails inside", faults=exception(4), says=(
             RequestRejected, f"{refused} 4, the instrument has an internal failure; read its panel")),
         Behaviour(driver, "is busy for ever", faults=exception(6), says=(
@@ -94,7 +94,8 @@ def modbus(driver: str, what: str, unit: int) -> list[Behaviour]:
         Behaviour(driver, "is busy twice", faults=lambda faults: faults.arm("modbus_exception", value=6, count=2),
                   gives=fine),
         Behaviour(driver, "memory parity error", faults=exception(8), says=(
-            RequestRejected, f"{refused} 8, memory parity error; switch it off and on, and have it repaired")),
+            RequestRejected, (f"{refused} 8, the instrument has a memory parity error; switch it off "
+            "and on, and have it repaired"))),
         Behaviour(driver, "gateway without a path", faults=exception(10), says=(
             RequestRejected, f"{refused} 10, gateway path unavailable; check the gateway's serial port settings")),
         Behaviour(driver, "gateway without a device", faults=exception(11), says=(
@@ -126,12 +127,12 @@ TCP = [
     (
         "reply to another request",
         lambda _, reply: b"\x77\x77" + reply[2:],
-        r"the reply to request 30583 came, not to re",
+        r"the reply to request 30583 arrived instead of that to re",
     ),
     (
         "another protocol number",
         lambda _, reply: reply[:2] + b"\0\1" + reply[4:],
-        r"protocol number 1 came, Modbus TCP h",
+        r"the reply has protocol number 1 instead of 0",
     ),
     (
         "a byte too many",
@@ -185,7 +186,8 @@ class RefusesMoves(Wire):
 def of_table() -> list[Behaviour]:
     """Return what the controller of the table may do."""
     silent = r"sim://arrick gave no answer in 1.0 s; check power, cable and baud rate"
-    other = r"sim://arrick answered {}, not a C4; check the name of the port and the baud rate$"
+    other = r"sim://arrick answered {}, which is not the answer of a C4 controller; check the name "
+    r"of the port and the baud rate$"
     return [
         Behaviour(C4, "mute", Deaf, (NoReply, silent)),
         Behaviour(C4, "always slower than the time-out", lambda wire: Late(wire, 90.0), (NoReply, silent)),
@@ -196,9 +198,11 @@ def of_table() -> list[Behaviour]:
         Behaviour(C4, "is another controller", through(lambda data, _: data.replace(b"C4", b"MD")), (
             WrongInstrument, other.format("'MD simulated'"))),
         Behaviour(C4, "echo of what is sent", Echoes, (
-            WrongInstrument, r"sim://arrick answered '!1fp', not a C4; the line sends back what is sent: switch")),
+            WrongInstrument, (r"sim://arrick answered '!1fp', which is not the answer of a C4 "
+            r"controller; the line echoes what labctl sends: switch"))),
         Behaviour(C4, "flood of a", lambda wire: Flood(wire, b"aaaa"), (
-            NoReply, "sim://arrick gave no answer in 1.0 s; letters come that answer nothing; find what else sends")),
+            NoReply, ("sim://arrick gave no answer in 1.0 s; letters arrive that answer no command; "
+            "find what else sends"))),
         Behaviour(C4, "refuses everything", faults=lambda faults: faults.arm("refusal"), says=(
             WrongInstrument, other.format("'e'"))),
         Behaviour(C4, "refuses a move", RefusesMoves, (
@@ -210,7 +214,8 @@ def of_table() -> list[Behaviour]:
         Behaviour(C4, "ends lines with LF", through(lambda data, _: data.replace(b"\r\n", b"\n")), gives=fine),
         Behaviour(C4, "ends lines with CR", through(lambda data, _: data.replace(b"\r\n", b"\r")), gives=fine),
         Behaviour(C4, "motor stalls", faults=lambda faults: faults.arm("stall"), says=(
-            MalformedReply, r"\d+ steps took [\d.]+ s instead of [\d.]+ s; check speed_template, .* motor stalls")),
+            MalformedReply, (r"\d+ steps took [\d.]+ s instead of [\d.]+ s; check speed_template, .* "
+            r"motor does not stall"))),
     ]  # fmt: skip
 
 

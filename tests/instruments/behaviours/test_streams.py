@@ -180,7 +180,7 @@ def of_each(driver: str) -> list[Behaviour]:
         Behaviour(driver, "clock 3 % fast", gives=lambda found: found.lost == 0, changes=clock_off(3e4)),
         Behaviour(
             driver, "clock 8 % fast", None,
-            (WrongInstrument, r"sends [\d.]+ readings/s on sim://\S+, and the bench file says .*; set sample_rate_hz"),
+            (WrongInstrument, r"sends [\d.]+ readings/s on sim://\S+, but the bench file says .*; set sample_rate_hz"),
             changes=clock_off(8e4),
         ),
         Behaviour(driver, "switched off for 1.5 s", Reset, gives=told),
@@ -192,7 +192,7 @@ def of_each(driver: str) -> list[Behaviour]:
 
 
 SET_OTHERWISE = (
-    r"the unit on sim://\S+ is not configured as the bench file requires:  {}.*; configure the unit in its service mode"
+    r"the unit on sim://\S+ is not configured as the bench file requires: {}.*; configure the unit in its service mode"
 )
 STANDS = (
     MalformedReply,
@@ -203,9 +203,9 @@ STANDS = (
 )
 SPECIAL = [
     Behaviour(STIM, "sends increments", changes=device(output_unit="incremental"), says=(
-        WrongInstrument, SET_OTHERWISE.format("gyro output unit INCREMENTAL ANGLE"))),
+        WrongInstrument, SET_OTHERWISE.format("the gyro output unit is INCREMENTAL ANGLE"))),
     Behaviour(STIM, "sends 250 a second", changes=device(sample_rate_hz=250), says=(
-        WrongInstrument, SET_OTHERWISE.format("sample rate 250"))),
+        WrongInstrument, SET_OTHERWISE.format("the sample rate is 250"))),
     Behaviour(STIM, "sends another datagram", changes=device(datagram=0xA5), says=(
         WrongInstrument, SET_OTHERWISE.format("the datagram is 0xA5 instead of 0x94"))),
     Behaviour(STIM, "is another unit", changes=lambda record: (

@@ -38,7 +38,7 @@ EXPECTED = {
     "path of the port in /dev/serial/by-id",
     "mute": "no intact datagram on {0} within 1.5 s: no bytes arrived; check power, cable and bit rate 460800, "
     "datagram 0x94 and crlf",
-    "fast": "sends 110 readings/s on {0}, and the bench file says 100, limit +-4 %; set sample_rate_hz = 110 or "
+    "fast": "sends 110 readings/s on {0}, but the bench file says 100, limit +-4 %; set sample_rate_hz = 110 or "
     "configure "
     "the unit",
 }
@@ -80,7 +80,7 @@ def test_what_a_technician_needs_is_found_on_the_triaxial_bench() -> None:
     assert unit["counter"] == 16.0
     assert abs(unit["clock"] or 0.0) < 5.0
     assert found["mems"].reported["serial"].startswith("N")
-    assert "u 0" in next(f.text for f in found["mems"].findings if f.what == "clock")
+    assert "u = 0" in next(f.text for f in found["mems"].findings if f.what == "clock")
 
 
 def test_the_drift_of_a_clock_is_measured() -> None:
@@ -177,7 +177,7 @@ def test_an_open_port_is_judged_by_name_adapter_users_and_latency(
     ]  # fmt: skip
     assert found[0].text == f"port {port} on USB adapter A9"
     assert found[1].text.endswith(f"set port = '{folder}/usb-FTDI_A9-if00-port0'")
-    assert found[2].text.startswith("process 812 (ModemManager) has ")
+    assert found[2].text.startswith("process 812 (ModemManager) also has ")
     assert found[3].text == (f"the adapter delays received bytes by up to 16 ms: run `echo 1 | sudo tee {timer}`")
     by_id = port_checks.of_open_port(str(folder / "usb-FTDI_A9-if00-port0"), wants_quick=False)
     assert [each.state for each in by_id] == ["good", "doubtful", "good"]

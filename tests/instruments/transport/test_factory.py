@@ -27,7 +27,8 @@ from instruments.transport.factory import Ports
 def test_a_simulated_address_needs_a_simulation(opener: Any) -> None:
     with pytest.raises(
         LinkError,
-        match=r"table: sim://.* is a simulated instrument, but this bench has no simulation; correct the address",
+        match=r"table: sim://.* is the address of a simulated instrument, but this bench is not "
+        r"simulated; correct the address",
     ):
         opener(Ports(VirtualClock()))
 

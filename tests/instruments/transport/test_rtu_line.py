@@ -117,7 +117,10 @@ def test_a_line_without_a_fault_waits_for_nothing() -> None:
 def test_a_line_that_is_never_silent_is_said_in_bounded_time() -> None:
     line = Line()
     line.transmit = lambda _t_s: b"\x55\xaa"  # type: ignore[method-assign]
-    with pytest.raises(MalformedReply, match=r"chamber: the line was never silent for .* find a second Modbus master"):
+    with pytest.raises(
+        MalformedReply,
+        match=r"chamber: labctl sent .*, but the line was never silent for .* find a second Modbus master",
+    ):
         line.registers.get(AIR)
     assert line.clock.now_s() < 70
     line.registers.close()

@@ -33,13 +33,13 @@ WRONG = [
     (changed("serial-csv", "line", "fields", 0, unit=None), "field gyro_x has no unit; add one like unit = 'rad/s'"),
     (changed("serial-csv", "line", "fields", 1, name="gyro_x"), "two fields have the name 'gyro_x'"),
     (changed("serial-csv", "line", "fields", 1, name="gyro_w"), "no field is named gyro_x, gyro_y or gyro_z"),
-    (changed("kvh-1750", counter={"field": "count", "wrap": 128}), "counter: no field is named 'count' (there"),
+    (changed("kvh-1750", counter={"field": "count", "wrap": 128}), "counter: no field is named 'count'; choose one"),
     (changed("kvh-1750", "frame", sync="FE 8"), ("'FE 8' is not a series of hexadecimal bytes; write "
     "it like 'FE 81 FF 55'")),
     (changed("kvh-1750", "frame", sync=""), "sync is empty; give the bytes with which every frame begins"),
     (changed("kvh-1750", "frame", length=30), ("field accel_z_g ends at byte 28, but the data of a "
     "frame end at byte 26")),
-    (changed("kvh-1750", "frame", "checksum", algorithm="crc32/mpeg2"), "no checksum 'crc32/mpeg2' is known"),
+    (changed("kvh-1750", "frame", "checksum", algorithm="crc32/mpeg2"), "checksum 'crc32/mpeg2' is not known"),
     (changed("kvh-1750", "frame", "checksum", algorithm="md5"), ("checksum 'md5' is not known; "
     "choose one of xor8, sum8")),
     (changed("kvh-1750", "frame", "fields", 0, type="f16"), "Input should be 'u8', 'i8'"),
