@@ -70,9 +70,14 @@ class ChamberSettings(DeviceSettings):
     @model_validator(mode="after")
     def _in_order(self) -> ChamberSettings:
         if not self.min_c < self.max_c:
-            raise ValueError(f"min_c {self.min_c:g} must be below max_c {self.max_c:g}")
+            raise ValueError(
+                f"min_c = {self.min_c:g} deg C must be below max_c = {self.max_c:g} deg C; correct one of the two"
+            )
         if not self.min_c <= self.safe_c <= self.max_c:
-            raise ValueError(f"safe_c {self.safe_c:g} must lie between min_c {self.min_c:g} and max_c {self.max_c:g}")
+            raise ValueError(
+                f"safe_c = {self.safe_c:g} deg C must lie between min_c = {self.min_c:g} and max_c "
+                f"= {self.max_c:g} deg C; correct it"
+            )
         return self
 
 
@@ -171,7 +176,7 @@ class BenchFile(Strict):
         for what in ("name", "serial", "port"):
             given = [value for unit in self.gyros if (value := getattr(unit, what)) is not None]
             if twice := next((value for value in given if given.count(value) > 1), None):
-                raise ValueError(f"two gyros have the {what} {twice!r}; each needs its own")
+                raise ValueError(f"two gyros have the {what} {twice!r}; give each gyro a different one")
         return self
 
     @model_validator(mode="after")
@@ -180,10 +185,15 @@ class BenchFile(Strict):
         names = ["table", "chamber", *(unit.name for unit in self.gyros)]
         for reference in self.references:
             if reference.name in names:
-                raise ValueError(f"two instruments have the name {reference.name!r}; give [[references]] another name")
+                raise ValueError(
+                    f"two instruments have the name {reference.name!r}; give the one in [[references]] another name"
+                )
             names.append(reference.name)
         if len(chosen := [each.name for each in self.references if each.is_temperature]) > 1:
-            raise ValueError(f"is_temperature is set for {' and '.join(chosen)}; the fit takes one temperature")
+            raise ValueError(
+                f"is_temperature is set for {' and '.join(chosen)}, but a fit uses one "
+                "temperature; set it for one of these columns"
+            )
         return self
 
     @model_validator(mode="after")
@@ -192,7 +202,8 @@ class BenchFile(Strict):
         stated = [(each.quantity, each.name) for each in self.standards]
         if twice := next((one for one in stated if stated.count(one) > 1), None):
             raise ValueError(
-                f"two [[standards]] have the quantity {twice[0]!r} and the name {twice[1]!r}; remove one, or name both"
+                f"two [[standards]] have the quantity {twice[0]!r} and the name {twice[1]!r}; remove one, or "
+                "give each a different name"
             )
         return self
 

@@ -45,7 +45,7 @@ class ScaledClock:
 
     def __init__(self, speed: float = 1.0, *, now_s: float = 0.0) -> None:
         if not speed > 0:
-            raise ValueError(f"clock speed must be positive, not {speed}")
+            raise ValueError(f"the speed of a clock is {speed}; give a number above 0 (1 is real time)")
         self.speed = speed
         self._wall_start_s = time.monotonic() - now_s / speed
         self._utc_start = datetime.now(UTC) - timedelta(seconds=now_s)
@@ -87,7 +87,7 @@ class VirtualClock:
 
     def __init__(self, start: datetime = datetime(2026, 1, 5, 8, 0, tzinfo=UTC)) -> None:
         if start.tzinfo is None:
-            raise ValueError("a clock starts at an aware instant; give the start a time zone")
+            raise ValueError("the start of a clock has no time zone; give one, such as UTC")
         self._now_s = 0.0
         self._start = start.astimezone(UTC)
 

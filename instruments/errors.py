@@ -42,11 +42,11 @@ class LinkError(InstrumentError):
 
 
 class NoReply(LinkError):
-    """No reply came within the time-out."""
+    """No reply arrived within the time-out."""
 
 
 class MalformedReply(LinkError):
-    """A reply came that does not fit the protocol or the request."""
+    """A reply arrived that does not fit the protocol or the request."""
 
 
 class RequestRejected(InstrumentError):

@@ -20,10 +20,12 @@ class Contact(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, str_strip_whitespace=True)
 
     name: str = Field(default="", pattern=LINE)
-    street: str = Field(default="", pattern=LINE, description="Street and number, or box.")
+    street: str = Field(default="", pattern=LINE, description="Street and number, or post-office box.")
     post_code: str = Field(default="", pattern=LINE)
     city: str = Field(default="", pattern=LINE)
-    country: str = Field(default="", pattern=rf"{COUNTRY}|^$", description="ISO 3166-1 alpha-2, as DE.")
+    country: str = Field(
+        default="", pattern=rf"{COUNTRY}|^$", description="Code of the country (ISO 3166-1 alpha-2), such as DE."
+    )
     email: str = Field(default="", pattern=LINE)
     phone: str = Field(default="", pattern=LINE)
 
@@ -31,10 +33,14 @@ class Contact(BaseModel):
 class Laboratory(Contact):
     """The laboratory of a bench file: `[laboratory]`."""
 
-    accreditation: str = Field(default="", pattern=LINE, description="Code under which it is accredited; empty: none.")
+    accreditation: str = Field(
+        default="", pattern=LINE, description="Accreditation number of the laboratory; empty: not accredited."
+    )
     place: Place = "laboratory"
     #: Address of labctl as a customer reaches it: a certificate's QR code leads to the version there.
     url: str = Field(default="", pattern=r"^(https?://[^\s\x00-\x1f]{1,300})?$")
     #: In front of the number of every certificate: two laboratories then have none in common.
     number_prefix: str = Field(default="", pattern=r"^[A-Za-z0-9._/-]{0,40}$")
-    procedure: str = Field(default="", pattern=LINE, description="Number of its written procedure.")
+    procedure: str = Field(
+        default="", pattern=LINE, description="Number of the laboratory's written calibration procedure."
+    )

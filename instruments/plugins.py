@@ -206,7 +206,7 @@ class PluginGroup(Generic[PluginT]):
         hint = f"did you mean {near[0]!r}? If not, " if near else ""
         listed = ", ".join(f"{each} ({self._by_name[each][0].release})" for each in names)
         return (
-            f"no {self.noun} {name!r} is installed (there are {listed or 'none'}); {hint}{self._advice}{self._stale()}"
+            f"no {self.noun} {name!r} is installed (installed: {listed or 'none'}); {hint}{self._advice}{self._stale()}"
         )
 
     def _stale(self) -> str:

@@ -75,12 +75,12 @@ class Standard(BaseModel):
         if len(given) != 1:
             stated = " and ".join(given) or "none"
             raise ValueError(
-                f"standard {self.quantity}: {stated} of u, expanded and half_width is given; give exactly one, in "
-                f"{UNITS[self.quantity][0]}"
+                f"standard {self.quantity}: {stated} of the keys u, expanded and half_width are given; give "
+                f"exactly one, in {UNITS[self.quantity][0]}"
             )
         if self.half_width is not None and self.distribution not in HALF_WIDTHS:
             raise ValueError(
-                f"standard {self.quantity}: half_width = {self.half_width:g} has no meaning for a normal "
+                f"standard {self.quantity}: half_width = {self.half_width:g} is not defined for a normal "
                 f"distribution; set distribution to one of {', '.join(HALF_WIDTHS)}"
             )
         return self
@@ -89,7 +89,10 @@ class Standard(BaseModel):
     def _usable(self) -> Standard:
         allowed = UNITS[self.quantity]
         if self.unit is not None and self.unit not in allowed:
-            raise ValueError(f"standard {self.quantity}: unit {self.unit!r}; give it in {' or '.join(allowed)}")
+            raise ValueError(
+                f"standard {self.quantity}: unit {self.unit!r} is not accepted; give the "
+                f"uncertainty in {' or '.join(allowed)}"
+            )
         if self.calibrated is not None and self.due is not None and self.due < self.calibrated:
             raise ValueError(
                 f"standard {self.quantity}: due {self.due} is before calibrated {self.calibrated}; correct the dates"

@@ -48,14 +48,16 @@ def read_toml_text(path: Path) -> str:
     with path.open("rb") as file:
         content = file.read(MOST_BYTES + 1)
     if len(content) > MOST_BYTES:
-        raise tomllib.TOMLDecodeError(f"larger than {MOST_BYTES} bytes, the limit for such a file")
+        raise tomllib.TOMLDecodeError(f"larger than {MOST_BYTES} bytes, the limit of such a file")
     return content.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
 
 
 def parse_toml(text: str) -> dict[str, object]:
     """Return what a TOML text says. Raises TOMLDecodeError, also where it is too long or nested too deeply."""
     if len(text) > MOST_BYTES:
-        raise tomllib.TOMLDecodeError(f"{len(text)} characters; at most {MOST_BYTES} are read")
+        raise tomllib.TOMLDecodeError(
+            f"{len(text)} characters long; the limit of such a file is {MOST_BYTES} characters"
+        )
     _refuse_deep(text)
     try:
         return tomllib.loads(text)
@@ -81,7 +83,7 @@ def _refuse_deep(text: str) -> None:
             brackets += (mark in "[{") - (mark in "]}")
         if brackets > DEEPEST or parts >= DEEPEST:
             line = text.count("\n", 0, token.start()) + 1
-            what = "brackets stand" if brackets > DEEPEST else "a key has parts"
+            what = "brackets are nested" if brackets > DEEPEST else "a dotted key is"
             raise tomllib.TOMLDecodeError(
-                f"line {line}: {what} more than {DEEPEST} deep; no file of labctl is nested as deeply; correct it"
+                f"line {line}: {what} more than {DEEPEST} levels deep, the limit of such a file"
             )

@@ -86,7 +86,7 @@ class Calibration:
         with _reading("axes"):
             axes = self.document["axes"]
             if not (isinstance(axes, list) and axes and set(axes) <= set(get_args(Axis))):
-                raise ValueError(f"{str(axes)[:80]} instead of some of x, y and z")
+                raise ValueError(f"{str(axes)[:80]} is not a list of axes; give one or more of x, y and z")
             return tuple(axes)
 
     @cached_property
@@ -218,7 +218,8 @@ def read_calibration(source: Path | bytes) -> Calibration:
         schema = document.get("schema") if isinstance(document, dict) else None
         if schema != SCHEMA:
             raise BadCalibrationFile(
-                f"{name}: schema {repr(schema)[:80]}, this labctl reads {SCHEMA!r}; use the labctl that wrote it"
+                f"{name}: the file has schema {repr(schema)[:80]}, but this version of labctl reads {SCHEMA!r}; "
+                "use the version that wrote the file"
             )
         whole, found = _canonical_and_hash(document)
         if whole != content.strip():

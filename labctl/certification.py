@@ -81,10 +81,10 @@ def warn(text: str) -> None:
 
 def _instant(text: object) -> datetime:
     if not isinstance(text, str):
-        raise TypeError(f"{text!r} instead of a time")
+        raise TypeError(f"{text!r} is not a time; write it as 2027-03-01T08:00:00Z")
     found = datetime.fromisoformat(text)
     if found.tzinfo is None:
-        raise ValueError(f"{text!r} has no time zone")
+        raise ValueError(f"{text!r} has no time zone; end it with Z or an offset such as +01:00")
     return found.astimezone(UTC)
 
 

@@ -67,7 +67,7 @@ class Compensator:
         Raises BadInput for another word in `outside`.
         """
         if outside not in {"clamp", "refuse"}:
-            raise BadInput(f"outside = {outside!r}: give 'clamp' or 'refuse'")
+            raise BadInput(f"outside = {outside!r} is not known; give 'clamp' or 'refuse'")
         self.calibration = calibration
         #: That the calibration was overdue or revoked when it was loaded; empty where it was neither.
         self.warning = calibration.warning((clock or SystemClock()).utc()) if calibration.certification else ""
@@ -187,8 +187,8 @@ class Compensator:
             return temperature_c
         if self.needs_temperature:
             raise BadInput(
-                f"{self.calibration.serial}: its calibration is of {self._low_c:g} to {self._high_c:g} deg C; give the "
-                "temperature of each sample"
+                f"{self.calibration.serial}: its calibration depends on the temperature ({self._low_c:g} to "
+                f"{self._high_c:g} deg C); give temperature_c for each sample"
             )
         return STAND_IN_C
 
@@ -206,8 +206,9 @@ class Compensator:
                 else f"rate {raw[row].tolist()} deg/s outside {self._slow:g} to {self._fast:g} deg/s"
             )
             raise BadInput(
-                f"sample {row + 1}: {what} calibrated for {self.calibration.serial} "
-                f"version {self.calibration.version}; ask for clamp to correct it at the edge and flag it"
+                f"sample {row + 1}: {what} (the range calibrated for {self.calibration.serial} version "
+                f"{self.calibration.version}); set outside = 'clamp' to correct such a sample as at the "
+                "edge of the range and flag it"
             )
         return np.asarray(cold | fast)
 

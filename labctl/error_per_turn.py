@@ -25,8 +25,8 @@ def error_per_turn(error_dps: NDArray[np.float64], rate_dps: NDArray[np.float64]
     slow = np.abs(rate_dps) < LEAST_RATE_DPS
     if np.any(slow):
         raise BadInput(
-            f"rate {float(np.asarray(rate_dps)[slow][0]):g} deg/s: the error per turn is given from {LEAST_RATE_DPS:g} "
-            "deg/s on; use the error in deg/s instead"
+            f"rate {float(np.asarray(rate_dps)[slow][0]):g} deg/s: the error per turn is defined only for rates "
+            f"of {LEAST_RATE_DPS:g} deg/s or more; use the error in deg/s instead"
         )
     return error_dps * 360.0 / np.abs(rate_dps)
 

@@ -62,7 +62,7 @@ class BadRecording(BadInput):
 
 
 class BadFile(BadRecording):
-    """A log file is wrong; nothing of it was kept. `problems`: everything that is wrong with it, one line each."""
+    """A log file is wrong; nothing was imported. `problems`: everything that is wrong with it, one line each."""
 
     slug = "bad-file"
 

@@ -120,10 +120,14 @@ class Orientation:
 
     def _refuse_bad(self, t_s: float, rate_dps: float) -> None:
         if not (np.isfinite(t_s) and np.isfinite(rate_dps)):
-            raise BadInput(f"reading at {t_s} s is {rate_dps} deg/s, not a number; leave such readings out")
+            raise BadInput(
+                f"the reading at {t_s} s has the rate {rate_dps} deg/s, which is not a finite "
+                "number; leave such readings out"
+            )
         if self._last is not None and t_s <= self._last[0]:
             raise BadInput(
-                f"reading at {t_s:g} s comes after one at {self._last[0]:g} s; pass the readings in order of time"
+                f"the reading at {t_s:g} s was passed after the reading at {self._last[0]:g} s; pass the "
+                "readings in order of time"
             )
 
     def _judge(self, t_s: float, rate_dps: float, still: bool | None) -> None:

@@ -17,10 +17,10 @@ VERBS = frozenset(
     re.findall(
         r"\w+",
         """
-    abort accept add allow answer ask calibrate call change check choose clear compare confirm connect correct count
-    create delete divide do end exchange export find fit free get give home import inspect install keep lay leave
-    let list log lower make mark measure move name open pass pause plan put raise read record reduce remove
-    rename repair repeat replace report reset restart restore resume rewrite run save say send set shorten
+    abort accept add allow answer ask calibrate call change check choose clear compare configure confirm connect correct
+    count create delete divide do end exchange export find fit free get give home import inspect install keep lay leave
+    let list log lower make mark measure move name open pass pause plan press put query raise read record reduce remove
+    rename repair repeat replace report request reset restart restore resume rewrite run save say send set shorten
     show sort start state stop subtract switch take tick try turn unlock update use wait write
     """,
     )
@@ -48,7 +48,7 @@ EXCEPTIONS = {
     ("labctl/processes/supervisor.py", "stopped; {left.text}"): PASSED_ON,
     ("labctl/recording/data_files/values.py", "{self.path}: column"): PASSED_ON,
     ("labctl/recording/files.py", "{path}: {place}: {first['msg']}"): "the message of the schema says what is expected",
-    ("labctl/services/benches/lease.py", "bench {self._bench} may not be driven"): (
+    ("labctl/services/benches/lease.py", "this process may not drive bench"): (
         "the campaign ends, and its advice says it"
     ),
     ("labctl/services/benches/lease.py", "{described(holder)}. {taken}"): PASSED_ON,

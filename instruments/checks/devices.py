@@ -25,7 +25,13 @@ def ask_table(table: RateTable, report: DeviceReport) -> None:
     try:
         report.add([Finding("identity", table.identify())])
         if table.is_moving():
-            report.add([Finding("motion", "the table turns: stop it, and find out who drives it", "bad")])
+            report.add(
+                [
+                    Finding(
+                        "motion", "the table is turning: stop it, and find out which program or person drives it", "bad"
+                    )
+                ]
+            )
         else:
             report.add([Finding("motion", "it stands")])
     except InstrumentError as error:
@@ -114,7 +120,7 @@ def _listen(gyro: Gyro) -> Readings:
 
 
 def _alarm(alarm: str) -> Finding:
-    text = f"{alarm} is active: remove its cause at the chamber, then clear it at the controller's panel"
+    text = f"{alarm} is active: remove its cause at the chamber, then clear the alarm at the controller's panel"
     return Finding("alarms", text, "bad")
 
 
@@ -134,7 +140,7 @@ def _ask_shortcomings(device: object, report: DeviceReport, otherwise: str = "")
 def _identity(found: GyroIdentity) -> str:
     said = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in found.reported.items())
     text = f"{found.model}, serial {found.serial}"
-    return f"{text}; it says: {said}" if said else f"{text}; it says nothing of itself"
+    return f"{text}; the instrument reported: {said}" if said else f"{text}; the instrument reported no identification"
 
 
 def _judge_readings(gyro: Gyro, readings: Readings, report: DeviceReport) -> None:
@@ -157,13 +163,19 @@ def _judge_stream(gyro: StreamingGyro, report: DeviceReport) -> None:
     period = gyro.period
     if period.measured_s is not None:
         off_ppm, u_ppm = 1e6 * (period.nominal_s / period.measured_s - 1.0), 1e6 * period.u_share
-        text = f"its clock is {off_ppm:+.0f} ppm off the computer's (u {u_ppm:.2g} ppm in {LISTEN_S:g} s)"
+        text = (
+            f"its clock differs by {off_ppm:+.0f} ppm from the clock of this computer (u = {u_ppm:.2g} ppm, "
+            f"measured over {LISTEN_S:g} s)"
+        )
         report.add([Finding("clock", text, value=off_ppm, unit="ppm")])
     if (steps := gyro.counter_step) is not None:
         found, meant = steps
         text = f"counter step {found}"
         if found != meant:
-            text += f", the bench file means {meant}: correct sample_rate_hz or datagram, or set the unit"
+            text += (
+                f", but the bench file gives {meant}: correct sample_rate_hz or datagram in the bench file, "
+                "or configure the unit"
+            )
         report.add([Finding("counter", text, "good" if found == meant else "bad", value=float(found))])
 
 

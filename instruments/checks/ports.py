@@ -28,8 +28,8 @@ def before_opening(port: str) -> list[Finding]:
         return [
             Finding(
                 "port",
-                f"port {port} is not there: plug the adapter in, or give the port's present name; `labctl bench ports` "
-                "lists those that are there",
+                f"port {port} does not exist: plug the adapter in, or give the present name of the port; `labctl "
+                "bench ports` lists all ports",
                 "bad",
             )
         ]
@@ -49,18 +49,26 @@ def of_open_port(port: str, *, wants_quick: bool) -> list[Finding]:
     found = [Finding("port", about)]
     stable = stable_name(port)
     if Path(port).name.startswith(NUMBERED):
-        advice = f"set port = '{stable}'" if stable else "look for a path in /dev/serial/by-id or by-path"
+        advice = f"set port = '{stable}'" if stable else "use the path of the port in /dev/serial/by-id or by-path"
         found.append(
-            Finding("port name", f"the number of {name} depends on the order of plugging: {advice}", "doubtful")
+            Finding(
+                "port name",
+                f"the number of {name} depends on the order in which adapters are plugged in: {advice}",
+                "doubtful",
+            )
         )
     if users := users_of(port):
         found.append(
-            Finding("port users", f"{', '.join(users)} has {port} open too and takes bytes from it: end it", "doubtful")
+            Finding(
+                "port users",
+                f"{', '.join(users)} also has {port} open and takes bytes from it: end that process",
+                "doubtful",
+            )
         )
     latency_ms = latency_timer_ms(name)
     if latency_ms is not None:
         slow = wants_quick and latency_ms > QUICK_MS
-        text = f"the adapter holds bytes back for up to {latency_ms} ms"
+        text = f"the adapter delays received bytes by up to {latency_ms} ms"
         file = SYS_TTY / name / "device" / "latency_timer"
         advice = f": run `echo {QUICK_MS} | sudo tee {file}`"
         found.append(
@@ -85,6 +93,6 @@ def shared(ports: Mapping[str, str]) -> dict[str, Finding]:
         real = os.path.realpath(port)
         other = first.setdefault(real, device)
         if other != device:
-            text = f"port {port} is that of {other} too ({ports[other]}): give each instrument its own port"
+            text = f"port {port} is also given for {other} ({ports[other]}): give each instrument a different port"
             found[device] = Finding("port", text, "bad")
     return found

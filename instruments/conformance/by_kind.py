@@ -22,7 +22,8 @@ def refuses_a_rate_beyond_its_limit(stand: Stand) -> None:
         require(not stand.driver.is_moving(), "the table moves after a rate beyond its limit was refused")
         return
     raise Failed(
-        f"spin({1.01 * limit_dps:g}) is beyond max_rate_dps = {limit_dps:g}; raise LimitError before a byte is sent"
+        f"spin({1.01 * limit_dps:g}) was accepted, but {1.01 * limit_dps:g} deg/s is beyond max_rate_dps = "
+        f"{limit_dps:g} deg/s; raise LimitError before a byte is sent"
     )
 
 
@@ -37,9 +38,9 @@ def turns_and_comes_to_rest(stand: Stand) -> None:
             abs(spin.rate_dps - rate_dps) < 0.01 * abs(rate_dps), f"spin({rate_dps:g}) reports {spin.rate_dps:g} deg/s"
         )
         require(spin.steady_until_s - spin.steady_from_s >= TURN_S - 1e-6, f"the rate is not steady for {TURN_S:g} s")
-        require(table.is_moving(), "is_moving says no during a run")
+        require(table.is_moving(), "is_moving() returns False during a run")
         table.settle(spin)
-        require(not table.is_moving(), "is_moving says yes after settle")
+        require(not table.is_moving(), "is_moving() returns True after settle()")
     before_s = clock.now_s()
     table.stop()
     table.stop()
@@ -54,9 +55,15 @@ def refuses_a_set_point_beyond_its_limits(stand: Stand) -> None:
             stand.driver.set_temperature_c(wrong_c)
         except LimitError:
             continue
-        raise Failed(f"set_temperature_c({wrong_c:g}) is beyond the limits; raise LimitError before a byte is sent")
+        raise Failed(
+            f"set_temperature_c({wrong_c:g}) was accepted, but {wrong_c:g} deg C is beyond the limits "
+            "of the driver; raise LimitError before a byte is sent"
+        )
     now_c = stand.driver.read().setpoint_c
-    require(now_c == before_c, f"the set point is {now_c:g} deg C after refusals, and was {before_c:g}")
+    require(
+        now_c == before_c,
+        f"the set point is {now_c:g} deg C after two refused requests, but it was {before_c:g} deg C before",
+    )
 
 
 def reads_back_its_set_point(stand: Stand) -> None:
@@ -68,9 +75,13 @@ def reads_back_its_set_point(stand: Stand) -> None:
     require(
         abs(given_c - wanted_c) <= chamber.limits.resolution_c, f"set point {wanted_c:g} is read back as {given_c:g}"
     )
-    require(abs(read.setpoint_c - given_c) < 1e-6, f"read gives set point {read.setpoint_c:g}, set was {given_c:g}")
     require(
-        abs(chamber.make_safe() - chamber.safe_c) <= chamber.limits.resolution_c, "make_safe leaves another set point"
+        abs(read.setpoint_c - given_c) < 1e-6,
+        f"read() returns the set point {read.setpoint_c:g} deg C, but {given_c:g} deg C was set",
+    )
+    require(
+        abs(chamber.make_safe() - chamber.safe_c) <= chamber.limits.resolution_c,
+        "after make_safe() the set point is not safe_c",
     )
 
 
@@ -80,9 +91,9 @@ def gives_whole_numbers_at_rising_times(stand: Stand) -> None:
     gyro.start()
     parts = [gyro.read(1.0) for _ in range(4)]
     times = np.concatenate([part.t_s for part in parts])
-    require(np.all(np.diff(times) > 0), "the times of the readings do not rise")
+    require(np.all(np.diff(times) > 0), "the times of the readings do not increase")
     wanted = 4 * gyro.sample_rate_hz
-    require(abs(len(times) - wanted) <= 3, f"{len(times)} readings came in 4 s; {wanted:g} must")
+    require(abs(len(times) - wanted) <= 3, f"{len(times)} readings arrived in 4 s; at least {wanted:g} are expected")
     names = {channel.name for channel in gyro.channels}
     for part in parts:
         require(set(part.raw) == names, f"readings have {sorted(part.raw)}, the channels are {sorted(names)}")
@@ -101,7 +112,10 @@ def sees_the_rate_of_the_table(stand: Stand) -> None:
     """Check sign and scale of the first axis on the turning table, one of the axes being vertical."""
     gyro, table = stand.driver, stand.bench.table
     limits = gyro.limits
-    require(limits.max_rate_dps > 0 and limits.min_c < limits.max_c, f"the limits {limits} are none")
+    require(
+        limits.max_rate_dps > 0 and limits.min_c < limits.max_c,
+        f"the limits {limits} are not a range: the lower limit must be below the upper",
+    )
     if table is None:
         return
     gyro.start()

@@ -43,7 +43,7 @@ def has_every_method(stand: Stand) -> None:
 
 def sends_nothing_when_it_is_made(stand: Stand) -> None:
     """Check that no time has passed: nothing was sent, and nothing waited for."""
-    require(stand.clock.now_s() == 0, f"it waited {stand.clock.now_s():g} s when it was made; open ports at first use")
+    require(stand.clock.now_s() == 0, f"the constructor waited {stand.clock.now_s():g} s; open ports at first use")
 
 
 def says_who_it_is(stand: Stand) -> None:
@@ -51,7 +51,10 @@ def says_who_it_is(stand: Stand) -> None:
     found = stand.driver.identify()
     if stand.kind == "gyro":
         given = next(each.serial for each in stand.file.gyros if each.name == stand.driver.name)
-        require(found.serial == given, f"identify gives the serial number {found.serial!r}, the bench file {given!r}")
+        require(
+            found.serial == given,
+            f"identify() returns the serial number {found.serial!r}, but the bench file gives {given!r}",
+        )
         require(found.technology in ("fog", "mems", "piezo"), f"technology {found.technology!r} is not known")
     else:
         require(isinstance(found, str) and found, f"identify gives {found!r}; return a text")
@@ -68,7 +71,8 @@ def reports_silence(stand: Stand) -> None:
         _fail(stand, "answers, but the instrument is silent; raise NoReply after a time-out")
     waited_s = stand.clock.now_s()
     require(
-        waited_s < LONGEST_SILENCE_S, f"it waited {waited_s:g} s for a silent instrument; at most {LONGEST_SILENCE_S:g}"
+        waited_s < LONGEST_SILENCE_S,
+        f"the driver waited {waited_s:g} s for a silent instrument; the limit is {LONGEST_SILENCE_S:g} s",
     )
 
 
@@ -119,7 +123,7 @@ def closes_twice(stand: Stand) -> None:
     stand.close()
     stand.close()
     stand.ask()
-    require(stand.driver.identify() == before, "identify gives something else after the link was closed and opened")
+    require(stand.driver.identify() == before, "identify() returns another result after the link was closed and opened")
 
 
 def _is_its_own(stand: Stand, error: InstrumentError) -> None:

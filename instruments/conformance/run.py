@@ -45,7 +45,7 @@ def _problem(check: Check, name: str, file: BenchFile) -> str:
     except Failed as failure:
         return str(failure)
     except InstrumentError as error:
-        return f"raised {type(error).__name__} where it must not: {error}"
+        return f"raised {type(error).__name__} in a normal situation: {error}"
     except Exception as error:  # noqa: BLE001  a driver of another package may raise anything
         return f"raised {summary(error)}; every failure of a driver must be an InstrumentError"
     return ""

@@ -70,8 +70,9 @@ def place_of(name: str) -> BenchFile:
         if bench.is_simulated and name in [each.driver for each in bench.sections.values()]:
             return resolve(bench)
     raise ValueError(
-        f"driver {name!r} says of no simulated bench on which it can be tried: give it a Trial "
-        "(instruments.drivers.driver) with the address of its simulator, or name a bench file that has it by --bench"
+        f"driver {name!r} has no simulated bench to be checked on; give the driver a Trial "
+        "(instruments.drivers.driver) with the address of its simulator, or name a bench file that uses the "
+        "driver with --bench"
     )
 
 
@@ -93,7 +94,9 @@ def _with_trial(name: str, kind: Kind, trial: Trial) -> BenchFile:
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"])
-        raise ValueError(f"driver {name!r}: its Trial is no bench: {place}: {first['msg']}; correct it") from error
+        raise ValueError(
+            f"driver {name!r}: its Trial does not describe a valid bench: {place}: {first['msg']}; correct the Trial"
+        ) from error
 
 
 def open_stand(name: str, file: BenchFile) -> Stand:
@@ -104,12 +107,12 @@ def open_stand(name: str, file: BenchFile) -> Stand:
     kind = kind_of(name)
     found = next(((key, each) for key, each in file.sections.items() if each.driver == name), None)
     if found is None:
-        raise ValueError(f"bench {file.name!r} has no {kind} with driver {name!r}; name one that has")
+        raise ValueError(f"bench {file.name!r} has no {kind} with driver {name!r}; name a bench that has one")
     url = found[1].port or found[1].host or ""
     if not is_simulated_address(url):
         raise ValueError(
-            f"driver {name!r} is at {url or 'no address'} on bench {file.name!r}; it is tried on a simulated "
-            "instrument only, at sim://..."
+            f"driver {name!r} is at {url or 'no address'} on bench {file.name!r}, but a driver is checked on a "
+            "simulated instrument only; give it an address that begins with sim://"
         )
     clock = VirtualClock()
     bench = open_bench(file, clock)

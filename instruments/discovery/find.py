@@ -49,7 +49,9 @@ def find_on_port(port: str, clock: Clock) -> Found:
                 if (found := probe.recognise(data, baudrate)) is not None:
                     return Found(port, name, _kind(name), found)
         if heard:
-            return Found(port, why_not=f"{heard} bytes came that no driver recognises, so nothing was sent")
+            return Found(
+                port, why_not=f"{heard} bytes arrived that no driver recognises, so labctl sent nothing to this port"
+            )
         for name, probe in _probes(asking=True):
             for baudrate in probe.baudrates:
                 data = _exchange(ports, port, baudrate, probe.asks, probe.wait_s, clock)
@@ -57,7 +59,9 @@ def find_on_port(port: str, clock: Clock) -> Found:
                     return Found(port, name, _kind(name), found)
     except InstrumentError as error:
         return Found(port, why_not=str(error).removeprefix(f"{error.device}: "))
-    return Found(port, why_not="nothing answers: check power and cable; a gyro must send by itself")
+    return Found(
+        port, why_not="no instrument answers: check power and cable; a gyro must send readings without a request"
+    )
 
 
 def find_on_host(host: str, tcp_port: int, clock: Clock) -> Found:
@@ -75,7 +79,7 @@ def find_on_host(host: str, tcp_port: int, clock: Clock) -> Found:
         return Found(address, why_not=f"the link broke ({error}); check the address")
     finally:
         _closed(client)
-    return Found(address, why_not="no driver recognises what answers there")
+    return Found(address, why_not="an instrument answers, but no installed driver recognises it")
 
 
 def ask_itself(name: str, values: Mapping[str, object], clock: Clock) -> dict[str, object]:

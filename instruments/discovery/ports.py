@@ -26,9 +26,9 @@ def port_info(path: str, product: str = "") -> PortInfo:
     """Return what is known of one port."""
     trouble = ""
     if not os.access(path, os.R_OK | os.W_OK):
-        trouble = f"it may not be used by this user: {permission_command(path)}"
+        trouble = f"this user has no access to the port: {permission_command(path)}"
     elif users := users_of(path):
-        trouble = f"{', '.join(users)} has it open: end it"
+        trouble = f"{', '.join(users)} has the port open: end that process"
     return PortInfo(path, stable_name(path) or path, adapter_of(path), product, trouble)
 
 

@@ -76,8 +76,11 @@ class ArrickC4:
         self._command(lines.IDENTIFY)
         text = self._link.read_line()
         if not text.startswith(lines.IDENTITY_PREFIX):
-            advice = lines.ECHO_ADVICE if lines.is_echo(text) else "check the port's name and the baud rate"
-            raise WrongInstrument(self.name, f"{self.settings.port} answered {text!r}, not a C4; {advice}")
+            advice = lines.ECHO_ADVICE if lines.is_echo(text) else "check the name of the port and the baud rate"
+            raise WrongInstrument(
+                self.name,
+                f"{self.settings.port} answered {text!r}, which is not the answer of a C4 controller; {advice}",
+            )
         return text
 
     def achievable_dps(self, rate_dps: float) -> float:
@@ -132,7 +135,8 @@ class ArrickC4:
             raise MalformedReply(
                 self.name,
                 f"{abs(move.steps)} steps took {end_s - start_s:.1f} s instead of {move.duration_s:.1f} s; "
-                "check speed_template, step_clock_hz and acceleration_dps2, or the motor stalls; home the table",
+                "check speed_template, step_clock_hz and acceleration_dps2 in the bench file and that the "
+                "motor does not stall, then home the table",
             )
         self._steps += move.steps
 

@@ -39,8 +39,8 @@ def measured_clock(
     if abs(ratio - 1) > LARGEST_DEVIATION:
         raise WrongInstrument(
             device,
-            f"steps run at {100 * ratio:.4g} % of the rate of the bench file, limit {100 * LARGEST_DEVIATION:g} % off; "
-            "check step_clock_hz, speed_template and that the motor turns",
+            f"the motor steps at {100 * ratio:.4g} % of the rate that the bench file gives, limit "
+            f"+-{100 * LARGEST_DEVIATION:g} % from 100 %; check step_clock_hz, speed_template and that the motor turns",
         )
     u_s = 2 * settings.reply_u_s  # of four replies; what all of them have in common cancels
     return StepClock(

@@ -20,7 +20,7 @@ LINE_END = b"\r\n"
 #: More of them belong to no earlier move.
 MOST_LATE_LETTERS = 20
 LINE_IS_BUSY = (
-    "letters come that answer nothing; find what else sends on this line, or switch the controller off and on"
+    "letters arrive that answer no command; find what else sends on this line, or switch the controller off and on"
 )
 
 
@@ -107,8 +107,8 @@ class C4Link:
             elif (found := self.read_line(skip="")) != command.expect:
                 raise RequestRejected(
                     self._device,
-                    f"answered {found!r} to {command.send} where init_commands expects {command.expect!r}; "
-                    "correct the bench file by the controller's manual",
+                    f"answered {found!r} to {command.send}, but init_commands in the bench file expects "
+                    f"{command.expect!r}; correct init_commands by the manual of the controller",
                 )
         self._initialised = True
 
@@ -125,7 +125,7 @@ class C4Link:
         found = self.read_letter(timeout_s)
         if found != letter:
             raise RequestRejected(
-                self._device, f"answered {found!r} where {letter!r} was expected, so it did not {what}; home the table"
+                self._device, f"answered {found!r} instead of {letter!r}, so it did not {what}; home the table"
             )
 
     def _port_timeout_s(self, deadline_s: float) -> float:

@@ -74,12 +74,18 @@ class Gyrostar:
         """
         name = self._get(MODULE_NAME)
         if name != MODULE_6017:
-            text = f"{MODULE_NAME} is 0x{name:04X}, an ADAM-6017's is 0x{MODULE_6017:04X}; check the host's address"
+            text = (
+                f"{MODULE_NAME} is 0x{name:04X} instead of 0x{MODULE_6017:04X} (ADAM-6017); check the "
+                "address of the host"
+            )
             raise WrongInstrument(self.name, text)
         for channel, wanted in self.options.range_codes.items():
             found = self._get(RANGE_CODE.nth(channel, 1, first=0))
             if found != wanted:
-                text = f"input {channel} has range code 0x{found:04X}, the bench file says 0x{wanted:04X}; set either"
+                text = (
+                    f"input {channel} has range code 0x{found:04X}, but the bench file says 0x{wanted:04X}; "
+                    "change one of the two"
+                )
                 raise WrongInstrument(self.name, text)
         settings, options = self.settings, self.options
         return GyroIdentity(

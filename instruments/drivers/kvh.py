@@ -163,7 +163,7 @@ class KvhGyro:
 
     def _no_line(self, silence_s: float) -> NoReply:
         advice = self._stream.advice(f"baud rate {self._baudrate} and options.pattern")
-        return NoReply(self.name, f"no whole line on {self.settings.port} for {silence_s:.1f} s: {advice}")
+        return NoReply(self.name, f"no complete line on {self.settings.port} for {silence_s:.1f} s: {advice}")
 
     def _decode(self, data: bytes) -> Readings:
         pieces = (self._unfinished + data).split(b"\n")

@@ -43,8 +43,8 @@ class LibraryInstrument:
                 return float(found)
         raise MalformedReply(
             self.device,
-            f"attribute {attribute} holds {found!r}, not a number; "
-            "name the attribute that holds the measured value in the bench file",
+            f"attribute {attribute} holds {found!r}, which is not a number; correct the bench file: name the "
+            "attribute that holds the measured value",
         )
 
     def set(self, attribute: str, value: float) -> None:
@@ -87,7 +87,8 @@ class LibraryInstrument:
         except (ValueError, TypeError) as error:
             raise RequestRejected(
                 self.device,
-                f"{library} refused to {what} ({one_line(error)}); check the value, and the reply at its panel",
+                f"{library} refused to {what} ({one_line(error)}); check the value, and the message on the "
+                "panel of the instrument",
             ) from error
         except Exception as error:
             self._forget()
@@ -179,5 +180,5 @@ class LibraryInstrument:
 
     def _broken(self, error: Exception) -> LinkError:
         return LinkError(
-            self.device, f"the link {self._settings.address_url} is gone ({one_line(error)}); check cable and power"
+            self.device, f"the link {self._settings.address_url} was lost ({one_line(error)}); check cable and power"
         )

@@ -19,7 +19,7 @@ from instruments.protocols.stim300.settings import DatagramOptions
 #: So many intact frames or lines, and no damage beyond the cut ones at both ends, are no accident.
 LEAST_FRAMES = 4
 SERIAL = "the unit's serial number, from its label"
-RATE = "its highest rate, deg/s, by the data sheet"
+RATE = "the largest rate of the unit, deg/s, from its data sheet"
 
 
 def _stim300(data: bytes, baudrate: int) -> Recognised | None:
@@ -77,9 +77,10 @@ def _c4(data: bytes, _baudrate: int) -> Recognised | None:
         return None
     settings: dict[str, object] = {"max_rate_dps": 100.0, "acceleration_dps2": 90.0}
     confirm = {
-        "max_rate_dps": "the table's highest rate, deg/s",
+        "max_rate_dps": "the largest rate of the table, deg/s",
         "acceleration_dps2": "its ramp, deg/s^2",
-        "speed_template": "the C4's speed command from its manual, with {divisor}; without it no rate is turned",
+        "speed_template": "the C4's speed command from its manual, with {divisor}; without this command the "
+        "table cannot turn at a rate",
     }
     return Recognised(text, settings, confirm)
 

@@ -21,11 +21,15 @@ KINDS: dict[type[Driver], tuple[str, type[DeviceSettings]]] = {
 def _checked(found: Any) -> Driver:
     if not isinstance(found, TableDriver | ChamberDriver | GyroDriver | ReferenceDriver):
         raise TypeError(
-            f"{found!r} is no TableDriver, ChamberDriver, GyroDriver or ReferenceDriver of instruments.drivers.driver"
+            f"{found!r} is not a TableDriver, ChamberDriver, GyroDriver or ReferenceDriver of "
+            "instruments.drivers.driver; make it one of these"
         )
     _, base = KINDS[type(found)]
     if not (isinstance(found.settings, type) and issubclass(found.settings, base)):
-        raise TypeError(f"its settings {found.settings!r} do not extend instruments.bench_config.{base.__name__}")
+        raise TypeError(
+            f"its settings class {found.settings!r} is not a subclass of "
+            f"instruments.bench_config.{base.__name__}; derive it from that class"
+        )
     return found
 
 

@@ -65,7 +65,7 @@ def _section(
         wrong += [_detail(each["type"], each["msg"], (*place, *each["loc"]), each["input"]) for each in error.errors()]
         return section
     for name, value in (found.model_extra or {}).items():
-        text = f"driver {section.driver} has no such setting (there are {_settings_of(driver)})"
+        text = f"driver {section.driver} has no such setting; choose one of {_settings_of(driver)}"
         wrong.append(_detail("extra_forbidden", text, (*place, name), value))
     return found
 

@@ -190,8 +190,9 @@ class Stim300:
             if said := differences(found, self.settings):
                 raise WrongInstrument(
                     self.name,
-                    f"the unit on {self.settings.port} is set otherwise than needed: {'; '.join(said)}; set the unit "
-                    "in its service mode (commands u, m, d) or correct the bench file",
+                    f"the unit on {self.settings.port} is not configured as the bench file requires: "
+                    f"{'; '.join(said)}; configure the unit in its service mode (commands u, m, d), or correct "
+                    "the bench file",
                 )
             self._set = found
         elif (serial := parse_serial_number(special)) is not None:
@@ -208,7 +209,8 @@ class Stim300:
             return
         raise WrongInstrument(
             self.name,
-            f"the unit on {settings.port} has serial number {serial}, bench file or campaign says {wanted}; connect "
+            f"the unit on {settings.port} has serial number {serial}, but the bench file or the "
+            f"campaign names {wanted}; connect "
             "the "
             "right unit, or correct port, serial or own_serial",
         )

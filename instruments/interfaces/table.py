@@ -35,8 +35,8 @@ class TableLimits:
         if abs(rate_dps) > self.max_rate_dps * (1 + ROUNDING):
             raise LimitError(
                 device,
-                f"rate {rate_dps:g} deg/s is beyond the table's {self.max_rate_dps:g} deg/s; "
-                "ask for less, or plan with --clip",
+                f"rate {rate_dps:g} deg/s is beyond the limit of the table, {self.max_rate_dps:g} deg/s; "
+                "request a lower rate, or plan with --clip, which leaves such points out",
             )
 
 

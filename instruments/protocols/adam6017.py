@@ -57,7 +57,7 @@ class WiringOptions(Strict):
         if code not in RANGES_V:
             known = ", ".join(f"0x{known:04X}" for known in RANGES_V)
             raise ValueError(
-                f"input range code 0x{code:04X} is not a voltage range of the ADAM-6017 (there are {known})"
+                f"input range code 0x{code:04X} is not a voltage range of the ADAM-6017; choose one of {known}"
             )
         return code
 
@@ -65,7 +65,9 @@ class WiringOptions(Strict):
     @classmethod
     def _is_another(cls, channel: int | None, info: ValidationInfo) -> int | None:
         if channel is not None and channel == info.data.get("channel"):
-            raise ValueError(f"input {channel} is set for the rate and for the thermometer; give each its own input")
+            raise ValueError(
+                f"input {channel} is given both for the rate and for the thermometer; give each a different input"
+            )
         return channel
 
     @property

@@ -42,10 +42,13 @@ class AnalogSettings(GyroSettings):
         inputs = self.options.all_inputs
         if len(self.options.inputs) != len(self.axes):
             raise ValueError(
-                f"options.inputs has {len(self.options.inputs)} inputs for {len(self.axes)} axes; one each"
+                f"options.inputs has {len(self.options.inputs)} inputs for {len(self.axes)} axes; give one "
+                "input for each axis"
             )
         if len(set(inputs)) < len(inputs):
-            raise ValueError(f"options.inputs {inputs}: an input carries two signals; give each its own")
+            raise ValueError(
+                f"options.inputs {inputs}: one input is given for two signals; give each signal a different input"
+            )
         return self
 
     @property
@@ -65,7 +68,7 @@ class LabJackSettings(AnalogSettings):
     @model_validator(mode="after")
     def _has_host(self) -> LabJackSettings:
         if self.host is None:
-            raise ValueError("give host, the LabJack's address on the network")
+            raise ValueError("key host is missing; give the network address of the LabJack")
         return self
 
     @property

@@ -23,7 +23,7 @@ MOVE = re.compile(r"m1([fr])(\d+)n")
 
 
 #: What to do where the answer is the command itself.
-ECHO_ADVICE = "the line sends back what is sent: switch the adapter's local echo off, and check the wires and power"
+ECHO_ADVICE = "the line echoes what labctl sends: switch the local echo of the adapter off, and check wires and power"
 
 
 def is_echo(text: str) -> bool:

@@ -60,7 +60,7 @@ class BinderSettings(ChamberSettings):
     @model_validator(mode="after")
     def _has_address(self) -> BinderSettings:
         if (self.port is None) == (self.host is None):
-            raise ValueError("give either port (a serial port) or host and tcp_port, one of the two")
+            raise ValueError("give either port (a serial port), or host with tcp_port (a network address)")
         return self
 
     @property

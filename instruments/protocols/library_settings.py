@@ -31,9 +31,11 @@ class LibraryOptions(BaseModel):
     def _has_address(self) -> LibraryOptions:
         if self.library == "msl-equipment":
             if not self.address:
-                raise ValueError('give address, in the words of msl-equipment: "TCP::10.0.0.7::2000"')
+                raise ValueError(
+                    'key address is missing; write it in the syntax of msl-equipment, such as "TCP::10.0.0.7::2000"'
+                )
         elif (getattr(self, "port", None) is None) == (getattr(self, "host", None) is None):
-            raise ValueError("give either port (a serial port) or host and tcp_port, one of the two")
+            raise ValueError("give either port (a serial port), or host with tcp_port (a network address)")
         return self
 
     @property
@@ -58,7 +60,9 @@ class LibraryChamberSettings(LibraryOptions, ChamberSettings):
     @model_validator(mode="after")
     def _can_be_off(self) -> LibraryChamberSettings:
         if self.safe_state == "off" and not self.stop:
-            raise ValueError('safe_state = "off" needs stop, the method that switches heating and cooling off')
+            raise ValueError(
+                'safe_state = "off" also needs the key stop: the method that switches heating and cooling off'
+            )
         return self
 
 

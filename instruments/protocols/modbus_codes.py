@@ -13,13 +13,14 @@ ILLEGAL_FUNCTION, ILLEGAL_ADDRESS, ILLEGAL_VALUE, DEVICE_FAILURE, ACKNOWLEDGED, 
 MEMORY_PARITY, GATEWAY_PATH, GATEWAY_TARGET = 8, 10, 11
 #: Modbus Application Protocol V1.1b3, section 7.
 EXCEPTIONS = {
-    ILLEGAL_FUNCTION: "it does not know the function; check driver and address in the bench file",
-    ILLEGAL_ADDRESS: "it has no such register, or the register cannot be written; check model and driver",
-    ILLEGAL_VALUE: "it does not accept the value; check the limits that are set on it",
-    DEVICE_FAILURE: "it failed inside; read its panel, and switch it off and on",
-    ACKNOWLEDGED: "it needs more time; try again later",
-    BUSY: "it is busy; end at its panel what it does, or try again later",
-    MEMORY_PARITY: "memory parity error; switch it off and on, and have it repaired if that stays",
+    ILLEGAL_FUNCTION: "the instrument does not know the function; check driver and address in the bench file",
+    ILLEGAL_ADDRESS: "the instrument has no such register, or the register cannot be written; check model and driver",
+    ILLEGAL_VALUE: "the instrument does not accept the value; check the limits that are set on the instrument",
+    DEVICE_FAILURE: "the instrument has an internal failure; read its panel, then switch it off and on",
+    ACKNOWLEDGED: "the instrument needs more time; try again later",
+    BUSY: "the instrument is busy; end its present task at its panel, or try again later",
+    MEMORY_PARITY: "the instrument has a memory parity error; switch it off and on, and have it repaired if the "
+    "error persists",
     GATEWAY_PATH: "gateway path unavailable; check the gateway's serial port settings",
     GATEWAY_TARGET: "gateway target device failed to respond; check address, power and cable behind the gateway",
 }

@@ -17,7 +17,10 @@ MakeDevice = Callable[[InstrumentSetup], SimulatedDevice]
 
 def _checked(found: object) -> MakeDevice:
     if not callable(found):
-        raise TypeError(f"{found!r} is nothing that makes a simulated instrument of an InstrumentSetup")
+        raise TypeError(
+            f"{found!r} is not a class or function that makes a simulated instrument from an "
+            "InstrumentSetup; correct the entry point"
+        )
     return cast(MakeDevice, found)
 
 

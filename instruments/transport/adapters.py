@@ -42,8 +42,7 @@ def require_adapter(device: str, port: str | None, wanted: str | None) -> dict[s
     if wanted is not None and not is_adapter(wanted, found):
         raise WrongInstrument(
             device,
-            f"port {port} is on USB adapter {found or 'without a serial number'}, bench file or campaign says "
-            f"{wanted}; "
-            "two adapters may have changed places: give the port's path in /dev/serial/by-id",
+            f"port {port} is on USB adapter {found or 'without a serial number'}, but the bench file or the "
+            f"campaign names {wanted}; two adapters may be exchanged: give the path of the port in /dev/serial/by-id",
         )
     return {"adapter": found} if found else {}

@@ -106,7 +106,9 @@ class Ports:
         client = self._links(host, device).tcp_client(host, tcp_port, timeout_s=timeout_s)
         if not client.connect():
             raise LinkError(
-                device, f"no Modbus TCP at {host}:{tcp_port}; check address, cable and that it is switched on"
+                device,
+                f"no Modbus TCP instrument answers at {host}:{tcp_port}; check address, cable and that "
+                "the instrument is switched on",
             )
         return client
 
@@ -133,7 +135,7 @@ class Ports:
         if self._simulated is None:
             raise LinkError(
                 device,
-                f"{address} is a simulated instrument, but this bench has no simulation; correct the address in the "
-                "bench file",
+                f"{address} is the address of a simulated instrument, but this bench is not simulated; correct "
+                "the address in the bench file",
             )
         return self._simulated

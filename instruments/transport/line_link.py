@@ -140,4 +140,4 @@ class LineLink:
 
     def _broken(self, what: str, error: Exception) -> InstrumentError:
         self.close()
-        return LinkError(self.device, f"cannot {what}, the link {self.url} is gone ({error}); check cable and power")
+        return LinkError(self.device, f"cannot {what}, the link {self.url} was lost ({error}); check cable and power")

@@ -128,15 +128,18 @@ class Registers:
             return value
         other: WordOrder = "big" if self._word_order == "little" else "little"
         if register.kind == "float32" and register.is_plausible(exchanged := register.decode(words, other)):
-            advice = f"with its words exchanged it is {exchanged:g}: set word_order = '{other}' in the bench file"
+            advice = (
+                f"with its two words exchanged the value is {exchanged:g}: set word_order = '{other}' in the bench file"
+            )
         elif register.below and value < register.low:
-            advice = f"that is {register.below}: check the sensor and its wires at the controller"
+            advice = f"this value is {register.below}: check the sensor and its wires at the controller"
             raise MalformedReply(self._link.device, f"{register} reads {value:g} {register.unit}; {advice}")
         else:
             advice = "check the sensor, the word order and that the bench file names the right driver"
         raise MalformedReply(
             self._link.device,
-            f"{register} reads {value:g} {register.unit}, possible are {register.low:g} to {register.high:g}; {advice}",
+            f"{register} reads {value:g} {register.unit}, outside the possible range of {register.low:g} to "
+            f"{register.high:g}; {advice}",
         )
 
     def _check_writable(self, register: Register, value: float) -> None:

@@ -28,10 +28,13 @@ def explain_tcp(received: bytes, sent: bytes, address: int) -> str:
     if len(received) <= TCP_PREFIX_BYTES:
         return _bytes(received, LINE)
     if protocol := int.from_bytes(received[2:4], "big"):
-        return f"protocol number {protocol} came, Modbus TCP has 0; {ADDRESS}"
+        return f"the reply has protocol number {protocol} instead of 0 (Modbus TCP); {ADDRESS}"
     if received[:2] != sent[:2]:
         number, asked = (int.from_bytes(each[:2], "big") for each in (received, sent))
-        return f"the reply to request {number} came, not to request {asked}; find the second master of this link"
+        return (
+            f"the reply to request {number} arrived instead of that to request {asked}; find the second "
+            "Modbus master on this link"
+        )
     if received[TCP_PREFIX_BYTES] != address:
         return _other_unit(received[TCP_PREFIX_BYTES], address)
     return _bytes(received, LINE)
@@ -40,10 +43,12 @@ def explain_tcp(received: bytes, sent: bytes, address: int) -> str:
 def other_server(received: bytes) -> str:
     """Return what answered where bytes begin as those of no Modbus instrument do; empty where they may be of one."""
     if received.startswith(b"HTTP/") or b"<html" in received[:200].lower():
-        return f"an HTTP server answered, no Modbus instrument; {ADDRESS}"
+        return f"an HTTP server answered, not a Modbus instrument; {ADDRESS}"
     beginning = received[:LEAST_TEXT]
     if len(beginning) == LEAST_TEXT and beginning.isascii() and beginning.decode().isprintable():
-        return f"text came ({one_line(received[:LONGEST_TEXT].decode('latin-1'))}), no Modbus; {ADDRESS}"
+        return (
+            f"text arrived ({one_line(received[:LONGEST_TEXT].decode('latin-1'))}) instead of a Modbus reply; {ADDRESS}"
+        )
     return ""
 
 
@@ -56,4 +61,4 @@ def _other_unit(found: int, address: int) -> str:
 
 
 def _bytes(received: bytes, advice: str) -> str:
-    return f"{len(received)} bytes came that are no reply; {advice}"
+    return f"{len(received)} bytes arrived that are not a Modbus reply; {advice}"

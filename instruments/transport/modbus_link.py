@@ -127,7 +127,7 @@ class ModbusLink:
                 raise MalformedReply(self.device, f"cannot {what}, {advice}") from error
             # pymodbus's own text is the client's address in memory
             detail = "" if isinstance(error, ConnectionException) else f" ({one_line(error)})"
-            text = f"cannot {what}, the link is gone{detail}; check cable and power"
+            text = f"cannot {what}, the link was lost{detail}; check cable and power"
             raise LinkError(self.device, text) from error
         except (ModbusException, *UNDECODABLE) as error:
             if self._received:

@@ -39,7 +39,8 @@ def open_port(
         except ValueError as error:
             port.close()
             raise ValueError(
-                f"its kernel driver does not switch the RS-485 direction; set rs485 = {{ by = 'rts' }}, or leave rs485 "
+                f"the kernel driver of this port cannot switch the RS-485 direction; set rs485 = {{ by = 'rts' "
+                f"}}, or leave rs485 "
                 f"out where the adapter switches by itself ({error})"
             ) from error
     return EchoFreePort(port) if line.echo else port

@@ -23,16 +23,16 @@ def remedy(url: str, error: Exception) -> str:
     """Return what to check of a port that cannot be opened."""
     number = getattr(error, "errno", None)
     if number == errno.EACCES:
-        return f"that this user may use it: {permission_command(url)}"
+        return f"that this user has access to the port: {permission_command(url)}"
     if number in (errno.EBUSY, errno.EAGAIN) or "exclusively lock" in str(error):
         if found := users_of(url):
-            return f"which other process has it open: {', '.join(found)}; end it"
-        return f"which other process has it open: run `fuser -v {url}`, and end that one"
+            return f"which other process has it open: {', '.join(found)}; end that process"
+        return f"which other process has it open: run `fuser -v {url}`, and end that process"
     if number == errno.ENOENT:
         there = sorted(str(path) for path in BY_ID.glob("*")) if BY_ID.is_dir() else []
-        found_text = f"; there are {', '.join(there)}" if there else f"; `ls {BY_ID}` lists those that are there"
+        found_text = f"; the ports are {', '.join(there)}" if there else f"; `ls {BY_ID}` lists all ports"
         return f"the cable and the port's name{found_text}"
-    return "the cable, the port's name and who else uses it"
+    return "the cable, the name of the port, and which other process uses the port"
 
 
 def permission_command(url: str) -> str:

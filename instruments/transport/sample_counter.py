@@ -59,6 +59,6 @@ class SampleCounter:
         if self._standing >= MOST_STANDING:
             raise MalformedReply(
                 self._device,
-                f"the counter on {self._port} stands at {int(counts[-1])} in {self._standing} readings in a row; check "
-                "that the counter's field is the right one, and switch the unit off and on",
+                f"the sample counter on {self._port} stands at {int(counts[-1])} in {self._standing} successive "
+                "readings; check that the field of the counter is the right one, and switch the unit off and on",
             )

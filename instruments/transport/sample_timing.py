@@ -143,6 +143,6 @@ def refuse_other_rate(device: str, port: str | None, line: PeriodLine) -> None:
     if line.is_outside_tolerance and (period_s := line.measured_s):
         raise WrongInstrument(
             device,
-            f"sends {1 / period_s:.4g} readings/s on {port}, and the bench file says {1 / line.nominal_s:.4g}, limit "
+            f"sends {1 / period_s:.4g} readings/s on {port}, but the bench file says {1 / line.nominal_s:.4g}, limit "
             f"+-{100 * TOLERANCE:g} %; set sample_rate_hz = {1 / period_s:.4g} or configure the unit",
         )

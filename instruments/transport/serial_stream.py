@@ -97,8 +97,8 @@ class SerialStream:
     def advice(self, sent_as: str) -> str:
         """Return what came where a reading should have, and what to check; `sent_as` names what readings depend on."""
         if not self.unused:
-            return f"nothing came; check power, cable and {sent_as}"
-        return f"{self.unused} bytes came that are none; check {sent_as}, and what else sends on this line"
+            return f"no bytes arrived; check power, cable and {sent_as}"
+        return f"{self.unused} bytes arrived that are not readings; check {sent_as}, and what else sends on this line"
 
     def read_for(self, duration_s: float, every_s: float) -> bytes:
         """Return the bytes of the next `duration_s` clock seconds; the port is emptied every `every_s` seconds.

@@ -78,7 +78,7 @@ class PolledReader:
 
 
 class ThreadedReader:
-    """Reads all the time, in a thread of its own, and notes when bytes came."""
+    """Reads all the time, in a thread of its own, and notes when bytes arrived."""
 
     def __init__(self, port: SerialPort, clock: Clock) -> None:
         self._port, self._clock = port, clock

@@ -64,7 +64,8 @@ NEEDS_APPROVER = Depends(_approver)
 DECLARES_KEY = Security(
     HTTPBearer(
         scheme_name="key",
-        description="A key that `labctl key create` made. A service on loopback without --require-keys needs none.",
+        description="An API key made by `labctl key create`. A service on loopback (127.0.0.1) without "
+        "--require-keys needs no key.",
         auto_error=False,
     )
 )

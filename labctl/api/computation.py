@@ -65,7 +65,7 @@ async def while_connected(
     try:
         await asyncio.wait({asked, left}, return_when=asyncio.FIRST_COMPLETED)
         if not asked.done():
-            raise HTTPException(CLIENT_LEFT, "the client left before the answer was computed")
+            raise HTTPException(CLIENT_LEFT, "the client has disconnected before the answer was computed")
         return asked.result()
     finally:
         await _end(asked, left)
@@ -93,7 +93,7 @@ async def follow(
     if asked.cancelled() or (first is None and asked.exception() is not None):
         await _end(left)
         if asked.cancelled():
-            raise HTTPException(CLIENT_LEFT, "the client left before the first stage")
+            raise HTTPException(CLIENT_LEFT, "the client has disconnected before the computation began")
         asked.result()
 
     async def stream() -> AsyncIterator[bytes]:

@@ -64,7 +64,7 @@ def _of_the_log(of_requests: int) -> Iterator[Metric]:
     lost, repeated = held_back()
     repeated += of_requests
     yield CounterMetricFamily(
-        "labctl_log_records_lost", "Log records of the web process that could not be written", value=lost
+        "labctl_log_records_lost", "Number of log records of the web process that could not be written", value=lost
     )
     yield CounterMetricFamily(
         "labctl_log_records_held_back",

@@ -113,23 +113,26 @@ class AccessMiddleware:
         host = headers.get("host", "")
         if _name_of(host) not in self._access.hosts:
             raise NotAllowed(
-                f"host {host!r} is not accepted; use an address of this list, or start the service with "
-                "--require-keys: "
-                f"{', '.join(sorted(self._access.hosts))}"
+                f"host {host!r} is not accepted; use one of these addresses: "
+                f"{', '.join(sorted(self._access.hosts))}; or start the service with --require-keys"
             )
         if "forwarded" in headers or "x-forwarded-for" in headers:
-            raise NotAllowed("the request came through a proxy; start the service with --require-keys behind one")
+            raise NotAllowed(
+                "the request came through a proxy; a service behind a proxy must be started with --require-keys"
+            )
         reads = scope["method"] in READING
         if reads and not scope["path"].startswith(API):
             return
         if headers.get("sec-fetch-site", "none") not in {"none", "same-origin"}:
             raise NotAllowed(
-                "a page of another site may send no request here; open the address of this service in the browser"
+                "pages of other sites may not send requests to this service; open the address of this service "
+                "in the browser"
             )
         origin = headers.get("origin")
         if not reads and origin is not None and origin.partition("://")[2] != host:
             raise NotAllowed(
-                f"a page of {origin[:80]} may change nothing here; open the address of this service in the browser"
+                f"a page of {origin[:80]} may not change anything in this service; open the address of this "
+                "service in the browser"
             )
 
 

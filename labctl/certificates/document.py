@@ -30,7 +30,7 @@ class Customer(Contact):
     """Who ordered the calibration."""
 
     contact: str = Field(default="", description="Person to ask.")
-    order: str = Field(default="", description="The customer's number of the order.")
+    order: str = Field(default="", description="Order number of the customer.")
 
 
 class Item(Part):

@@ -39,7 +39,8 @@ app = typer.Typer(
     add_completion=False,
     rich_markup_mode="rich",
     pretty_exceptions_enable=False,
-    help="Calibrate gyroscopes: run the bench, fit a model, compare it with the measurements, serve the calibration.",
+    help="Calibrate gyroscopes: run a test bench, fit an error model, compare the model with the measurements, "
+    "serve the calibration.",
 )
 app.add_typer(bench.app, name="bench")
 app.add_typer(plugins.driver_app, name="driver")

@@ -67,7 +67,7 @@ def _errors_as_lines() -> Iterator[None]:
 def _exit_with_all(error: BadFile) -> typer.Exit:
     if len(error.problems) == 1:
         return _exit(str(error), error.exit_status)
-    found = _exit(f"{error.path}: {len(error.problems)} problems, nothing of it was kept:", error.exit_status)
+    found = _exit(f"{error.path}: {len(error.problems)} problems; nothing was imported:", error.exit_status)
     for problem in error.problems:
         stderr.print(f"  - {' '.join(problem.split())}", markup=False)
     return found

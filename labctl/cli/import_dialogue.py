@@ -90,7 +90,8 @@ class Acceptance:
             hint = f"the map was written to {self.out}: correct that file and import with --map {self.out}"
         elif not self.given and any("[" in line or "sample_rate_hz" in line for line in lines):
             hint = (
-                f"labctl import {self.path} --write-map MAP.toml writes the map so far; correct and give it with --map"
+                f"`labctl import {self.path} --write-map MAP.toml` writes the incomplete map; correct that file "
+                "and give it with --map"
             )
         else:
             raise BadFile.of(self.path, lines)
@@ -105,7 +106,7 @@ class Acceptance:
         )
         if self.quiet or not sys.stdin.isatty():
             raise BadInput(f"{self.path}: this map is proposed and not yet accepted; {advice}")
-        if not typer.confirm("import with this map?", default=False, err=True):
+        if not typer.confirm("import the log with this column map?", default=False, err=True):
             stderr.print(f"nothing was imported; {advice}", style="dim")
             raise typer.Exit(1)
 

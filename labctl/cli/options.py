@@ -21,24 +21,30 @@ Serial = Annotated[str, typer.Argument(metavar="SERIAL", help="Serial number of 
 AcceptWarnings = Annotated[
     bool,
     typer.Option(
-        "--accept-warnings", help="Fit data that are certainly wrong, and keep a fit that is worse than none."
+        "--accept-warnings",
+        help="Fit the data although labctl found errors in them, and keep the fit even if "
+        "it is worse than no correction.",
     ),
 ]
 BenchName = Annotated[
     str | None,
     typer.Option("--bench", metavar="FILE", help="Bench file, or the name of a bench that ships with labctl."),
 ]
-CampaignId = Annotated[int | None, typer.Argument(metavar="ID", help="Number of the campaign; default: the newest.")]
+CampaignId = Annotated[
+    int | None, typer.Argument(metavar="ID", help="Number of the campaign; default: the newest campaign.")
+]
 RecordingIds = Annotated[
     str | None,
     typer.Option(
         "--recording",
         metavar="ID[,ID...]",
-        help="Number of the recording, or of several to be used together: 1,2,3; default: the unit's newest.",
+        help="Number of the recording, or several numbers to use recordings together, such as 1,2,3; default: "
+        "the unit's newest recording.",
     ),
 ]
 RecordingId = Annotated[
-    int | None, typer.Option("--recording", metavar="ID", help="Number of the recording; default: the unit's newest.")
+    int | None,
+    typer.Option("--recording", metavar="ID", help="Number of the recording; default: the unit's newest recording."),
 ]
 
 

@@ -14,6 +14,6 @@ def turn_text(answer: CampaignResponse) -> str:
     if turn is None:
         return ""
     if turn.phase == "rest":
-        return f"keep the unit still, {turn.position} up"
+        return f"keep the unit still, axis {turn.position} pointing up"
     came = ", ".join(f"{deg:.0f}" for deg in turn.came_deg.values()) or "nothing"
-    return f"turned so far: {came} of {turn.asked_deg:g} deg about {turn.position}"
+    return f"turned so far: {came} of {turn.asked_deg:g} deg about axis {turn.position}"

@@ -27,7 +27,10 @@ def head_lines(
         f"Carries: {carries}.",
     ]
     if differs_dps is not None:
-        lines.append(f"Differs from the calibration in what it carries by at most {at_most(differs_dps):.3g} deg/s.")
+        lines.append(
+            f"Rates corrected by this file differ from those of the calibration by at most "
+            f"{at_most(differs_dps):.3g} deg/s, apart from what the format cannot express."
+        )
     lines += [plain(line) for line in bound_lines(calibration)]
     lines += [f"LOST {loss.text}." for loss in losses]
     return lines + list(notes)

@@ -77,8 +77,12 @@ def largest_difference(part: StaticPart, table: Table) -> float:
 
 def write(calibration: Calibration, options: Mapping[str, str]) -> Written:
     """Return the table; raises BadInput for a model that depends on more than output and temperature."""
-    needs_thermometer(calibration, NAME, "its error is the same at every temperature; use python, c or json")
-    part = static_part(calibration, NAME, carries="the table is over output and temperature alone")
+    needs_thermometer(
+        calibration,
+        NAME,
+        "the error of this calibration is the same at every temperature; use format python, c or json",
+    )
+    part = static_part(calibration, NAME, carries="the table of this format depends on output and temperature only")
     m = whole_number(options, "outputs", (2, MOST), OUTPUTS, NAME) if part.has_rates else 1
     n = whole_number(options, "temperatures", (2, MOST), TEMPERATURES, NAME)
     table = table_of(part, part.outputs(m), part.temperatures(n))

@@ -18,7 +18,7 @@ def number(options: Mapping[str, str], name: str, format_name: str) -> float | N
     except ValueError:
         found = np.nan
     if not np.isfinite(found):
-        raise BadInput(f"format {format_name}: option {name} = {options[name]!r} is no number; give one")
+        raise BadInput(f"format {format_name}: option {name} = {options[name]!r} is not a number; give a number")
     return found
 
 

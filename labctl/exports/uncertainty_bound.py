@@ -25,7 +25,10 @@ def bound_lines(calibration: Calibration) -> list[str]:
     if unknown:
         lines.append(f"Uncertainty of a corrected rate: unknown for {unknown}.")
     if known and found is not None and found["not_stated"]:
-        lines.append(f"Not stated for the bench, and not in U: {', '.join(found['not_stated'])}.")
+        lines.append(
+            f"Uncertainties that the bench does not state, and that U does not contain: "
+            f"{', '.join(found['not_stated'])}."
+        )
     return lines
 
 

@@ -26,7 +26,7 @@ def level_asked() -> int | None:
     if not name:
         return None
     if name.lower() not in LEVELS:
-        raise BadInput(f"{LOG_LEVEL_VARIABLE}={name}: name one of {', '.join(LEVELS)}")
+        raise BadInput(f"{LOG_LEVEL_VARIABLE}={name} is not a log level; set it to one of {', '.join(LEVELS)}")
     return LEVELS[name.lower()]
 
 

@@ -19,13 +19,22 @@ _PRINTED = (
     Printed("coefficients", "Eqs. 9 to 11", "coefficients of the surface", "1", 12.0),
     Printed("raw_max", "Figs. 3, 5", "largest error before compensation", "deg/s", 2.0, "about"),
     Printed("left_max", "Fig. 7", "largest error after compensation", "deg/s", None),
-    Printed("ratio", "Fig. 7", "RMS error before over after compensation", "1", 10.0, "about"),
+    Printed("ratio", "Fig. 7", "RMS error before divided by RMS error after compensation", "1", 10.0, "about"),
     Printed("heldout_ratio", "Fig. 7", "the same, at temperatures left out of the fit", "1", None),
-    Printed("turn_before", "Fig. 8", "largest error per turn of 360 deg, static bias off only", "deg", 15.0, "about"),
+    Printed(
+        "turn_before", "Fig. 8", "largest error per turn of 360 deg, only static bias subtracted", "deg", 15.0, "about"
+    ),
     Printed("turn_after", "Fig. 9", "largest error per turn, full compensation", "deg", None),
     Printed("turn_after_share", "Fig. 9", "largest error per turn, share of the turn", "%", 2.0, "below"),
-    Printed("turn_ratio", "Figs. 8, 9", "RMS error per turn before over after", "1", 10.0, "about"),
-    Printed("turn_max_ratio", "Figs. 8, 9", "largest error per turn before over after", "1", 10.0, "about"),
+    Printed("turn_ratio", "Figs. 8, 9", "RMS error per turn before divided by after compensation", "1", 10.0, "about"),
+    Printed(
+        "turn_max_ratio",
+        "Figs. 8, 9",
+        "largest error per turn before divided by after compensation",
+        "1",
+        10.0,
+        "about",
+    ),
 )
 
 _CONTRADICTIONS = (
@@ -48,12 +57,13 @@ _CONTRADICTIONS = (
     Contradiction(
         "Eq. 14, Figs. 8, 9",
         "The error per turn grows without bound towards rest.",
-        "It is given from 5 deg/s on, as in the paper; the error in deg/s stands beside it.",
+        "labctl gives the error per turn for rates of 5 deg/s or more, as the paper does, and beside it the "
+        "error in deg/s.",
     ),
     Contradiction(
         "Results",
-        "One order of magnitude for the error in deg/s stands beside less than 2 % of a turn, but the raw error is "
-        "itself 2 deg/s on 100 deg/s, which is 2 %.",
+        "The paper states an error in deg/s that is one order of magnitude smaller, and an error of less than 2 "
+        "% of a turn; but the uncorrected error is 2 deg/s at 100 deg/s, which is also 2 %.",
         "Both are given: the ratio of the RMS errors, and the largest error per turn as a share of 360 deg.",
     ),
     Contradiction(

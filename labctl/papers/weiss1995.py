@@ -62,7 +62,7 @@ def _contradictions() -> Iterator[Contradiction]:
         "Offsets at rest",
         f"About 0.5 (deg/s)/K is claimed; the table has {steep:.2f} between 16 and 23 deg C by least squares "
         f"({ends:.2f} from end to end) and {flat:.2f} between 23 and 45 deg C: a curve, or a lag behind the "
-        "thermometer. Six points cannot tell.",
+        "thermometer. Six points are too few to decide.",
         "Recipe gyrostar fills the gap between 23 and 45 deg C.",
     )
     limit = OFFSET_SHARE_PER_K * FULL_DPS
@@ -75,7 +75,7 @@ def _contradictions() -> Iterator[Contradiction]:
     yield Contradiction(
         "Scale factors",
         "22,007 has a decimal comma among points.",
-        "It is read as 22.007; a file that mixes both is refused.",
+        "labctl reads it as 22.007, and refuses a file that mixes points and commas.",
     )
     yield Contradiction(
         "Program",

@@ -58,7 +58,7 @@ def full_turn(comparison: ComparisonJson) -> go.Figure | None:
     if not rows:
         return None
     axes = _in_order(_of(columns["axis"], rows))
-    words = ("static bias off only", "after the calibration")
+    words = ("only static bias subtracted", "after the calibration")
     figure = grid_of(
         [f"{axis}: {word}" for axis in axes for word in words], 2, specs=[[{"type": "scene"}] * 2 for _ in axes]
     )

@@ -32,7 +32,7 @@ def paper_html(page: PaperPage) -> str:
         *(f"<p>{escape(line)}</p>" for line in page["story"]),
         *_numbers(page["numbers"]),
         "<h2>Where the paper contradicts itself or leaves a choice</h2>" if page["contradictions"] else "",
-        table_part(("place", "what the numbers say", "what is done here"), page["contradictions"], (1, 2)),
+        table_part(("place", "what the printed numbers show", "what is done here"), page["contradictions"], (1, 2)),
         "<h2>What could not be made</h2>" if page["missing"] else "",
         table_part(("what", "why", "what to record"), page["missing"], (1, 2)),
         *map(figure_part, pictures),

@@ -37,91 +37,95 @@ class _Kind(Generic[AnswerT]):
 KINDS = (
     _Kind(
         "map", "Where the model fails, in rate and temperature",
-        "Each cell is the mean residual of its data sets over the noise floor, and every measured cell is drawn; "
-        "red: measured error above the model, blue: below it; the same colour scale in all maps."
-        " Data sets share a cell where rate and temperature "
-        "repeat within 0.1 % and 0.25 K. Dimmed cells are less than two noise floors from zero: a single one is not "
-        "significant."
-        " A "
-        "column that is coloured from top to bottom depends on the rate, a row on the temperature, one corner on both.",
+        "Each cell shows the mean residual of its data sets divided by the noise floor; all measured cells are "
+        "drawn. Red: the measured error is above the model; blue: below it. All maps have the same colour "
+        "scale. Data sets share a cell if their rates agree within 0.1 % and their temperatures within 0.25 K. "
+        "Dimmed cells are less than two noise floors from zero; a single dimmed cell is not significant. If a "
+        "column is coloured from top to bottom, the residual depends on the rate; if a row is, on the "
+        "temperature; if one corner is, on both.",
         residual_maps.maps,
     ),
     _Kind(
         "channels", "Residual against every logged channel",
-        "Dots are data sets, the line is their running mean (or the mean at each level), the band its 95 % interval, "
-        "with the drift between data sets taken into account. Where the band excludes zero, the error depends on "
-        "this channel, or on another that changes together with it, as time and temperature do when the temperature "
-        "only rises."
+        "Dots: data sets. Line: their running mean, or the mean at each level. Band: the 95 % interval of that "
+        "mean, including the drift between data sets. If the band excludes zero, the error depends on this "
+        "channel or on another channel that changes together with it. Time and temperature change together if "
+        "the temperature only rises."
         "",
         residual_lines.channels,
     ),
     _Kind(
         "time", "Residual against time",
-        "Dotted lines are power-ons; the temperature is below; without times, the data sets in order. A slope is "
-        "drift, a step at a power-on or a re-mounting is a shift, a decay after a power-on is warm-up. Lag-1 and the "
-        "runs test are of the residuals after the drift that the noise model knows is taken out: a small p means "
-        "that successive residuals are still correlated."
+        "Upper plot: residual; lower plot: temperature; dotted lines: power-ons. If the times are not known, "
+        "the data sets are drawn in order. A slope is drift, a step at a power-on or a re-mounting is a shift, "
+        "a decay after a power-on is warm-up. The lag-1 correlation and the runs test use the residuals after "
+        "subtraction of the drift in the noise model: a small p means that successive residuals are still correlated."
         "",
         residual_lines.time,
     ),
     _Kind(
-        "angle", "Waves in the table angle, within data sets",
-        "Mean power over white noise by cycles per turn; a bar above the dashed limit is a line (about 5 % chance of "
-        "one anywhere in a panel with nothing there). Once per turn: Earth's rate, a magnetic field or a tilt; four "
-        "per turn: the gear. The stepper's own lines (50 and 200 per turn) and, where the latitude is known, the "
-        "Earth's are taken out: bars well below 1 are the frequencies to which sampling aliased them. A line that "
+        "angle", "Periodic errors over the table angle, within data sets",
+        "Mean power divided by that of white noise, for each number of cycles per turn. A bar above the dashed "
+        "limit is a spectral line; noise alone puts one bar of a panel above it with a probability of about 5 "
+        "%. Once per turn: the Earth's rate, a magnetic field or a tilt. Four times per turn: the gear. The "
+        "lines of the stepper motor (50 and 200 per turn) and, if the latitude is known, that of the Earth are "
+        "removed: bars well below 1 are the frequencies at which sampling shows these lines. A line that "
         "appears here and not over time follows the table."
         "",
         spectra.angle,
     ),
     _Kind(
         "frequency", "Waves in time",
-        "Left: the data sets' residuals as waves, dashed what noise alone gives on average. Right: readings within "
-        "data sets over white noise, dashed the limit. A line that appears here and not over the angle follows a "
-        "clock, not the table: mains, a fan, the chamber's cycling."
+        "Left: spectrum of the residuals of the data sets; dashed: the mean for noise alone. Right: spectrum of "
+        "the readings within data sets, divided by white noise; dashed: the limit. A line that appears here and "
+        "not over the table angle does not follow the table: its cause may be the mains, a fan or the cycling "
+        "of the chamber."
         "",
         spectra.frequency,
     ),
     _Kind(
         "time_in_set", "The first seconds of a data set",
-        "The mean course of all data sets, and the same by the step in rate that went before; bands are 95 % about "
-        "zero. A mean that decays in the right panel shows that the gyro or the table is still settling: wait longer.",
+        "Left: mean course of all data sets. Right: the same divided by the step in rate before the data set. "
+        "Bands: 95 % interval about zero. A mean that decays in the right panel shows that the gyro or the "
+        "table is still settling: wait longer.",
         residual_lines.time_in_set,
     ),
     _Kind(
-        "legs", "From below minus from above",
-        "Pairs of data sets at one rate and temperature, once reached from a lower temperature and once from a higher. "
-        "Off zero: hysteresis, or a part that follows the temperature later than the thermometer; hysteresis closes "
-        "towards both ends of "
-        "the range. A slope over rate means that the scale factor has hysteresis too.",
+        "legs", "Difference between heating and cooling",
+        "Differences of two data sets at the same rate and temperature: one reached from a lower temperature, "
+        "one from a higher. A difference other than zero shows hysteresis, or a part of the gyro that follows "
+        "the temperature later than the thermometer; hysteresis becomes smaller towards both ends of the range. "
+        "A slope over the rate shows that the scale factor has hysteresis too.",
         residual_lines.legs,
     ),
     _Kind(
         "previous_rate", "Residual against the rate before",
-        "A slope or a step at zero means that the output depends on the previous rate. With rates in rising order "
-        "this picture is that over the rate itself, shifted by one data set."
+        "A slope or a step at zero shows that the output depends on the previous rate. If the rates were "
+        "measured in ascending order, this picture shows the same as the residual over the rate, shifted by one "
+        "data set."
         "",
         residual_lines.previous_rate,
     ),
     _Kind(
         "repeats", "Repeated points",
-        "Differences of data sets at one rate and temperature; dashed are two standard deviations of what the noise "
-        "model gives neighbours like these. Points far outside: an effect that depends on neither rate nor "
+        "Differences of data sets at the same rate and temperature. Dashed: two standard deviations that the "
+        "noise model expects of such pairs. Points far outside show an effect that depends on neither rate nor "
         "temperature, or noise that is larger than estimated."
         "",
         noise.repeats,
     ),
     _Kind(
         "allan", "Allan deviation of the static record",
-        "The longest section at rest and at one temperature. Slope -1/2 is angle random walk N, the flat part bias "
-        "instability B, slope +1/2 rate random walk K; bars are 95 % intervals, dashed the fitted sum of the terms.",
+        "Allan deviation of the longest section at rest and at one temperature. The slope -1/2 gives the angle "
+        "random walk N, the flat part the bias instability B, the slope +1/2 the rate random walk K. Bars: 95 % "
+        "intervals. Dashed: the fitted sum of these terms.",
         noise.allan,
     ),
 )  # fmt: skip
 LADDER = _Kind(
     "ladder", "Errors of the versions",
-    "Each version's RMS error on the data of its fit and on temperatures left out of its fit; dashed the noise floor. "
-    "An error that falls on the fitted data only is overfitting.",
+    "RMS error of each version on the data of its fit, and on temperatures left out of its fit. Dashed: the "
+    "noise floor. An error that falls on the fitted data only is overfitting.",
     noise.ladder,
 )  # fmt: skip
 
@@ -129,16 +133,17 @@ LADDER = _Kind(
 COMPARED = (
     _Kind(
         "error_over_rate", "Measured and modelled error of the version, without refitting",
-        "Nothing is refitted here. Dots are measured, lines are the version's model at each temperature level: blue is "
-        "cold, red is hot. Rows are outputs, columns the axis that is turned; each panel has its own scale of errors.",
+        "The version is applied without refitting. Dots: measured errors. Lines: the model of the version at "
+        "each temperature level; blue is cold, red is hot. Rows: outputs; columns: the axis that is turned. "
+        "Each panel has its own scale of errors.",
         model_lines.error_over_rate,
     ),
     _Kind(
         "full_turn", "Error after a full turn",
-        "How far a heading is off after one turn, from 5 deg/s on: left with only the static bias at rest "
-        "subtracted, right with the calibration applied and its remaining static bias subtracted, both on the same axes"
-        "; blue is cold, red is "
-        "hot.",
+        "Error of the heading after one full turn, for rates of 5 deg/s or more. Left: only the static bias at rest is "
+        "subtracted. Right: the calibration is applied, and the remaining static bias is "
+        "subtracted. Both plots have the "
+        "same scale; blue is cold, red is hot.",
         model_lines.full_turn,
     ),
 )  # fmt: skip

@@ -121,7 +121,8 @@ def _packed(answer: Answer) -> bytes:
         return pickle.dumps(
             Answer(
                 raised=LabctlError(
-                    f"an answer cannot be sent between processes; report this with the version of labctl: {text}"
+                    f"an answer cannot be sent between processes; report this text and the version of labctl to "
+                    f"its maintainers: {text}"
                 )
             )
         )

@@ -61,7 +61,10 @@ class Child:
             said = self.line.recv()
         except (EOFError, OSError):
             self._process.wait()
-            raise Failed(f"the {self.name} ended with status {self._process.returncode} at its start") from None
+            raise Failed(
+                f"the {self.name} ended with exit status {self._process.returncode} while it started; "
+                "read the log for the cause"
+            ) from None
         if isinstance(said, BaseException):
             self._process.wait()
             raise said

@@ -32,7 +32,7 @@ def listening(host: str, port: int) -> Iterator[Listening]:
             raise BadInput(f"--host {host}: {error.strerror}; name an address of this machine") from error
         except OSError as error:
             raise BadInput(
-                f"--port {port} on {host}: {error.strerror}; give another port, or 0 for a free one"
+                f"--port {port} on {host}: {error.strerror}; give another port, or 0 for a free port"
             ) from error
         name = f"[{host}]" if ":" in host else host
         listener.listen(BACKLOG)  # a client that reads the address may connect at once

@@ -89,7 +89,8 @@ class RemoteControl:
             if not stopped:
                 raise
             raise BenchSilent(
-                f"campaign {asked.campaign} was asked to stop; its progress is not known: {silent}; inspect the bench"
+                f"labctl has requested the stop of campaign {asked.campaign}, but it is not known whether the "
+                f"campaign has stopped: {silent}; inspect the bench"
             ) from silent
 
     def confirm(self, _: CommandContext, asked: ToCampaign[ConfirmRequest]) -> CampaignResponse:

@@ -40,11 +40,11 @@ class ServeRequest:
     def check(self) -> None:
         """Raise BadInput for a number that is out of its range."""
         if not 0 <= self.speed < float("inf"):
-            raise BadInput(f"--speed {self.speed}: a positive number, or 0 for as fast as it can")
+            raise BadInput(f"--speed {self.speed}: give a positive number, or 0 for as fast as possible")
         if not 0 <= self.port <= LAST_PORT:
-            raise BadInput(f"--port {self.port}: 1 to {LAST_PORT}, or 0 for a free one")
+            raise BadInput(f"--port {self.port}: give a port from 1 to {LAST_PORT}, or 0 for a free port")
         if not 1 <= self.max_upload_mib <= 1 << 20:
-            raise BadInput(f"--max-upload-mib {self.max_upload_mib}: 1 to {1 << 20}")
+            raise BadInput(f"--max-upload-mib {self.max_upload_mib}: give a size from 1 to {1 << 20} MiB")
 
 
 @dataclass(frozen=True)

@@ -40,12 +40,15 @@ class Supervision:
         """Obey a supervisor from now on. Raises Conflict while there is another, or for another bench."""
         with self._guard:
             if self._line is not None:
-                raise Conflict(f"the service at {self._settings.url} is in charge of this bench process; stop it first")
+                raise Conflict(
+                    f"the service at {self._settings.url} controls this bench process; stop that service first"
+                )
             if wanted.drives != self._settings.drives:
                 own = self._settings
                 raise Conflict(
-                    f"a bench process that outlived its service drives bench {own.bench} at speed {own.speed:g} and "
-                    "holds this database; start the service with the same --bench and --speed, or stop that process"
+                    f"a bench process whose service has ended still drives bench {own.bench} at speed "
+                    f"{own.speed:g} and uses this database; start the service with the same --bench and "
+                    "--speed, or stop that process"
                 )
             self._line = line
         self._settings = wanted

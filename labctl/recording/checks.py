@@ -71,8 +71,8 @@ def _possible(path: Path, name: str, values: NDArray[np.float64], low: float, hi
     if wrong.any():
         row = int(np.argmax(wrong))
         raise BadRecording(
-            f"{path}: column {name!r}, row {row + 1}: {values[row]:g} is not possible ({low:g} to {high:g} "
-            f"{BY_NAME[name].unit}); check the column's unit"
+            f"{path}: column {name!r}, row {row + 1}: {values[row]:g} is outside the possible range of {low:g} "
+            f"to {high:g} {BY_NAME[name].unit}; check the column's unit"
         )
 
 
@@ -87,9 +87,8 @@ def _squarable(path: Path, name: str, values: Column, valid: Column | None) -> N
     if wrong.any():
         row = int(np.argmax(wrong))
         raise BadRecording(
-            f"{path}: column {name[:80]!r}, row {row + 1}: {values[row]:g} is beyond {LARGEST:g}, the largest value "
-            "that is computed with;"
-            " check the column's unit"
+            f"{path}: column {name[:80]!r}, row {row + 1}: {values[row]:g} is larger than {LARGEST:g}, the "
+            "largest value that labctl accepts; check the column's unit"
         )
 
 
@@ -120,8 +119,8 @@ def _finite(path: Path, name: str, values: Column, valid: Column | None) -> None
     if bad.any():
         row = int(np.argmax(bad))
         raise BadRecording(
-            f"{path}: column {name!r}, row {row + 1}: {values[row]} where a number is needed "
-            f"({BY_NAME[name].meaning}); leave the row out, or mark it with valid = 0"
+            f"{path}: column {name!r}, row {row + 1}: {values[row]} is not a number (the column is the "
+            f"{BY_NAME[name].meaning}); leave the row out, or mark it with valid = 0"
         )
 
 

@@ -106,16 +106,17 @@ def check_coefficients(path: Path, info: RecordingInfo, columns: Mapping[str, ob
     unknown = sorted(set(columns) - known)
     if unknown:
         raise BadRecording(
-            f"{path}: column {unknown[0][:80]!r} is not known in a table of the form {form.name!r}, and would be lost; "
-            f"it has {', '.join(needed)}, and u_NAME for the standard uncertainty of a coefficient. A misalignment is "
+            f"{path}: column {unknown[0][:80]!r} is not known in a table of the form {form.name!r}; remove or "
+            f"rename it. The form has the columns {', '.join(needed)}, and u_NAME for the standard uncertainty "
+            "of a coefficient. A misalignment is "
             "given as k_xy (output x per rate about y) with all of K and B"
         )
     stated = [f"u_{name}" for name in coefficients if f"u_{name}" in columns]
     lacking = [f"u_{name}" for name in coefficients if f"u_{name}" not in columns]
     if stated and lacking:
         raise BadRecording(
-            f"{path}: column {lacking[0]!r} is missing, and {stated[0]!r} is there; give the standard uncertainty of "
-            "every coefficient, or of none"
+            f"{path}: column {lacking[0]!r} is missing, although column {stated[0]!r} is present; give the "
+            "standard uncertainty of every coefficient, or of none"
         )
     for name in stated:
         _check_u(path, name, columns)

@@ -52,7 +52,9 @@ class OutputUnit(BaseModel):
     @model_validator(mode="after")
     def _usable(self) -> OutputUnit:
         if self.scale == 0 or not math.isfinite(self.scale) or not math.isfinite(self.offset):
-            raise ValueError(f"scale must be a finite number other than 0 (is {self.scale}) and offset finite")
+            raise ValueError(
+                f"scale = {self.scale} and offset must be finite numbers, and scale must not be 0; correct them"
+            )
         return self
 
 
@@ -91,5 +93,5 @@ class RecordingInfo(BaseModel):
     @model_validator(mode="after")
     def _axes_once(self) -> RecordingInfo:
         if len(set(self.axes)) != len(self.axes):
-            raise ValueError(f"an axis is repeated in axes = {list(self.axes)}")
+            raise ValueError(f"an axis is repeated in axes = {list(self.axes)}; name each axis once")
         return self

@@ -39,7 +39,9 @@ def catalogue_with(written: Sequence[Formula]) -> dict[str, Effect]:
     """Return the catalogue with formulas that compete in it. Raises BadInput for a name that it has."""
     for each in written:
         if each.id in CATALOGUE:
-            raise BadInput(f"formula {each.id!r}: the catalogue has an effect of that name; choose another")
+            raise BadInput(
+                f"formula {each.id!r}: the catalogue already has an effect of that name; choose another name"
+            )
     return {**CATALOGUE, **{each.id: each for each in written}}
 
 

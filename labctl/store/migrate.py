@@ -43,8 +43,9 @@ def refuse_unknown(revision: str | None, location: str) -> None:
     """Raise StoreError when a database stands at a step that this code does not know."""
     if revision is not None and revision not in KNOWN:
         raise StoreError(
-            f"{location}: the database is at step {revision!r}, which is newer than this labctl (step {HEAD!r}); "
-            "use the labctl that made it, or a newer one. Nothing was changed"
+            f"{location}: the schema of the database is number {revision!r}, but this version of labctl knows "
+            f"only up to number {HEAD!r}. Nothing was changed; use the version of labctl that made the "
+            "database, or a newer one"
         )
 
 

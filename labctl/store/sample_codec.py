@@ -63,7 +63,8 @@ def unpack(block: Block) -> dict[str, NDArray[np.generic]]:
         raise StoreError("a block of readings is damaged: its checksum is wrong; restore the newest backup")
     if block.codec != CODEC:
         raise StoreError(
-            f"a block of readings is stored by codec {block.codec}, and this labctl reads {CODEC}; use a newer labctl"
+            f"a block of readings is stored with codec {block.codec}, but this version of labctl reads only "
+            f"{CODEC}; use a newer version"
         )
     (size,) = _HEAD.unpack_from(block.data)
     heads, lengths, effort = json.loads(block.data[_HEAD.size : _HEAD.size + size])

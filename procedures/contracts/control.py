@@ -58,15 +58,15 @@ class Control:
         """Wait until the thread that drives the bench has seen the abort, s of wall time; returns whether it has."""
         return self._heard.wait(within_s)
 
-    def pause(self, reason: str = "asked by a person") -> None:
+    def pause(self, reason: str = "requested by a person") -> None:
         """Ask to hold after the data set that is being taken; the environment is still recorded."""
         self._change(pause=True, reason=reason)
 
-    def resume(self, reason: str = "asked by a person") -> None:
+    def resume(self, reason: str = "requested by a person") -> None:
         """Ask to go on."""
         self._change(pause=False, reason=reason)
 
-    def abort(self, reason: str = "asked by a person") -> None:
+    def abort(self, reason: str = "requested by a person") -> None:
         """Ask for the end, now and in the safe state. Waits for no lock."""
         self._final(ControlRequest(abort=True, reason=reason))
 

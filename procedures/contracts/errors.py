@@ -37,7 +37,7 @@ class PlanRefused(ProcedureError):
     """A recipe asks for what the bench or a unit cannot do. `offenders` holds one clear text per point."""
 
     def __init__(self, recipe: str, offenders: Sequence[str], advice: str) -> None:
-        super().__init__(f"recipe {recipe} asks for what this bench cannot do: {'; '.join(offenders)}. {advice}")
+        super().__init__(f"this bench cannot run recipe {recipe}: {'; '.join(offenders)}. {advice}")
         self.offenders = tuple(offenders)
 
 

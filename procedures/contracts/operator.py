@@ -133,8 +133,8 @@ class HumanOperator:
         with self._lock:
             if self._pending is not None and self._pending.id == prompt_id and self._pending.kind != "turn":
                 raise StalePrompt(
-                    f"question {prompt_id!r} asks for no turn by hand: confirm it, or decline it; only a turn is asked "
-                    "again"
+                    f"question {prompt_id!r} does not ask for a turn by hand, and only a turn can be repeated; "
+                    "confirm the question, or decline it"
                 )
         self._reply(Answer(prompt_id, confirmed=False, by=by, reason=reason, again=True))
 
@@ -151,5 +151,7 @@ class HumanOperator:
         with self._lock:
             if self._pending is None or self._pending.id != answer.prompt_id or self._answer is not None:
                 now = f"{self._pending.id!r} is" if self._pending and self._answer is None else "no question is"
-                raise StalePrompt(f"question {answer.prompt_id!r} is no longer asked; {now} open now, answer that")
+                raise StalePrompt(
+                    f"question {answer.prompt_id!r} was already answered or withdrawn; {now} open now, answer that"
+                )
             self._answer = answer

@@ -128,8 +128,9 @@ def _gate(spin: Spin, step: Acquire) -> tuple[float, float]:
     from_s, until_s = spin.gate(spin.steady_from_s + step.settle_s, step.duration_s)
     if until_s - from_s < step.duration_s - 1e-6:
         raise StepFailed(
-            f"the table is steady at {spin.rate_dps:g} deg/s for {until_s - from_s:.3f} s after settling,"
-            f" not for the {step.duration_s:g} s of the data set"
+            f"the table is steady at {spin.rate_dps:g} deg/s for only {until_s - from_s:.3f} s after settling, "
+            f"not for the {step.duration_s:g} s of the data set; check the rate of the table, or shorten "
+            "duration_s in the recipe"
         )
     return from_s, until_s
 
@@ -214,5 +215,5 @@ def _demand_readings(counts: dict[str, ReadingCounts]) -> None:
     for name, count in counts.items():
         if count.valid + count.invalid == 0:
             raise BadData(
-                name, f"not one of about {count.expected:.0f} readings came; check cable, power and baud rate"
+                name, f"none of about {count.expected:.0f} expected readings arrived; check cable, power and baud rate"
             )

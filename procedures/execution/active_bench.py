@@ -31,14 +31,19 @@ class ActiveBench:
     def table(self) -> RateTable:
         """The rate table, for steps that need one. Raises StepFailed."""
         if self.rate_table is None:
-            raise StepFailed("this bench has no rate table; name one that has, or choose a recipe with [turns]")
+            raise StepFailed(
+                "this bench has no rate table; name a bench that has one, or choose a recipe with "
+                "[turns] (turns by hand)"
+            )
         return self.rate_table
 
     @property
     def chamber(self) -> Chamber:
         """The chamber, for steps that need one. Raises StepFailed."""
         if self.air_chamber is None:
-            raise StepFailed("this bench has no chamber; name one that has, or choose a recipe with [turns]")
+            raise StepFailed(
+                "this bench has no chamber; name a bench that has one, or choose a recipe with [turns] (turns by hand)"
+            )
         return self.air_chamber
 
     @property
@@ -57,6 +62,6 @@ class ActiveBench:
             self.rate_table.stop()
 
     def drop(self, gyro: str, reason: str) -> Gyro:
-        """Let a unit take no further part; returns it."""
+        """Exclude a unit from the rest of the campaign; returns it."""
         self.dropped[gyro] = reason
         return self.gyros.pop(gyro)

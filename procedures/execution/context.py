@@ -65,7 +65,7 @@ class ExecutionContext:
         return device in self.bench.gyros and len(self.bench.gyros) > 1
 
     def drop(self, gyro: str, reason: str) -> None:
-        """Let a unit take no further part; the others go on."""
+        """Exclude a unit from the rest of the campaign; the others go on."""
         unit = self.bench.drop(gyro, reason)
         self.monitor.forget(gyro)
         with contextlib.suppress(InstrumentError, OSError):  # its stream is closed once more in the safe state
@@ -78,7 +78,10 @@ class ExecutionContext:
     def notice_leaving(self, _t_s: float, chamber_c: float, _gyro_c: object) -> None:
         """Note that a soaked temperature no longer holds, once the air has left its band."""
         if self.soaked and abs(chamber_c - self.soaked.temperature_c) > self.soaked.band_c:
-            text = f"the temperature {self.soaked.temperature_c:g} deg C was left: the air is at {chamber_c:.2f} deg C"
+            text = (
+                f"the air has left the temperature {self.soaked.temperature_c:g} deg C of the soak and is at "
+                f"{chamber_c:.2f} deg C"
+            )
             self.recorder.event(Event("soak_owed", text))
             self.soaked = None
 

@@ -136,6 +136,6 @@ class Engine:
 
     def _describe_done(self) -> str:
         skipped, dropped = len(self._executor.skipped), self._context.bench.dropped
-        left_out = [f"{skipped} steps were left out as the units were not turned"] if skipped else []
-        gone = [f"{name} dropped out ({reason})" for name, reason in dropped.items()]
+        left_out = [f"{skipped} steps were left out because the units were not turned"] if skipped else []
+        gone = [f"{name} was excluded ({reason})" for name, reason in dropped.items()]
         return "; ".join(["all steps done", *left_out, *gone])

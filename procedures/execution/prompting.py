@@ -28,7 +28,7 @@ def ask(context: ExecutionContext, prompt: Prompt, meanwhile: Callable[[], None]
         answer = _wait_for_answer(context, prompt, meanwhile)
     if answer.again:
         said = f": {answer.reason}" if answer.reason else ""
-        context.recorder.event(Event(f"operator.{prompt.kind}", f"{prompt.text}: again, says {answer.by}{said}"))
+        context.recorder.event(Event(f"operator.{prompt.kind}", f"{prompt.text}: {answer.by} requests it again{said}"))
         return answer
     if not answer.confirmed:
         raise StepFailed(f"{answer.by} declined: {prompt.text}: {answer.reason}")
@@ -57,7 +57,7 @@ def _poll_until_answered(context: ExecutionContext, prompt: Prompt, meanwhile: C
     remind_at_s = began_s + remind_s
     while (answer := context.operator.answer(prompt.id)) is None:
         if timeout_s is not None and clock.now_s() - began_s >= timeout_s:
-            raise Unanswered(f"no answer within {timeout_s:g} s: {prompt.text}")
+            raise Unanswered(f"no answer within {timeout_s:g} s to the request: {prompt.text}")
         if clock.now_s() >= remind_at_s:
             remind_at_s += remind_s
             text = f"{prompt.text} [question {prompt.id}], open since {clock.now_s() - began_s:.0f} s"

@@ -47,7 +47,9 @@ def reconnect(context: ExecutionContext, error: LinkError) -> None:
             continue
         context.monitor.links.change(device, "well")
         return
-    context.monitor.links.change(device, "lost", f"{error}; not reached again in {len(PAUSES_S)} tries")
+    context.monitor.links.change(
+        device, "lost", f"{error}; the instrument was not reached again in {len(PAUSES_S)} tries"
+    )
     raise error
 
 

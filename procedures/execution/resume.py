@@ -29,7 +29,7 @@ class Restart:
     gap_s: float = math.inf  #: for how long nothing was recorded; infinite where a soak was owed already
     power_lost: bool = False  #: the units were off meanwhile
     added_runs: int = 0  #: powered sessions more than the plan has, this one among them
-    dropped: Mapping[str, str] = field(default_factory=dict)  #: units that took no further part, and why
+    dropped: Mapping[str, str] = field(default_factory=dict)  #: units that were excluded, and why
     skipped: frozenset[int] = frozenset()  #: steps that were left out before
 
 
@@ -75,7 +75,7 @@ def _make_safe_first(context: ExecutionContext) -> None:
             raise StepFailed("resumed, but the bench could not be made safe first: " + "; ".join(complaints))
         pass_time(context, pause_s, pausing=False)
         pause_s = min(2 * pause_s, LONGEST_PAUSE_S)
-    context.recorder.event(Event("safe_state", "before anything else, the bench is set to its safe state"))
+    context.recorder.event(Event("safe_state", "setting the bench to its safe state before resuming"))
 
 
 class _ChamberDeviation:
@@ -112,7 +112,7 @@ def _switch_on(context: ExecutionContext, run: int, restart: Restart) -> None:
 
 
 def _repeat(context: ExecutionContext, step: Step, start_at: int, carry_out: Callable[[Step], object]) -> None:
-    context.recorder.event(Event("lead_in", f"done again before step {start_at + 1}: {step.kind}"))
+    context.recorder.event(Event("lead_in", f"step repeated before step {start_at + 1}: {step.kind}"))
     carry_out(step)
 
 

@@ -63,7 +63,10 @@ def stop_table(table: RateTable, clock: Clock) -> str | None:
     until_s = clock.now_s() + STANDSTILL_TIMEOUT_S
     while table.is_moving():
         if clock.now_s() >= until_s:
-            return f"it still moves {STANDSTILL_TIMEOUT_S:g} s after it was stopped; switch its power off"
+            return (
+                f"the table still moves {STANDSTILL_TIMEOUT_S:g} s after it was stopped; switch the power of "
+                "the table off"
+            )
         clock.sleep(1.0)
     return None
 
@@ -71,5 +74,8 @@ def stop_table(table: RateTable, clock: Clock) -> str | None:
 def _make_chamber_safe(chamber: Chamber) -> str | None:
     set_c = chamber.make_safe()
     if abs(set_c - chamber.safe_c) > chamber.limits.resolution_c:
-        return f"set point {set_c:g} deg C was read back instead of {chamber.safe_c:g} deg C; set it by hand"
+        return (
+            f"set point {set_c:g} deg C was read back instead of {chamber.safe_c:g} deg C; set it at the "
+            "panel of the chamber"
+        )
     return None

@@ -75,7 +75,8 @@ class StepExecutor:
             self._recorder.event(
                 warning(
                     "soak_again",
-                    f"soaking again: {owed.temperature_c:g} deg C was left, or the unit's temperature is uncertain",
+                    f"soaking again: the air has left {owed.temperature_c:g} deg C, or the temperature of the "
+                    "unit is uncertain",
                 )
             )
             self.carry_out(owed)

@@ -113,7 +113,8 @@ def move_chamber(context: ExecutionContext, step: MoveChamber) -> Figures:
     half_step_c = context.bench.chamber.limits.resolution_c / 2
     if abs(set_c - step.temperature_c) > half_step_c + 1e-6:
         raise StepFailed(
-            f"{context.bench.chamber.name}: set point {set_c:g} deg C was read back, not {step.temperature_c:g}"
+            f"{context.bench.chamber.name}: set point {set_c:g} deg C was read back instead of "
+            f"{step.temperature_c:g} deg C; check the panel of the chamber"
         )
     began_s = context.clock.now_s() - context.paused_s
     for _ in polls(context):
@@ -123,8 +124,9 @@ def move_chamber(context: ExecutionContext, step: MoveChamber) -> Figures:
             break
         if took_s >= step.timeout_s:
             raise SoakFailed(
-                f"{context.bench.chamber.name}: {context.monitor.chamber_c:.1f} deg C after {took_s:.0f} s, not within"
-                f" {step.band_c:g} deg C of {step.temperature_c:g} deg C; limit {step.timeout_s:g} s",
+                f"{context.bench.chamber.name}: {context.monitor.chamber_c:.1f} deg C after {took_s:.0f} s, not "
+                f"within {step.band_c:g} deg C of the set point {step.temperature_c:g} deg C; limit "
+                f"{step.timeout_s:g} s; check chamber and door",
                 {"off_c": off_c, "took_s": took_s},
             )
     return {"setpoint_c": set_c, "chamber_c": context.monitor.chamber_c}
@@ -181,8 +183,9 @@ def measure_clock(context: ExecutionContext, step: MeasureClock) -> dict[str, fl
     found = table.measure_clock(step.rate_dps, step.short_s, lambda wait_s: _watched_wait(context, wait_s))
     beyond = abs(found.deviation_ppm) > found.limit_ppm
     text = (
-        f"{table.name}: the step rate is {found.deviation_ppm:+.0f} ppm off step_clock_hz = {found.nominal_hz:g}, "
-        f"u {found.u_ppm:.0f} ppm, limit {found.limit_ppm:.0f} ppm; rates are by the measured clock"
+        f"{table.name}: the step rate is {found.deviation_ppm:+.0f} ppm off step_clock_hz = "
+        f"{found.nominal_hz:g} Hz, u = {found.u_ppm:.0f} ppm, limit {found.limit_ppm:.0f} ppm; rates are "
+        "computed from the measured clock"
     )
     if beyond:
         text += f": set step_clock_hz = {found.nominal_hz * found.ratio:.0f} in the bench file"

@@ -92,5 +92,8 @@ def suspend(context: ExecutionContext, violation: GuardTripped) -> None:
         if any(each.action == "suspend" for each in violations):
             clear_since_s = clock.now_s()
         if clock.now_s() - began_s >= rules.suspend_timeout_s:
-            raise StepFailed(f"suspended for {rules.suspend_timeout_s:g} s without relief: {violation}")
+            raise StepFailed(
+                f"suspended for {rules.suspend_timeout_s:g} s, the limit of the recipe, because: "
+                f"{violation}; remove the cause, then resume the campaign"
+            )
     recorder.change_state(CampaignState.RUNNING, "the limits hold again")

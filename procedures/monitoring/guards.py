@@ -139,7 +139,7 @@ def _unit_off_air(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
     for name, temperature_c in now.gyro_c.items():
         off_c = abs(temperature_c - now.chamber_c)
         if now.taking_readings and off_c > limit_c:
-            text = f"its own thermometer is off the air's {now.chamber_c:.1f} deg C by"
+            text = f"its own thermometer differs from the air, {now.chamber_c:.1f} deg C, by"
             yield Excess(name, off_c, limit_c, "deg C", text)
 
 

@@ -216,4 +216,4 @@ class BenchMonitor:
 
     def _note_silence(self, device: str, error: InstrumentError) -> None:
         self._gyro_c.pop(device, None)
-        self.links.change(device, "degraded", f"{error}; asked again at the next check")
+        self.links.change(device, "degraded", f"{error}; labctl asks again at the next check")

@@ -49,7 +49,7 @@ class Progress:
     prompt: Prompt | None = None  #: the question that waits for a person
     turn: TurnProgress | None = None  #: the turn by hand that is under way
     links: Mapping[str, str] = field(default_factory=dict)  #: devices that are not well: degraded or lost
-    dropped: Mapping[str, str] = field(default_factory=dict)  #: units that take no further part, and why
+    dropped: Mapping[str, str] = field(default_factory=dict)  #: units that are excluded, and why
     last_error: str = ""
     live: LiveOutput = field(default_factory=LiveOutput, compare=False, repr=False)  #: newer than the other fields
 

@@ -54,8 +54,8 @@ class EncoderLog:
             return None
         if len(self.readings) < LEAST:
             raise StepFailed(
-                f"{self._table.name}: its encoder was read {len(self.readings)} times during a data set, and a rate "
-                f"needs {LEAST}; take longer data sets, or check the link"
+                f"{self._table.name}: its encoder was read {len(self.readings)} times during a data set, but a "
+                f"mean rate needs {LEAST} angles; take longer data sets, or check the link"
             )
         t_s = np.array([one.t_s for one in self.readings])
         angle_deg = np.array([one.angle_deg for one in self.readings])
@@ -101,13 +101,16 @@ def rate_event(table: RateTable, found: TableAngles) -> Event | None:
     if abs(off_ppm) <= limit_ppm:
         return None
     used = (
-        "the encoder is the reference, so this is in no calibration"
+        "the encoder is the reference, so this difference does not affect a calibration"
         if found.is_reference
-        else 'the demanded rate is the reference, so the scale factor contains it: set reference = "measured"'
+        else (
+            "the demanded rate is the reference, so this difference becomes part of the scale factor: set "
+            'reference = "measured" in the bench file'
+        )
     )
     text = (
         f"{table.name}: table_rate_ratio {off_ppm:+.0f} ppm (u {u_ppm:.0f} ppm, limit {limit_ppm:.0f} ppm): its "
-        f"encoder says {found.rate_dps:.5f} deg/s where {found.computed_dps:g} deg/s was demanded; {used}"
+        f"encoder measures {found.rate_dps:.5f} deg/s, but {found.computed_dps:g} deg/s was demanded; {used}"
     )
     return Event(
         "table_rate_ratio", text, level="warning", device=table.name, value=off_ppm, limit=limit_ppm, unit="ppm"

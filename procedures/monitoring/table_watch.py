@@ -46,7 +46,8 @@ class TableWatch:
         demand = f"run at {self._spin.rate_dps:g} deg/s" if self._spin.rate_dps else "rest"
         into_s = self._clock.now_s() - self._spin.steady_from_s
         raise TableStopped(
-            f"{self._table.name}: {'moves' if moving else 'stands still'} {into_s:.0f} s into a {demand}; check motor, "
+            f"{self._table.name}: {'moves' if moving else 'stands still'} {into_s:.0f} s after the beginning of "
+            f"a {demand}; check motor, "
             "load and step clock, and home the table"
         )
 

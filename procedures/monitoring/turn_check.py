@@ -105,7 +105,7 @@ def _lost(rules: TurnRules, unit: UnitTurn) -> str:
     courses = {"before the turn": unit.before, "of the turn": unit.turned, "after the turn": unit.after}
     for when, course in courses.items():
         if len(course) < 2:
-            return f"no readings {when} came; check cable and power"
+            return f"no readings {when} arrived; check cable and power"
         if course.lost > rules.max_lost:
             share, limit = 100 * course.lost, 100 * rules.max_lost
             return f"{share:.1f} % of the readings {when} were lost or bad, limit {limit:g} %"
@@ -117,7 +117,7 @@ def _at_limit(unit: UnitTurn) -> str:
         return ""
     return (
         f"the output reached {unit.turned.largest_dps:.0f} deg/s, but the unit measures only up to "
-        f"{unit.max_rate_dps:g}; turn the unit more slowly"
+        f"{unit.max_rate_dps:g} deg/s; turn the unit more slowly"
     )
 
 
@@ -173,17 +173,17 @@ def _other_axis(step: Turn, axis: str, angles: dict[str, float]) -> str:
     most = max(others, key=lambda name: others[name])
     if others[most] < OTHER_SHARE * abs(step.turn_deg) or others[most] <= abs(angles.get(axis, 0.0)):
         return ""
-    return f"{others[most]:.0f} deg came out about {most}, not about {axis}"
+    return f"the unit turned by {others[most]:.0f} deg about axis {most}, not about axis {axis}"
 
 
 def _angle(step: Turn, rules: TurnRules, came_deg: float, axis: str) -> str:
     asked = step.turn_deg
     if abs(came_deg) < NOTHING_SHARE * abs(asked):
-        return f"no turn about {axis} came out, only {abs(came_deg):.0f} deg of {abs(asked):g}"
+        return f"the unit turned by only {abs(came_deg):.0f} deg about axis {axis} instead of {abs(asked):g} deg"
     if came_deg * asked < 0:
         sense = "clockwise" if asked > 0 else "counter-clockwise"
-        return f"{abs(came_deg):.0f} deg came out in the other direction, {sense}"
+        return f"the unit turned by {abs(came_deg):.0f} deg in the wrong direction, {sense}"
     if abs(came_deg - asked) <= max(rules.tolerance * abs(asked), UNCERTAINTIES * step.turn_u_deg):
         return ""
     only = "only " if abs(came_deg) < abs(asked) else ""
-    return f"{only}{abs(came_deg):.0f} deg came out of {abs(asked):g} about {axis}"
+    return f"the unit turned by {only}{abs(came_deg):.0f} deg about axis {axis} instead of {abs(asked):g} deg"

@@ -69,7 +69,10 @@ class BenchLimits:
             return str(error)
         if abs(real_dps - rate_dps) <= max_error_fraction * abs(rate_dps):
             return None
-        return f"the nearest that the table runs is {real_dps:g} deg/s, more than {100 * max_error_fraction:g} % off"
+        return (
+            f"the nearest rate that the table can run is {real_dps:g} deg/s, more than "
+            f"{100 * max_error_fraction:g} % off"
+        )
 
     def temperature_complaint(self, temperature_c: float) -> str | None:
         """Return why the chamber or a unit cannot stand a temperature, or None."""
@@ -95,8 +98,8 @@ def missing_instruments(recipe: Recipe, limits: BenchLimits) -> tuple[str, ...]:
     """Return which instruments a recipe needs and the bench does not have, each in words."""
     if recipe.turns is not None:
         return ()
-    table = () if limits.table is not None else ("rates_dps: a rate table is needed, and the bench has none",)
-    chamber = () if limits.chamber is not None else ("temperatures_c: a chamber is needed, and the bench has none",)
+    table = () if limits.table is not None else ("rates_dps: a rate table is needed, but the bench has none",)
+    chamber = () if limits.chamber is not None else ("temperatures_c: a chamber is needed, but the bench has none",)
     return (*table, *chamber)
 
 
@@ -120,7 +123,7 @@ def fit_to_bench(recipe: Recipe, limits: BenchLimits, *, clip: bool) -> tuple[Re
         beyond += [f"{name} {value:g}: {text}" for value, text in complaints.items() if text]
         holder[key] = tuple(value for value in holder[key] if not complaints[value])
         if not holder[key]:
-            empty.append(f"{name}: nothing is left")
+            empty.append(f"{name}: no value is left within the limits")
     handling = recipe.mounting.handling_c
     if handling is not None and (text := limits.temperature_complaint(handling)):
         empty.append(f"mounting.handling_c {handling:g}: {text}")

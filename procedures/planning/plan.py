@@ -159,5 +159,5 @@ def _refuse_endless(recipe: Recipe) -> None:
     if recipe.turns is not None:
         asked = DATA_SETS_OF_TURN * len(recipe.positions) * len(recipe.turns.turns_deg) * recipe.turns.repeats
     if asked > MOST_DATASETS:
-        text = f"about {asked} data sets, where a campaign has at most {MOST_DATASETS}"
+        text = f"about {asked} data sets, but a campaign may have at most {MOST_DATASETS}"
         raise PlanRefused(recipe.name, [text], "Ask for fewer rates, temperatures or repeats.")

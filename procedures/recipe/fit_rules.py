@@ -38,5 +38,8 @@ class FitRules(Table):
         if self.model is None and not self.effects:
             raise ValueError('name a model (model = "bias_scale") or effects (effects = ["bias"])')
         if self.limits.drift_dps is not None and not self.against:
-            raise ValueError("limits.drift_dps needs the version in force: leave out against = false, or the limit")
+            raise ValueError(
+                "limits.drift_dps compares with the version in force, but against = false excludes "
+                "that comparison; leave out one of the two"
+            )
         return self

@@ -92,7 +92,8 @@ class Recipe(Table):
         if info.data.get("turns") is not None:
             if value != (() if listed else cls.model_fields[info.field_name or ""].default):
                 raise ValueError(
-                    "this key is for a table and a chamber, and a recipe with [turns] drives neither: remove the key"
+                    "this key is for a table or a chamber, but a recipe with [turns] (turns by hand) drives "
+                    "neither; remove the key"
                 )
         elif listed and "turns" in info.data and not value:
             raise PydanticCustomError("too_short", "Tuple should have at least 1 item after validation, not 0")
@@ -117,7 +118,9 @@ def read_recipe(source: str | Path) -> Recipe:
         raise RecipeError(f"recipe {path}: not TOML: {error}; correct it") from error
     except FileNotFoundError:
         known = ", ".join(shipped_recipes())
-        raise RecipeError(f"no recipe {str(source)!r}: give a file, or one of {known}") from None
+        raise RecipeError(
+            f"there is no recipe {str(source)!r}; give a recipe file, or one of the names {known}"
+        ) from None
     except (OSError, UnicodeDecodeError) as error:
         raise RecipeError(f"recipe {path}: cannot be read: {error}; check path and permissions") from error
     return parse_recipe(text, where=str(path))

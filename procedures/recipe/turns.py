@@ -20,13 +20,16 @@ def _text(text: str) -> str:
     unknown = sorted(set(template.get_identifiers()) - WORDS)
     if unknown or not template.is_valid():
         named = f"${unknown[0]} is unknown" if unknown else "a $ stands alone"
-        raise ValueError(f"{named}; known are {', '.join(f'${word}' for word in sorted(WORDS))}, and $$ for a dollar")
+        raise ValueError(
+            f"{named}; the known placeholders are "
+            f"{', '.join(f'${word}' for word in sorted(WORDS))}, and $$ for a dollar sign"
+        )
     return text
 
 
 def _angle(turn_deg: float) -> float:
     if not 0 < abs(turn_deg) <= MOST_DEG:
-        raise ValueError(f"a turn has more than 0 and at most {MOST_DEG:g} deg, either way")
+        raise ValueError(f"the size of a turn must be above 0 deg and at most {MOST_DEG:g} deg, in either direction")
     return turn_deg
 
 

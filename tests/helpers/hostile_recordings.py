@@ -138,7 +138,7 @@ HOSTILE: dict[str, tuple[Callable[[Path], None], str]] = {
     ),
     "tables in the head": (
         head("notes = " + "{a=" * DEEP + "1" + "}" * DEEP),
-        r"line 6: brackets stand more than 32 deep",
+        r"line 6: brackets are nested more than 32 levels deep",
     ),
     "dots in the head": (head("[" + "a." * DEEP + "a]"), r"recording.toml: not TOML: line 6: a key has parts .* deep"),
     "digits in the head": (head("power_on_s = " + "1" * 5000), r"recording.toml: not TOML: .*4300 digits"),

@@ -31,7 +31,7 @@ def test_two_units_may_share_a_bench() -> None:
 @pytest.mark.parametrize("what", ["name", "serial", "port"])
 def test_two_units_are_never_taken_for_one(what: str) -> None:
     same = two_units()["gyros"][0][what]
-    with pytest.raises(ValidationError, match=f"two gyros have the {what} '{same}'; each needs its own"):
+    with pytest.raises(ValidationError, match=f"two gyros have the {what} '{same}'; give each gyro a different one"):
         BenchFile.model_validate(two_units(**{what: same}))
 
 
@@ -53,7 +53,7 @@ def test_an_unknown_driver_is_refused_with_its_place_what_is_installed_and_what_
         (error,) = caught.value.errors()
         assert (error["loc"], error["input"]) == (place, "watlow-f5")
         here = known.format(version=DRIVERS.plugin("stim300").version)
-        assert error["msg"].startswith(f"no driver 'watlow-f5' is installed (there are {here} (labctl ")
+        assert error["msg"].startswith(f"no driver 'watlow-f5' is installed (installed: {here} (labctl ")
         assert "install the package that has it in its group labctl.drivers, or correct the name" in error["msg"]
         assert ("did you mean 'watlow-f4t'" in error["msg"] or "did you mean 'watlow-f4'" in error["msg"]) is (
             device == "chamber"
@@ -124,7 +124,7 @@ def test_settings_are_those_of_the_drivers_own_model(monkeypatch: pytest.MonkeyP
         (
             {"channel": 1, "chanel": 2},
             ("chamber", "chanel"),
-            f"driver acme-heater has no such setting (there are {KNOWN}, channel)",
+            f"driver acme-heater has no such setting; choose one of {KNOWN}, channel",
         ),
     ],
 )
@@ -150,10 +150,10 @@ def test_a_simulated_gyro_whose_driver_has_no_profile_is_told_to_name_one(monkey
     record = read_bench("single-axis-sim").model_dump()
     (gyro,) = record["gyros"]
     gyro |= {"driver": "kvh-new", "sample_rate_hz": None}
-    with pytest.raises(ValueError, match="gyro driver 'kvh-new': no profile of a simulated unit is known"):
+    with pytest.raises(ValueError, match="gyro driver 'kvh-new' has no profile of a simulated unit"):
         open_bench(BenchFile.model_validate(record), VirtualClock())
     record["simulation"]["units"] = {"fog": {"profile": "rd2100"}}
-    with pytest.raises(ValueError, match="gyro driver 'kvh-new': no usual rate is known"):
+    with pytest.raises(ValueError, match="gyro driver 'kvh-new' has no default number of readings per second"):
         open_bench(BenchFile.model_validate(record), VirtualClock())
     gyro["sample_rate_hz"] = 10.0
     opened = open_bench(BenchFile.model_validate(record), VirtualClock())

@@ -110,7 +110,7 @@ def test_an_unknown_name_is_told_what_is_installed_and_what_to_do(site: Path) ->
     with pytest.raises(UnknownPlugin) as caught:
         widgets().get("widget-on")
     assert str(caught.value) == (
-        "no widget 'widget-on' is installed (there are widget-one (acme-one 0.3)); did you mean 'widget-one'? If not, "
+        "no widget 'widget-on' is installed (installed: widget-one (acme-one 0.3)); did you mean 'widget-one'? If not, "
         "install the package that has it in its group labctl.widgets, or correct the name; labctl's own are not "
         "registered either: install labctl again (`make install`)"
     )

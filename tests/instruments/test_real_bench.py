@@ -87,6 +87,6 @@ def test_a_simulated_address_that_no_simulator_knows_is_named() -> None:
     record["table"]["port"] = "sim://turntable"
     bench = open_bench(BenchFile.model_validate(record), VirtualClock())
     with pytest.raises(
-        LinkError, match=r"no simulated instrument 'turntable' is installed \(there are acutrol-3000 \(labctl "
+        LinkError, match=r"no simulated instrument 'turntable' is installed \(installed: acutrol-3000 \(labctl "
     ):
         bench.table.identify()

@@ -30,10 +30,10 @@ def test_standard_uncertainty_by_how_it_is_stated(given: dict[str, Any], u: floa
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({}, "none of u, expanded and half_width is given; give exactly one, in ppm"),
-        ({"u": 1.0, "expanded": 2.0}, "u and expanded of u, expanded and half_width is given"),
-        ({"half_width": 1.0}, "half_width = 1 has no meaning for a normal distribution; set distribution to one of"),
-        ({"u": 1.0, "unit": "deg C"}, "unit 'deg C'; give it in ppm"),
+        ({}, "none of the keys u, expanded and half_width are given; give exactly one, in ppm"),
+        ({"u": 1.0, "expanded": 2.0}, "u and expanded of the keys u, expanded and half_width are given"),
+        ({"half_width": 1.0}, "half_width = 1 is not defined for a normal distribution; set distribution to one of"),
+        ({"u": 1.0, "unit": "deg C"}, "unit 'deg C' is not accepted; give the uncertainty in ppm"),
         ({"u": 1.0, "calibrated": "2026-02-01", "due": "2026-01-01"}, "due 2026-01-01 is before calibrated 2026-02-01"),
         ({"u": -1.0}, "greater than or equal to 0"),
         ({"u": float("inf")}, "finite"),

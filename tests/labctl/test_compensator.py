@@ -86,7 +86,7 @@ def test_the_file_survives_the_way_to_disk(any_calibration: Calibration, tmp_pat
     [
         (lambda text: text.replace('"version":1', '"version":7'), "was edited or damaged"),
         (lambda text: text[: len(text) // 2], "truncated"),
-        (lambda text: text.replace("labctl-calibration/1", "labctl-calibration/9"), "this labctl reads"),
+        (lambda text: text.replace("labctl-calibration/1", "labctl-calibration/9"), "this version of labctl reads"),
         (lambda _: "[]", "schema None"),
     ],
 )

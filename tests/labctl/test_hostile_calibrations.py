@@ -71,7 +71,7 @@ def nested_tables(text: str) -> str:
         (lambda text: text + " " * (65 << 20), "larger than the limit of 67108864 bytes"),
         (
             lambda text: text.replace('"labctl-calibration/1"', json.dumps("x" * 10_000)),
-            "schema 'x{79}, this labctl reads",
+            "schema 'x{79}, but this version of labctl reads",
         ),
     ],
 )

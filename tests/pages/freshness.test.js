@@ -35,7 +35,10 @@ test("it is stale once the service was not heard for long enough", () => {
   assert.equal(words({ service_s: STALE_MS / 1000 }).found, "no");
   const { found, stale, text } = words({ service_s: STALE_MS / 1000 + 0.1 });
   assert.deepEqual([found, stale], ["yes", true]);
-  assert.equal(text, "Last answer of the service 4 s ago. What is shown may be out of date; it dates from 12:00:00.");
+  assert.equal(
+    text,
+    "Last answer of the service 4 s ago. The values on this page may be out of date; they date from 12:00:00.",
+  );
 });
 
 test("a page that has just been opened asks first", () => {
@@ -44,7 +47,7 @@ test("a page that has just been opened asks first", () => {
   assert.deepEqual(words({ ...opened, open_s: 5 }), {
     found: "yes",
     stale: true,
-    text: "The service has not answered. What is shown may be out of date.",
+    text: "The service has not answered. The values on this page may be out of date.",
   });
 });
 

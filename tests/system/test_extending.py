@@ -85,7 +85,7 @@ def test_a_driver_with_its_simulator(outside: Callable[[str], Outside]) -> None:
     user = outside(GYRO)
     refused = user.labctl("labctl bench check acme-gyro/bench.toml", status=2)
     assert refused.stderr.count("\n") == 1
-    assert "gyros.0.driver: no driver 'acme-g1' is installed (there are gyrostar (labctl " in refused.stderr
+    assert "gyros.0.driver: no driver 'acme-g1' is installed (installed: gyrostar (labctl " in refused.stderr
     printed = user.follow()
     assert "[acme-g1 of acme-gyro 0.1.0]" in printed["labctl bench check acme-gyro/bench.toml"]
     tried = printed["labctl driver test acme-g1"].splitlines()
@@ -95,10 +95,10 @@ def test_a_driver_with_its_simulator(outside: Callable[[str], Outside]) -> None:
     bench.write_text(whole.replace('profile = "rd2100"', ""), encoding="utf-8")
     nameless = user.labctl("labctl bench check acme-gyro/bench.toml", status=2).stderr
     assert nameless.count("\n") == 1
-    assert "no profile of a simulated unit is known; set one in [simulation.units] of the bench file" in nameless
+    assert "has no profile of a simulated unit; set one in [simulation.units] of the bench file" in nameless
     bench.write_text(whole.replace('name = "g1"', 'name = "g1"\nmirored = true'), encoding="utf-8")
     misspelt = user.labctl("labctl bench check acme-gyro/bench.toml", status=2).stderr
-    assert "gyros.0.mirored: driver acme-g1 has no such setting (there are driver, port, " in misspelt
+    assert "gyros.0.mirored: driver acme-g1 has no such setting; choose one of driver, port, " in misspelt
     campaign = user.json("labctl campaign status")
     assert campaign["state"] == "done"
     assert campaign["drivers"]["g1"] == {"driver": "acme-g1", "distribution": "acme-gyro", "version": "0.1.0"}
@@ -134,7 +134,7 @@ def test_an_export(outside: Callable[[str], Outside]) -> None:
     refused = user.labctl("labctl calibration FOG-0001 --version 2 --format lookup-csv", status=2).stderr
     assert "format lookup-csv: the model needs supply_v too; use json" in refused
     unknown = user.labctl("labctl calibration FOG-0001 --version 1 --format lookup", status=2).stderr
-    assert "no export format 'lookup' is installed (there are ardupilot (labctl " in unknown
+    assert "no export format 'lookup' is installed (installed: ardupilot (labctl " in unknown
     assert "did you mean 'lookup-csv'?" in unknown
     (user.site / "acme_table" / "export.py").write_text(BROKEN_EXPORT, encoding="utf-8")
     failed = user.labctl("labctl calibration FOG-0001 --version 1 --format lookup-csv", status=2).stderr

@@ -120,4 +120,7 @@ def test_a_command_logs_only_when_it_is_asked_to(tmp_path: Path) -> None:
     assert json.loads(quiet.stdout)["state"] == json.loads(asked.stdout)["state"] == "done"
     reported = [json.loads(line) for line in asked.stderr.splitlines() if line.startswith("{")]
     assert [each["state"] for each in reported if each["event"] == "campaign.state"] == ["running", "done"]
-    assert wrong.stderr == "labctl: LABCTL_LOG_LEVEL=loud: name one of debug, info, warning, error, critical\n"
+    assert (
+        wrong.stderr
+        == "labctl: LABCTL_LOG_LEVEL=loud is not a log level; set it to one of debug, info, warning, error, critical\n"
+    )

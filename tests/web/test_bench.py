@@ -102,10 +102,10 @@ def test_says_that_it_is_stale_and_goes_on_where_it_was(
     expect(page.get_by_role("list")).to_contain_text("campaign running")
     page.context.set_offline(True)
     service.stop()
-    expect(page.get_by_text("Nothing new since")).to_be_visible()
+    expect(page.get_by_text("No update since")).to_be_visible()
     page.context.set_offline(False)
     service.start()
-    expect(page.get_by_text("Nothing new since")).not_to_be_visible()
+    expect(page.get_by_text("No update since")).not_to_be_visible()
     # resumed by the service itself, or ended by its stopping: either is shown
     expect(page.locator("main")).to_contain_text("campaign 1")
     faults.clear()

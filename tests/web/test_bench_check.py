@@ -49,7 +49,7 @@ def test_what_is_drawn_is_what_the_check_answered(service: Service, visit: Calla
 
     page = visit("/bench")
     card = page.get_by_role("region", name="Check of the bench")
-    expect(card).to_contain_text("Not checked since the service was started.")
+    expect(card).to_contain_text("The bench was not checked since the service was started.")
     card.get_by_role("button", name="Check the bench").click()
     expect(card).to_contain_text("5 instruments: 2 wrong, 0 doubtful.")
     answer = service.get("/api/benches")[0]["check"]

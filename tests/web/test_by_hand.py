@@ -57,19 +57,25 @@ def test_a_turn_is_shown_refused_wanted_again_and_done(service: Service, visit: 
         asked.get_by_role("button", name="It is done").click()
 
     turn, angle = page.get_by_role("region", name="The turn now"), page.get_by_role("status", name="Angle so far")
-    expect(question.get_by_role("heading")).to_have_text("Keep z up, and turn the unit by 360 deg about z")
+    expect(question.get_by_role("heading")).to_have_text(
+        "Keep axis z pointing up, and turn the unit by 360 deg about this axis"
+    )
     expect(question).not_to_contain_text("The table")
     expect(angle).to_have_text(re.compile(r"^30\d deg of 360 deg about z, counter-clockwise\.$"))
     expect(page.locator(".gauges")).not_to_contain_text("Chamber")
     question.get_by_role("button", name="Done", exact=True).click()  # the name is known: no dialog
 
-    expect(turn).to_contain_text(re.compile(r"Turn again: only 30\d deg came out of 360 about z\."))
+    expect(turn).to_contain_text(
+        re.compile(r"Turn again: the unit turned by only 30\d deg about axis z instead of 360 deg\.")
+    )
     expect(question).to_contain_text(
-        re.compile(r"Only 30\d deg came out of 360 about z: turn again; turn the units by 360")
+        re.compile(
+            r"The unit turned by only 30\d deg about axis z instead of 360 deg: turn again; turn the units by 360"
+        )
     )
     expect(angle).to_have_text(re.compile(r"^3[56]\d deg of 360 deg about z, counter-clockwise \(attempt 2\)\.$"))
     question.get_by_role("button", name="Turn again").click()
-    expect(turn).to_contain_text("Turn again: Ann wants it again.")
+    expect(turn).to_contain_text("Turn again: Ann requested the turn again.")
     expect(angle).to_have_text(re.compile(r"^3[56]\d deg of 360 deg about z, counter-clockwise \(attempt 3\)\.$"))
     question.get_by_role("button", name="Done", exact=True).click()
     expect(page.get_by_role("region", name="No campaign is running")).to_be_visible()

@@ -20,7 +20,7 @@ def test_a_campaign_is_planned_started_and_looked_back_at(service: Service, visi
 
     page = visit("/campaigns/new?recipe=short&hide=scale_factor_asymmetry")
     expect(page.get_by_role("region", name="Steps")).to_contain_text("15")
-    expect(page.get_by_role("region", name="What it can detect")).to_contain_text("It can detect")
+    expect(page.get_by_role("region", name="Effects that the plan can detect")).to_contain_text("This plan can detect")
     expect(page.get_by_role("spinbutton", name="Size")).not_to_have_value("")
     page.get_by_role("button", name="Start on").click()
     page.wait_for_url("**/bench")
@@ -33,7 +33,7 @@ def test_a_campaign_is_planned_started_and_looked_back_at(service: Service, visi
     expect(page.get_by_role("list")).to_contain_text(["campaign running"])
     page.get_by_role("button", name="errors", exact=True).click()
     assert "level=error" in page.url
-    expect(page.get_by_role("region", name="Events")).to_contain_text("Nothing of this kind")
+    expect(page.get_by_role("region", name="Events")).to_contain_text("No event of this kind")
 
 
 def test_what_the_bench_cannot_do_is_refused_or_left_out(visit: Callable[..., Page], faults: Faults) -> None:

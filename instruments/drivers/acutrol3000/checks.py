@@ -21,7 +21,7 @@ def numbers(device: str, text: str, least: int) -> list[float]:
     except ValueError:
         found = []
     if len(found) < least:
-        raise MalformedReply(device, f"answered {text!r} where {least} numbers were expected; check axis and cable")
+        raise MalformedReply(device, f"answered {text!r}, but {least} numbers were expected; check axis and cable")
     return found
 
 
@@ -32,7 +32,8 @@ def check_factory_limits(device: str, settings: Acutrol3000Settings, found: list
         if value > limit * (1 + 1e-9):
             raise WrongInstrument(
                 device,
-                f"{key} = {value:g} of the bench file is beyond the controller's absolute limit {limit:g}; lower it",
+                f"the bench file sets {key} = {value:g}, but the absolute limit of the controller is {limit:g}; "
+                "lower the value in the bench file",
             )
 
 
@@ -69,7 +70,8 @@ def close_interlock(device: str, settings: Acutrol3000Settings, link: AcutrolLin
         if not settings.reset_interlocks:
             raise RequestRejected(
                 device,
-                f"cannot move{cause}; find out why, then reset it at the controller, or set reset_interlocks = true",
+                f"cannot move{cause}; remove the cause, then reset the interlock at the controller, or set "
+                "reset_interlocks = true in the bench file",
             )
         link.ask(":Interlock:Reset")
     link.ask(acl.off(axis))  # no demand of before may move the table when it is servoed

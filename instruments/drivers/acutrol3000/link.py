@@ -127,7 +127,9 @@ class AcutrolLink:
         """Return the text of a reply; raises MalformedReply for characters that no reply has."""
         text = data.rstrip(b"\0\r\n").decode("latin-1").strip()
         if not text.isascii() or not all(each.isprintable() or each in "\r\n\t" for each in text):
-            raise MalformedReply(self._device, f"{self.url}: {text!r} is no reply; check the cable and baud rate")
+            raise MalformedReply(
+                self._device, f"{self.url}: {text!r} is not a valid reply; check the cable and baud rate"
+            )
         return text
 
     def _read(self, port: SerialPort, size: int, deadline_s: float) -> bytes:
@@ -138,8 +140,8 @@ class AcutrolLink:
             if left_s <= 0:
                 raise NoReply(
                     self._device,
-                    f"{self.url} gave no whole answer in {REPLY_S:.1f} s; check power, cable, address and that the "
-                    "controller's interface is active",
+                    f"{self.url} gave no complete answer within {REPLY_S:.1f} s; check power, cable and "
+                    "address, and that the interface of the controller is active",
                 )
             port.timeout = self._ports.port_timeout_s(self.url, left_s, device=self._device)
             found += bytes(port.read(size - len(found)))

@@ -53,7 +53,8 @@ class Acutrol3000:
         text = self._link.ask(acl.IDENTIFY)
         if not any(word in text.lower() for word in acl.IDENTITY):
             raise WrongInstrument(
-                self.name, f"{self._link.url} answered {text!r}, not an ACUTROL 3000; check the address"
+                self.name,
+                f"{self._link.url} answered {text!r}, which is not the answer of an ACUTROL 3000; check the address",
             )
         checks.check_factory_limits(self.name, self.settings, self._numbers(f":Limit:Absolute? {self._axis}", 2))
         return text
@@ -77,7 +78,9 @@ class Acutrol3000:
             angle_deg, rate_dps = self._numbers(f":Read:Position? {self._axis};Rate? {self._axis}", 2)
             if abs((angle_deg + 180) % 360 - 180) <= HOME_DEG and abs(rate_dps) <= self.settings.still_dps:
                 return
-            self._demand_time(deadline_s, f"is at {angle_deg:.4f} deg, not home (limit {HOME_DEG:g} deg)")
+            self._demand_time(
+                deadline_s, f"stands at {angle_deg:.4f} deg after homing instead of at 0 deg (limit {HOME_DEG:g} deg)"
+            )
             self._clock.sleep(POLL_S)
 
     def spin(self, rate_dps: float, steady_s: float) -> Spin:
@@ -110,7 +113,7 @@ class Acutrol3000:
         if not moved:
             raise RequestRejected(
                 self.name,
-                f"stopped during a run at {spin.rate_dps:g} deg/s{self._cause()}; check the load, then home it",
+                f"stopped during a run at {spin.rate_dps:g} deg/s{self._cause()}; check the load, then home the table",
             )
 
     def stop(self) -> None:
@@ -132,7 +135,8 @@ class Acutrol3000:
         if self._rate_dps and not moves and (cause := self._cause()):
             raise RequestRejected(
                 self.name,
-                f"stopped during a run at {self._rate_dps:g} deg/s{cause}; check load and interlocks, then home it",
+                f"stopped during a run at {self._rate_dps:g} deg/s{cause}; check load and interlocks, then home "
+                "the table",
             )
         return moves
 
@@ -192,8 +196,8 @@ class Acutrol3000:
             if not math.isclose(found, wanted, rel_tol=1e-4):
                 raise RequestRejected(
                     self.name,
-                    f"limits {name.lower()} to {found:g} where {wanted:g} was set; correct max_rate_dps and "
-                    "acceleration_dps2 in the bench file by :Limit:Absolute?",
+                    f"limits the {name.lower()} to {found:g}, but labctl set {wanted:g}; query :Limit:Absolute? "
+                    "of the controller, then correct max_rate_dps and acceleration_dps2 in the bench file",
                 )
 
     def _await_rate(self, rate_dps: float, deadline_s: float) -> None:
@@ -212,7 +216,7 @@ class Acutrol3000:
         deadline_s = self._clock.now_s() + self._tolerated_s(self._ramp_s(self.settings.max_rate_dps))
         while self.is_moving():
             if self._clock.now_s() > deadline_s:
-                raise NoReply(self.name, "the table still turns after Off; use its stop switch")
+                raise NoReply(self.name, "the table still turns after the command Off; press its stop switch")
             self._clock.sleep(POLL_S)
 
     def _demand_time(self, deadline_s: float, what: str) -> None:

@@ -30,7 +30,7 @@ def analog_channels(settings: AnalogSettings, scaling: list[tuple[float, float]]
 
 
 def analog_identity(settings: AnalogSettings, model: str, reported: dict[str, str]) -> GyroIdentity:
-    """Return the identity of the unit, which says nothing of itself, and what its inputs say."""
+    """Return the identity of the unit, which reports no identification, and what its inputs say."""
     options = settings.options
     output: dict[str, dict[str, float | str]] = {
         axis: {"unit": "V", "offset": options.rest_v, "scale": options.v_per_dps} for axis in settings.axes

@@ -87,7 +87,8 @@ class LabJackGyro:
             self.stop()
             raise WrongInstrument(
                 self.name,
-                f"scans {found:g} times per second, bench file {self.scans_per_s:g}; set sample_rate_hz = {found:g}",
+                f"scans {found:g} times per second, but the bench file states {self.scans_per_s:g}; set "
+                f"sample_rate_hz = {found:g}",
             )
         self._discard()
         self._last_s = self._clock.now_s()
@@ -127,7 +128,9 @@ class LabJackGyro:
             product = round(self._registers.get(lj.PRODUCT_ID))
             if product not in (lj.T4, lj.T7):
                 raise WrongInstrument(
-                    self.name, f"{self.settings.host} is product {product}, no LabJack T4 or T7; check the host"
+                    self.name,
+                    f"{self.settings.host} reports product number {product}, which is not a LabJack "
+                    "T4 or T7; check the host",
                 )
             self._model = f"LabJack T{product}"
             self._said = {"inputs": f"{self._model} {self._registers.get_int(lj.SERIAL_NUMBER)}"}
@@ -146,8 +149,8 @@ class LabJackGyro:
         if found.kink > lj.LARGEST_KINK:
             raise WrongInstrument(
                 self.name,
-                f"its slopes below and above the centre differ by {1e6 * found.kink:.0f} ppm, limit "
-                f"{1e6 * lj.LARGEST_KINK:.0f} ppm; check its calibration",
+                f"the slopes of its input below and above mid-range differ by {1e6 * found.kink:.0f} ppm, limit "
+                f"{1e6 * lj.LARGEST_KINK:.0f} ppm; check the calibration of the device",
             )
         return found
 
@@ -198,8 +201,8 @@ class LabJackGyro:
     def _silent(self, silent_s: float) -> NoReply:
         return NoReply(
             self.name,
-            f"no scan from {self.settings.stream_url} for {silent_s:.1f} s; check network, power, and that no other "
-            "program has the stream",
+            f"no scan from {self.settings.stream_url} for {silent_s:.1f} s; check network, power, and that no "
+            "other program uses the stream",
         )
 
     def _decode(self, data: bytes) -> Readings:

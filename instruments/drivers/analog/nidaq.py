@@ -81,7 +81,9 @@ class NidaqGyro:
         if abs(found / wanted - 1.0) > RATE_TOLERANCE:
             self.stop()
             raise WrongInstrument(
-                self.name, f"scans {found:g} times per second, bench file {wanted:g}; set sample_rate_hz = {found:g}"
+                self.name,
+                f"scans {found:g} times per second, but the bench file states {wanted:g}; set "
+                f"sample_rate_hz = {found:g}",
             )
         self._taken = 0
         self._last_s = self._clock.now_s()

@@ -69,7 +69,9 @@ class Binder(SetpointChamber):
         return mode is not None and bool(mode & binder.AUTOMATIC)
 
     def _end_profile(self) -> None:
-        raise RequestRejected(self.name, "a program runs and cannot be ended from here; end it at the chamber's panel")
+        raise RequestRejected(
+            self.name, "a program is running, and labctl cannot end it; end it at the panel of the chamber"
+        )
 
     def _switch_on(self) -> None:
         if not self._runs():

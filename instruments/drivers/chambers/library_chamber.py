@@ -66,7 +66,11 @@ class LibraryChamber(SetpointChamber):
 
     def _end_profile(self) -> None:
         if not self._names.stop:
-            raise RequestRejected(self.name, "a program runs, and the bench file names no stop; end it at its panel")
+            raise RequestRejected(
+                self.name,
+                "a program is running, and the bench file names no method `stop` "
+                "to end it; end it at the panel of the chamber",
+            )
         self._instrument.call(self._names.stop)
 
     def _switch_on(self) -> None:

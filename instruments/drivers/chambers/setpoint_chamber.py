@@ -134,16 +134,19 @@ class SetpointChamber(ABC):
         if not low <= rounded <= high:
             raise LimitError(
                 self.name,
-                f"set point {temperature_c:g} deg C lies outside {limits.min_c:g} to {limits.max_c:g} deg C "
-                "(the narrower of controller and bench file); nothing was written: ask for a set point within these "
-                "limits",
+                f"set point {temperature_c:g} deg C lies outside the limits, {limits.min_c:g} to "
+                f"{limits.max_c:g} deg C (the narrower ones of controller and bench file); nothing was written: "
+                "ask for a set point within these limits",
             )
         return rounded
 
     def _hindrance(self) -> str:
         """Return why a set point would have no effect, and what to do; an empty text where it has one."""
         if self._profile_runs():
-            return "a profile runs or is held on the controller, a set point would have no effect; end it at its panel"
+            return (
+                "a profile is running or held on the controller, so a set point would have no effect; end "
+                "the profile at the panel of the controller"
+            )
         return ""
 
     def _refuse_without_effect(self) -> None:
@@ -157,10 +160,10 @@ class SetpointChamber(ABC):
         if abs(found - rounded_c) > self.limits.resolution_c / 2:
             raise RequestRejected(
                 self.name,
-                f"set point {rounded_c:g} deg C was written but {found:g} deg C read back; "
-                "set the controller to its run page",
+                f"set point {rounded_c:g} deg C was written, but the controller reports {found:g} deg C; set "
+                "the controller to its run page",
             )
         return found
 
     def _wrong(self, text: str) -> WrongInstrument:
-        return WrongInstrument(self.name, f"{text}; check address and driver in the bench file")
+        return WrongInstrument(self.name, text)

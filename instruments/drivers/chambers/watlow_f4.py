@@ -42,14 +42,23 @@ class WatlowF4(Watlow):
         """
         get = self._registers.get_int
         if (model := get(f4.MODEL)) != f4.MODEL_F4:
-            raise self._wrong(f"the model register holds {model}, an F4's holds {f4.MODEL_F4}")
+            raise self._wrong(
+                f"the model register reads {model} instead of {f4.MODEL_F4} (F4); check the "
+                "address, or the driver in the bench file"
+            )
         if (units := get(f4.UNITS)) != f4.UNITS_TEMPERATURE:
-            raise self._wrong(f"input 1 measures no temperature (its units are {units}, a temperature's are 0)")
+            raise self._wrong(
+                f"input 1 does not measure a temperature (its units register reads {units} "
+                "instead of 0); set the input to temperature at the front panel"
+            )
         if get(f4.SCALE) == f4.SCALE_FAHRENHEIT:
-            raise self._wrong("the controller works in Fahrenheit, set it to Celsius at its front panel")
+            raise self._wrong("the controller works in degrees Fahrenheit; set it to Celsius at its front panel")
         for number in self.settings.alarm_inputs:
             if get(f4.INPUT_FUNCTION.nth(number, f4.INPUT_SETUP_STRIDE)) == f4.FUNCTION_WAIT_FOR:
-                raise self._wrong(f"digital input {number} is a profile's wait-for input, not an alarm (alarm_inputs)")
+                raise self._wrong(
+                    f"the controller uses digital input {number} as the wait-for input of a "
+                    "profile, not as an alarm; remove the input from alarm_inputs"
+                )
         return "; ".join([f"Watlow F4, steps of {self._resolution_c():g} deg C", *self._registers.remarks])
 
     def _read_scale(self) -> float:
@@ -77,8 +86,8 @@ class WatlowF4(Watlow):
     def _hindrance(self) -> str:
         if self._is_manual(self._mode()):
             return (
-                "the controller is in manual mode, a set point would have no effect; set the controller to auto at "
-                "its panel"
+                "the controller is in manual mode, so a set point would have no effect; set the controller to "
+                "auto at its panel"
             )
         return super()._hindrance()
 
@@ -104,7 +113,8 @@ class WatlowF4(Watlow):
             self._registers.put(event, 1)
             if self._registers.get_int(event) != 1:
                 raise RequestRejected(
-                    self.name, f"{event} stays off, the chamber cannot be switched on; check enable_event"
+                    self.name,
+                    f"{event} stays off, so the chamber cannot be switched on; check enable_event in the bench file",
                 )
 
     def _write_setpoint(self, temperature_c: float) -> None:

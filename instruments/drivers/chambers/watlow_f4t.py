@@ -44,12 +44,18 @@ class WatlowF4T(Watlow):
         self._known_part = None
         part = self._part_number()
         if not part.startswith("F4T"):
-            raise self._wrong(f"part number {part!r} is not an F4T's")
+            raise self._wrong(
+                f"part number {part!r} is not that of an F4T; check the address, or the driver in the bench file"
+            )
         if (status := self._registers.get_int(f4t.STATUS)) != f4t.STATUS_OK:
-            raise self._wrong(f"the device status is {status} instead of {f4t.STATUS_OK} (ok)")
+            raise self._wrong(
+                f"the device status is {status} instead of {f4t.STATUS_OK} (ok); read the error "
+                "at the panel of the controller"
+            )
         if (units := self._registers.get_int(f4t.ETHERNET_UNITS)) != f4t.UNITS_CELSIUS:
             raise self._wrong(
-                f"units on Ethernet are {units} instead of {f4t.UNITS_CELSIUS} (Celsius), set them at its panel"
+                f"the units on Ethernet are {units} instead of {f4t.UNITS_CELSIUS} (Celsius); set them at the "
+                "panel of the controller"
             )
         self._controller_limits()
         return f"Watlow {part}"
@@ -72,8 +78,8 @@ class WatlowF4T(Watlow):
             other = "big" if self.settings.word_order == "little" else "little"
             raise MalformedReply(
                 self.name,
-                f"its set point limits read {low:g} to {high:g} deg C, and the lower one must be below the other; "
-                f"set word_order = '{other}' in the bench file, or correct the limits at its panel",
+                f"its limits of the set point read {low:g} to {high:g} deg C, but the lower limit must be below "
+                f"the upper one; set word_order = '{other}' in the bench file, or correct the limits at its panel",
             )
         return low, high
 

@@ -60,7 +60,10 @@ class WeissAscii2(TextChamber):
         return False  # the protocol does not tell; a set point that a program changes is seen when it is read back
 
     def _end_profile(self) -> None:
-        raise RequestRejected(self.name, "ASCII-2 cannot end a program; end it at the chamber's panel")
+        raise RequestRejected(
+            self.name,
+            "a program is running, and protocol ASCII-2 has no command to end it; end it at the panel of the chamber",
+        )
 
     def _switch_on(self) -> None:
         status = self._status()

@@ -31,8 +31,8 @@ class LibraryReference:
             if settings.serial and settings.serial not in said:
                 raise WrongInstrument(
                     self.name,
-                    f"says that it is {said!r}, and the bench file names serial number {settings.serial!r}; correct "
-                    "the address, or serial and certificate",
+                    f"identifies itself as {said!r}, but the bench file gives serial number "
+                    f"{settings.serial!r}; correct the address, or serial and certificate, in the bench file",
                 )
         self.read()
         certificate = f"; certificate {settings.certificate}" if settings.certificate else ""

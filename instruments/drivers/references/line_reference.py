@@ -57,8 +57,8 @@ class LineReference:
         if wanted and wanted not in parts:
             raise WrongInstrument(
                 self.name,
-                f"says that it is {reply!r}, and the bench file names serial number {wanted!r}; correct the port, or "
-                "serial and certificate",
+                f"identifies itself as {reply!r}, but the bench file gives serial number {wanted!r}; correct "
+                "the port, or serial and certificate, in the bench file",
             )
         return reply
 
@@ -76,7 +76,9 @@ class LineReference:
         unit = found.groupdict().get("unit")
         if unit is not None and unit != quantity.says_unit:
             raise MalformedReply(
-                self.name, f"answers in {unit!r} instead of {quantity.says_unit!r}; set its unit at its panel"
+                self.name,
+                f"answers in {unit!r} instead of {quantity.says_unit!r}; set the unit of measurement "
+                "at the panel of the instrument",
             )
         return round(float(found["value"]) / quantity.resolution)
 

@@ -72,6 +72,6 @@ def gain_index(range_v: float) -> int:
     ranges = (10.0, 1.0, 0.1, 0.01)
     if range_v not in ranges:
         raise ValueError(
-            f"range_v {range_v:g} V is none of a T7's (there are {', '.join(f'{each:g}' for each in ranges)})"
+            f"range_v {range_v:g} V is not a range of a T7; choose one of {', '.join(f'{each:g}' for each in ranges)}"
         )
     return ranges.index(range_v)

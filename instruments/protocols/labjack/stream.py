@@ -23,9 +23,9 @@ DUMMY = 0xFFFF
 RECOVERING, RECOVERED, OVERLAP, RECOVERED_UNKNOWN, BURST_ENDED = 2940, 2941, 2942, 2943, 2944
 #: Statuses after which no further scan comes, or an unknown number is missing -> what they mean, and what to do.
 FATAL = {
-    OVERLAP: "its inputs cannot be scanned so fast; lower sample_rate_hz or resolution_index",
+    OVERLAP: "the inputs cannot be scanned at this rate; lower sample_rate_hz or resolution_index",
     RECOVERED_UNKNOWN: "more than 65535 scans were skipped while its buffer was full; check network and processor",
-    BURST_ENDED: "it was set to a limited number of scans; another program has used it",
+    BURST_ENDED: "the device was set to a limited number of scans, so another program has used it",
 }
 
 

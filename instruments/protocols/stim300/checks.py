@@ -18,16 +18,18 @@ def differences(found: Configuration, settings: Stim300Settings) -> list[str]:
     """Return what a unit is set to that its bench file does not say, one phrase each."""
     options, said = settings.options, []
     if found.unit not in RATE_UNITS:
-        said.append(f"gyro output unit {UNIT_NAMES[found.unit]} in deg, needed ANGULAR RATE or AVERAGE ANGULAR RATE")
+        said.append(
+            f"the gyro output unit is {UNIT_NAMES[found.unit]} in deg instead of ANGULAR RATE or AVERAGE ANGULAR RATE"
+        )
     rate_hz = settings.sample_rate_hz or DEFAULT_RATE_HZ
     if found.sample_rate_hz not in {None, rate_hz}:  # by an external trigger it is what the stream shows
-        said.append(f"sample rate {found.sample_rate_hz} Hz, bench file {rate_hz:g} Hz")
+        said.append(f"the sample rate is {found.sample_rate_hz} Hz instead of {rate_hz:g} Hz")
     if options.datagram not in found.datagrams:
-        said.append(f"datagram 0x{found.datagrams[0]:02X}, bench file 0x{options.datagram:02X}")
+        said.append(f"the datagram is 0x{found.datagrams[0]:02X} instead of 0x{options.datagram:02X}")
     if found.crlf != options.crlf:
         said.append(f"CR LF {'on' if found.crlf else 'off'}, bench file {'on' if options.crlf else 'off'}")
     if missing := [axis for axis in settings.axes if axis not in found.axes]:
-        said.append(f"gyro axes {' '.join(found.axes) or 'none'}, bench file also {' '.join(missing)}")
+        said.append(f"the gyro axes are {' '.join(found.axes) or 'none'}, without {' '.join(missing)}")
     return said
 
 

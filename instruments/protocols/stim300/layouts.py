@@ -119,7 +119,7 @@ def content_of(identifier: int) -> Content:
         if identifier in row:
             index = row.index(identifier)
             return Content(bool(index & 1), bool(index & 2), bool(index & 4), row is not PLAIN)
-    raise ValueError(f"0x{identifier:02X} is no normal-mode datagram of a STIM300")
+    raise ValueError(f"0x{identifier:02X} is not the identifier of a normal-mode datagram of a STIM300")
 
 
 def _layout(identifier: int) -> Layout:

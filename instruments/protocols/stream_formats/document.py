@@ -32,7 +32,7 @@ def hex_bytes(text: str) -> bytes:
     try:
         return bytes.fromhex(text)
     except ValueError:
-        raise ValueError(f"{text!r} is no row of hexadecimal bytes; write it like 'FE 81 FF 55'") from None
+        raise ValueError(f"{text!r} is not a series of hexadecimal bytes; write it like 'FE 81 FF 55'") from None
 
 
 class StreamField(Strict):
@@ -51,11 +51,14 @@ class StreamField(Strict):
         if self.unit is None:
             return self
         if self.unit not in UNITS:
-            raise ValueError(f"field {self.name}: unit {self.unit!r} is not known (there are {_units()})")
+            raise ValueError(f"field {self.name}: unit {self.unit!r} is not known; choose one of {_units()}")
         wanted = unit_of_channel(self.name)
         if wanted is not None and UNITS[self.unit].unit != wanted:
             fitting = [unit for unit, each in UNITS.items() if each.unit == wanted]
-            raise ValueError(f"field {self.name}: unit {self.unit!r} does not fit (there are {', '.join(fitting)})")
+            raise ValueError(
+                f"field {self.name}: unit {self.unit!r} does not belong to this quantity; choose "
+                f"one of {', '.join(fitting)}"
+            )
         return self
 
 
@@ -156,18 +159,24 @@ class FrameLayout(Strict):
         if not self.sync.strip():
             raise ValueError("sync is empty; give the bytes with which every frame begins")
         if isinstance(self.length, int) and not len(hex_bytes(self.sync)) < self.length <= LONGEST_FRAME:
-            raise ValueError(f"length {self.length} must be above that of sync and at most {LONGEST_FRAME}")
+            raise ValueError(
+                f"length = {self.length} bytes; give more than the number of bytes of sync, and at "
+                f"most {LONGEST_FRAME} bytes"
+            )
         for each in self.fields:
             if each.item is not None and self.items is None:
-                raise ValueError(f"field {each.name}: leave `item` out, or add [frame.items]")
+                raise ValueError(
+                    f"field {each.name} has the key `item`, but the format has no section "
+                    "[frame.items]; leave the key out, or add the section"
+                )
             if (
                 isinstance(self.length, int)
                 and each.item is None
                 and each.at + each.size > (end := self.content_end(self.length))
             ):
                 raise ValueError(
-                    f"field {each.name} ends at byte {each.at + each.size}, and the data of a frame at byte {end}; "
-                    "correct at, type or length"
+                    f"field {each.name} ends at byte {each.at + each.size}, but the data of a frame end at byte "
+                    f"{end}; correct `at`, `type` or `length`"
                 )
         return self
 
@@ -207,16 +216,19 @@ class StreamFormat(Strict):
     @model_validator(mode="after")
     def _whole(self) -> StreamFormat:
         if (self.line is None) == (self.frame is None):
-            raise ValueError("give either [line] or [frame]")
+            raise ValueError("a stream format has one of the sections [line] and [frame]; give exactly one")
         names = [each.name for each in self.fields]
         if twice := next((name for name in names if names.count(name) > 1), None):
-            raise ValueError(f"two fields have the name {twice!r}; each needs its own")
+            raise ValueError(f"two fields have the name {twice!r}; rename one")
         if not self.axes or not set(self.axes) <= {"x", "y", "z"}:
-            raise ValueError(f"the rates are the fields gyro_x, gyro_y, gyro_z; there are {', '.join(names)}")
+            raise ValueError(
+                f"no field is named gyro_x, gyro_y or gyro_z (the fields are {', '.join(names)}); "
+                "give the rates of the gyro these names"
+            )
         if silent := [each.name for each in self.fields if each.name.startswith("gyro_") and each.unit is None]:
             raise ValueError(f"field {silent[0]} has no unit; add one like unit = 'rad/s'")
         if self.counter is not None and self.counter.field not in names:
-            raise ValueError(f"counter: no field is named {self.counter.field!r} (there are {', '.join(names)})")
+            raise ValueError(f"counter: no field is named {self.counter.field!r}; choose one of {', '.join(names)}")
         return self
 
 

@@ -48,23 +48,31 @@ class StreamSettings(GyroSettings):
     def _found(cls, given: Any) -> Any:
         if isinstance(given, str):
             if given.endswith(".toml"):
-                raise ValueError(f"no file {given!r} is beside the bench file; correct the name, or put it there")
+                raise ValueError(
+                    f"the folder of the bench file has no file {given!r}; correct the name, or put the file there"
+                )
             near = difflib.get_close_matches(given, shipped_formats(), n=1)
             hint = f"did you mean {near[0]!r}? If not, " if near else ""
             raise ValueError(
-                f"no stream format {given!r} ships with labctl (there are {', '.join(shipped_formats())}); {hint}give "
-                "a file beside the bench file, whose name ends in .toml"
+                f"no stream format {given!r} comes with labctl (those that do: {', '.join(shipped_formats())}); "
+                f"{hint}name one of these, or a .toml file in the folder of the bench file"
             )
         return given
 
     @model_validator(mode="after")
     def _usable(self) -> StreamSettings:
         if not set(self.axes) <= set(self.format.axes):
-            raise ValueError(f"axes {list(self.axes)}: the format has {list(self.format.axes)}; correct axes or format")
+            raise ValueError(
+                f"axes = {list(self.axes)}, but the stream format has the axes "
+                f"{list(self.format.axes)}; correct axes or format"
+            )
         if self.port is None:
             raise ValueError("port is missing; add the serial port, best by its path in /dev/serial/by-id")
         if self.sample_rate_hz is None:
-            raise ValueError("neither the format nor the bench file gives a rate; add sample_rate_hz")
+            raise ValueError(
+                "neither the stream format nor the bench file states the number of readings per "
+                "second; add sample_rate_hz"
+            )
         return self
 
 

@@ -35,9 +35,9 @@ class Quantity(Strict):
         try:
             groups = re.compile(pattern).groupindex
         except re.error as error:
-            raise ValueError(f"pattern {pattern!r} is no regular expression: {error}") from error
+            raise ValueError(f"pattern {pattern!r} is not a regular expression ({error}); correct it") from error
         if "value" not in groups:
-            raise ValueError(f"pattern {pattern!r} has no group (?P<value>...) for the number")
+            raise ValueError(f"pattern {pattern!r} has no group (?P<value>...) for the number; add one")
         return pattern
 
 
@@ -99,15 +99,20 @@ class LineReferenceSettings(ReferenceSettings):
     @classmethod
     def _is_known(cls, model: str) -> str:
         if model and model not in MODELS:
-            raise ValueError(f"model {model!r} is not known (there are {', '.join(MODELS)}); give quantities instead")
+            raise ValueError(
+                f"model {model!r} is not known; choose one of {', '.join(MODELS)}, or give quantities instead"
+            )
         return model
 
     @model_validator(mode="after")
     def _is_complete(self) -> LineReferenceSettings:
         if (self.port is None) == (self.host is None):
-            raise ValueError("give either port (a serial port) or host and tcp_port, one of the two")
+            raise ValueError("give either port (a serial port), or host with tcp_port (a network address)")
         if not self.model and not self.quantities:
-            raise ValueError(f"give model ({', '.join(MODELS)}), or quantities of another instrument")
+            raise ValueError(
+                f"model and quantities are missing; give model ({', '.join(MODELS)}), or for "
+                "another instrument its quantities"
+            )
         return self
 
     @property

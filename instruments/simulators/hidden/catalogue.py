@@ -75,9 +75,11 @@ def _checked(found: Any) -> tuple[type[HiddenEffect], ...]:
     kinds = (found,) if isinstance(found, type) else tuple(found)
     for kind in kinds:
         if not (isinstance(kind, type) and issubclass(kind, HiddenEffect)):
-            raise TypeError(f"{kind!r} is no subclass of instruments.simulators.hidden.HiddenEffect")
+            raise TypeError(
+                f"{kind!r} is not a subclass of instruments.simulators.hidden.HiddenEffect; derive it from that class"
+            )
         if missing := [name for name in ("id", "unit", "default") if not hasattr(kind, name)]:
-            raise TypeError(f"{kind.__name__} has no {', '.join(missing)}")
+            raise TypeError(f"{kind.__name__} does not define {', '.join(missing)}; add it")
     return kinds
 
 
@@ -112,6 +114,6 @@ def hidden_effects(sizes: dict[str, float | str], seed: list[int]) -> list[Hidde
     made = []
     for effect_id, size in sizes.items():
         if effect_id not in EFFECTS:
-            raise ValueError(f"effect {effect_id!r} cannot be hidden (there are {', '.join(sorted(EFFECTS))})")
+            raise ValueError(f"effect {effect_id!r} cannot be hidden; choose one of {', '.join(sorted(EFFECTS))}")
         made.append(EFFECTS[effect_id](float(size), seed))
     return made

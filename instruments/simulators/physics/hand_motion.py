@@ -55,13 +55,13 @@ class HandMotion:
         known = {"u_deg": 0.5, "rate_dps": 90.0, "reaction_s": 2.0}
         mistakes = settings.get("mistakes", ())
         if wrong := sorted(set(settings) - {*known, "mistakes"}):
-            raise ValueError(f"[simulation] hand.{wrong[0]} is not known; there are {', '.join(known)}, mistakes")
+            raise ValueError(f"[simulation] hand.{wrong[0]} is not known; choose one of {', '.join(known)}, mistakes")
         if not isinstance(mistakes, list | tuple) or not set(mistakes) <= set(MISTAKES):
             raise ValueError(f"[simulation] hand.mistakes = {mistakes!r}: give a list of {', '.join(MISTAKES)}")
         for name, usual in known.items():
             value = settings.get(name, usual)
             if not isinstance(value, int | float) or not (value > 0 or (name == "u_deg" and value == 0)):
-                raise ValueError(f"[simulation] hand.{name} = {value!r} is no positive number; correct it")
+                raise ValueError(f"[simulation] hand.{name} = {value!r}; give a number above 0")
             known[name] = float(value)
         self._u_deg, self._rate_dps, self._reaction_s = known["u_deg"], known["rate_dps"], known["reaction_s"]
         self._mistakes = [str(each) for each in cast("Sequence[object]", mistakes)]  #: made first, one in each turn

@@ -189,7 +189,9 @@ USUAL_RATE_HZ = {"stim300": 125.0, "kvh-dsp3000": 100.0, "kvh-rd2100": 10.0, "gy
 def usual_rate_hz(driver: str) -> float:
     """Return the sampling rate of a unit without one in the bench file, Hz; raises ValueError where none is known."""
     if driver not in USUAL_RATE_HZ:
-        raise ValueError(f"gyro driver {driver!r}: no usual rate is known; set sample_rate_hz in the bench file")
+        raise ValueError(
+            f"gyro driver {driver!r} has no default number of readings per second; set sample_rate_hz in the bench file"
+        )
     return USUAL_RATE_HZ[driver]
 
 
@@ -200,16 +202,16 @@ def make_unit(driver: str, axes: tuple[str, ...], settings: Mapping[str, object]
     profile = given.pop("profile", DEFAULT_PROFILES.get(driver))
     if profile is None:
         raise ValueError(
-            f"gyro driver {driver!r}: no profile of a simulated unit is known; set one in [simulation.units] of the "
-            f"bench file (there are {', '.join(PROFILES)})"
+            f"gyro driver {driver!r} has no profile of a simulated unit; set one in [simulation.units] of the "
+            f"bench file: {', '.join(PROFILES)}"
         )
     if not isinstance(profile, str) or profile not in PROFILES:
-        raise ValueError(f"simulated unit profile {profile!r} is not known (there are {', '.join(PROFILES)})")
+        raise ValueError(f"simulated unit profile {profile!r} is not known; choose one of {', '.join(PROFILES)}")
     made = PROFILES[profile](axes, np.random.default_rng(seed))
     known = {
         name for name in UnitTruth.__dataclass_fields__ if name not in {"axes", "gain", "offset", "bend", "warm_up"}
     }
     for name in given:
         if name not in known:
-            raise ValueError(f"simulated unit has no setting {name!r} (there are {', '.join(sorted(known))})")
+            raise ValueError(f"simulated unit has no setting {name!r}; choose one of {', '.join(sorted(known))}")
     return UnitTruth(**{**made.__dict__, **given})

@@ -77,8 +77,9 @@ class RtuLine:
             if now_s - begun_s >= LONGEST_DRAIN_S:
                 raise NeverSilent(
                     self._device,
-                    f"the line was never silent for {SILENCE_FACTOR * self._latency_s:.2g} s in {LONGEST_DRAIN_S:g} s "
-                    "without a request; find the second master, or the device that sends by itself, on this line",
+                    f"labctl sent no request for {LONGEST_DRAIN_S:g} s, but the line was never silent for "
+                    f"{SILENCE_FACTOR * self._latency_s:.2g} s; find a second Modbus master, or a device that "
+                    "sends by itself, on this line",
                 )
             self._clock.sleep(min(POLL_S, silent_until_s - now_s))
         self._doubtful_since_s = None
@@ -99,7 +100,7 @@ class RtuLine:
                 return b""  # the beginning of an echo: more is to come
         kept = data.lstrip(STRAY_BYTES)
         if kept and len(kept) < len(data):
-            self._remark("stray bytes come before replies; check termination and bias of the RS-485 line")
+            self._remark("stray bytes arrive before replies; check termination and bias of the RS-485 line")
         return kept
 
     def _note_latency(self, since_s: float) -> None:

@@ -42,10 +42,12 @@ def audit(
     service: ServiceDep,
     since: Annotated[
         datetime | None,
-        Query(description="Only rows from this instant on, ISO 8601; an instant without a time zone is UTC."),
+        Query(description="Only rows written at or after this time (ISO 8601; UTC if no time zone is given)."),
     ] = None,
-    after: Annotated[int, Query(ge=0, le=2**63 - 1, description="Only rows whose number is larger than this.")] = 0,
-    limit: Annotated[int, Query(ge=1, le=10_000, description="At most this many rows.")] = 1000,
+    after: Annotated[
+        int, Query(ge=0, le=2**63 - 1, description="Only rows with a number larger than this number.")
+    ] = 0,
+    limit: Annotated[int, Query(ge=1, le=10_000, description="Largest number of rows in the response.")] = 1000,
 ) -> list[AuditResponse]:
     """Who did what, when and why, in order; each row's hash covers it and the row before."""
     return list_audit(service.store, since, after, limit)

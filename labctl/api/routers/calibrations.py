@@ -46,7 +46,9 @@ from labctl.services.schemas.uncertainty import SurfaceResponse, UncertaintyResp
 
 router = APIRouter(prefix="/api/units/{serial}", tags=["calibrations"])
 OtherUnit = Annotated[bool, Query(description="Accept a recording of another unit than the one in the address.")]
-RecordingNumber = Annotated[int | None, Query(description="Recording; default: the unit's newest.")]
+RecordingNumber = Annotated[
+    int | None, Query(description="Number of the recording; default: the unit's newest recording.")
+]
 RecordingNumbers = Annotated[
     list[int] | None, Query(description="Several recordings of the unit, used together; instead of `recording`.")
 ]
@@ -58,12 +60,13 @@ Formulas = Annotated[
 
 
 @router.head("/calibration", include_in_schema=False)
-@router.get("/calibration", summary="The calibration to use", response_class=Response)
+@router.get("/calibration", summary="The calibration in force", response_class=Response)
 async def calibration(
     serial: str,
     service: ServiceDep,
     version: Annotated[
-        int | None, Query(description="Version; default: the certified version (404 if there is none).")
+        int | None,
+        Query(description="Number of the version; default: the certified version (status 404 if there is none)."),
     ] = None,
     format: Annotated[  # noqa: A002  the contract's name
         str, Query(description="Format of the file, such as json or c; `GET /api/units/{serial}` lists the formats.")

@@ -39,9 +39,11 @@ def certificate(
     serial: str,
     version: int,
     service: ServiceDep,
-    format: Annotated[str, Query(description="pdf (PDF/A-3), xml (DCC 3.3.0) or json.")] = "pdf",  # noqa: A002
+    format: Annotated[  # noqa: A002
+        str, Query(description="Format of the certificate: pdf (PDF/A-3), xml (DCC 3.3.0) or json.")
+    ] = "pdf",
     number: Annotated[
-        str | None, Query(description="Number of a certificate of the version; default: the one that is valid.")
+        str | None, Query(description="Number of a certificate of the version; default: the valid certificate.")
     ] = None,
     if_none_match: Annotated[str | None, Header()] = None,
 ) -> Response:

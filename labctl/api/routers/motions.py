@@ -14,7 +14,11 @@ from labctl.services.schemas.comparison import MotionResponse
 router = APIRouter(prefix="/api")
 
 
-@router.get("/recordings/{recording}/motion", summary="A recording by what moved the unit", tags=["recordings"])
+@router.get(
+    "/recordings/{recording}/motion",
+    summary="A recording in the form that suits its kind of motion",
+    tags=["recordings"],
+)
 async def recording_motion(request: Request, recording: int, service: ServiceDep) -> MotionResponse:
     """Bias by temperature at rest, the integral of each turn, the course of a profile, or gravity about each move."""
     return await while_connected(request, service, recording_by_motion, recording)
@@ -22,7 +26,7 @@ async def recording_motion(request: Request, recording: int, service: ServiceDep
 
 @router.get(
     "/units/{serial}/calibrations/{version}/motion",
-    summary="A version without refitting, on a recording by what moved the unit",
+    summary="A version applied to a recording, in the form that suits its kind of motion",
     tags=["calibrations"],
 )
 async def version_motion(
@@ -30,7 +34,9 @@ async def version_motion(
     serial: str,
     version: int,
     service: ServiceDep,
-    recording: Annotated[int | None, Query(description="Recording; default: the unit's newest.")] = None,
+    recording: Annotated[
+        int | None, Query(description="Number of the recording; default: the unit's newest recording.")
+    ] = None,
     other_unit: Annotated[
         bool, Query(description="Accept a recording of another unit than the one in the address.")
     ] = False,

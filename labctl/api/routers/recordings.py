@@ -52,7 +52,9 @@ ImporterField = Annotated[
         max_length=100, description="Importer that reads the file; empty: the importer that recognises the file best."
     ),
 ]
-OptionField = Annotated[list[str] | None, Form(max_length=20, description="Options of the importer, as KEY=VALUE.")]
+OptionField = Annotated[
+    list[str] | None, Form(max_length=20, description="Option of the importer, as KEY=VALUE; may be repeated.")
+]
 ModifiedField = Annotated[
     float | None, Form(ge=0, le=4e12, description="When the file was last written, ms since 1970-01-01 UTC.")
 ]
@@ -107,7 +109,7 @@ async def preview(
     modified_ms: ModifiedField = None,
 ) -> LogPreview:
     """The proposed map of a log, or what it becomes by the map that is sent; its first rows, traces, and everything
-    that is wrong. Nothing of it is kept."""
+    that is wrong. Nothing is stored."""
     given, options = sent_map(column_map), parsed_options(option or ())
     return await with_files(
         request,
@@ -120,7 +122,15 @@ async def preview(
 
 
 @router.get("/templates/{kind}", summary="A template", response_class=PlainTextResponse)
-def template_file(kind: Annotated[Motion, PathParameter(description="What moves the unit.")]) -> PlainTextResponse:
+def template_file(
+    kind: Annotated[
+        Motion,
+        PathParameter(
+            description="How the unit is moved: at table rates, at "
+            "rest, by turns, along a profile, or by hand between poses."
+        ),
+    ],
+) -> PlainTextResponse:
     """A CSV file with the columns that a kind of data needs, units in their names."""
     headers = {"Content-Disposition": f'attachment; filename="{kind}.csv"'}
     return PlainTextResponse(template(kind), media_type="text/csv", headers=headers)
@@ -185,7 +195,8 @@ async def allan(
     recording: int,
     service: ServiceDep,
     dataset: Annotated[
-        int | None, Query(description="Number of the data set to use; default: the longest section at rest.")
+        int | None,
+        Query(description="Number of the data set to use; default: the longest section of the recording at rest."),
     ] = None,
 ) -> AllanResponse:
     """The overlapping Allan deviation of each axis with 95 % intervals, and the coefficients N, B and K where they
@@ -198,16 +209,37 @@ async def orientation(
     request: Request,
     recording: int,
     service: ServiceDep,
-    axis: Annotated[str | None, Query(description="x, y or z; default: the only one.", max_length=1)] = None,
+    axis: Annotated[
+        str | None, Query(description="Axis x, y or z; default: the only axis of the recording.", max_length=1)
+    ] = None,
     version: Annotated[
         int | None,
-        Query(ge=0, description="Calibration that corrects it; 0: none; default: the certified one, if any."),
+        Query(
+            ge=0,
+            description="Version of the calibration that corrects the readings; 0: no correction; "
+            "default: the certified version, if any.",
+        ),
     ] = None,
     rest_s: Annotated[
-        float, Query(ge=0, le=1e6, description="At rest so long at first: its static bias is taken off, s.")
+        float,
+        Query(
+            ge=0,
+            le=1e6,
+            description="Time for which the unit is at rest at the beginning, s; the "
+            "mean rate of that time (static bias) is subtracted.",
+        ),
     ] = 0.0,
-    instability_dps: Annotated[float, Query(ge=0, le=1e6, description="Bias instability, for the uncertainty.")] = 0.0,
-    standstill: Annotated[bool, Query(description="Hold the angle and learn the offset at standstill.")] = True,
+    instability_dps: Annotated[
+        float,
+        Query(
+            ge=0,
+            le=1e6,
+            description="Bias instability of the gyro, deg/s; it is part of the uncertainty of the static bias.",
+        ),
+    ] = 0.0,
+    standstill: Annotated[
+        bool, Query(description="While the unit stands still, hold the angle and estimate the offset again.")
+    ] = True,
 ) -> OrientationResponse:
     """The angle of one axis from its rate: static bias taken off (Ojeda et al. 2000, eqs. 15 and 16), offset renewed
     at standstill (Weiss)."""

@@ -17,7 +17,7 @@ router = APIRouter(prefix="/api/schedule", tags=["campaigns"])
 
 @router.get("", summary="Scheduled starts")
 def schedule(
-    service: ServiceDep, ended: Annotated[bool, Query(description="List entries that have ended too.")] = False
+    service: ServiceDep, ended: Annotated[bool, Query(description="List starts that have ended as well.")] = False
 ) -> list[ScheduledResponse]:
     """Every waiting entry of the schedule, the next first, with the outcome of its past starts."""
     return queue.list_starts(service.store, ended=ended)

@@ -18,7 +18,9 @@ app = typer.Typer(no_args_is_help=True, help="The audit trail: who did what, whe
 def list_(
     since: Annotated[
         datetime | None,
-        typer.Option("--since", help="List rows from this instant on, UTC: 2026-03-01 or 2026-03-01T08:00:00."),
+        typer.Option(
+            "--since", help="List only rows written at or after this time (UTC): 2026-03-01 or 2026-03-01T08:00:00."
+        ),
     ] = None,
     as_json: Json = False,
     database: Database = None,

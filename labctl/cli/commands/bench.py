@@ -54,28 +54,43 @@ def ports(as_json: Json = False, database: Database = None) -> None:  # noqa: AR
         said = [f"now {port.device}" if port.device != port.path else "", adapter, port.trouble]
         console.print(f"{port.path}  {'; '.join(filter(None, said))}", markup=False, soft_wrap=True)
     if not found:
-        console.print("this computer has no serial port: plug the adapters in", markup=False)
+        console.print("this computer has no serial port: plug in the USB adapters", markup=False)
 
 
 @app.command("new")
 def new(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="Bench file to write.")],
-    name: Annotated[str, typer.Option("--name", help="Name of the bench; default: that of the file.")] = "",
+    name: Annotated[
+        str, typer.Option("--name", help="Name of the bench; default: the name of the file without its suffix.")
+    ] = "",
     latitude_deg: Annotated[
-        float | None, typer.Option("--latitude", metavar="DEG", help="Where the bench stands, for the Earth's rate.")
+        float | None,
+        typer.Option(
+            "--latitude", metavar="DEG", help="Latitude of the bench, deg; the Earth's rate is computed from it."
+        ),
     ] = None,
     port: Annotated[
-        list[str] | None, typer.Option("--port", metavar="PATH", help="Serial port; repeatable. Default: all.")
+        list[str] | None,
+        typer.Option(
+            "--port",
+            metavar="PATH",
+            help="Serial port to search; may be repeated; default: all ports of this computer.",
+        ),
     ] = None,
     host: Annotated[
-        list[str] | None, typer.Option("--host", metavar="HOST[:PORT]", help="Modbus TCP instrument; repeatable.")
+        list[str] | None,
+        typer.Option("--host", metavar="HOST[:PORT]", help="Network name of a Modbus TCP instrument; may be repeated."),
     ] = None,
     setting: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="SECTION.KEY=VALUE", help="As table.max_rate_dps=100 or stim300.serial=A1."),
+        typer.Option(
+            "--set",
+            metavar="SECTION.KEY=VALUE",
+            help="Setting of the bench file, such as table.max_rate_dps=100 or stim300.serial=A1.",
+        ),
     ] = None,
-    yes: Annotated[bool, typer.Option("--yes", help="Ask nothing; what is missing is an error.")] = False,
-    force: Annotated[bool, typer.Option("--force", help="Replace a file that is there.")] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="Ask no questions; a missing setting is then an error.")] = False,
+    force: Annotated[bool, typer.Option("--force", help="Replace the file if it exists.")] = False,
     as_json: Json = False,
     database: Database = None,  # noqa: ARG001  every command takes it
 ) -> None:
@@ -131,7 +146,10 @@ def status(as_json: Json = False, database: Database = None) -> None:
         print_json(benches)
     else:
         for bench in benches:
-            said = [bench.unconfirmed, *(f"not made safe; campaigns left there: {left}" for left in bench.left)]
+            said = [
+                bench.unconfirmed,
+                *(f"not in its safe state; campaigns that did not end: {left}" for left in bench.left),
+            ]
             if bench.attempts:
                 said.insert(
                     1, f"labctl tried {bench.attempts} more times to set the safe state, last at {bench.attempted_at}"
@@ -151,7 +169,7 @@ def status(as_json: Json = False, database: Database = None) -> None:
 @app.command("clear")
 def clear(
     bench: Annotated[str, typer.Argument(metavar="NAME", help="Name of the bench, as `labctl bench status` shows it.")],
-    by: Annotated[str, typer.Option("--by", metavar="NAME", help="Who has inspected it.")],
+    by: Annotated[str, typer.Option("--by", metavar="NAME", help="Name of the person who has inspected the bench.")],
     reason: Annotated[str, typer.Option("--reason", metavar="TEXT", help="What was found.")] = "inspected the bench",
     as_json: Json = False,
     database: Database = None,

@@ -13,8 +13,8 @@ from labctl.cli.options import AcceptWarnings, Database, Json, RecordingIds, Ser
 from labctl.cli.output import console, print_json, stderr
 
 Version = Annotated[int, typer.Argument(metavar="VERSION", help="Calibration version of the unit: 1, 2, 3 ...")]
-By = Annotated[str, typer.Option("--by", metavar="NAME", help="Name of the person.")]
-Reason = Annotated[str, typer.Option("--reason", metavar="TEXT", help="Reason; it is recorded.")]
+By = Annotated[str, typer.Option("--by", metavar="NAME", help="Name of the person who does this; it is recorded.")]
+Reason = Annotated[str, typer.Option("--reason", metavar="TEXT", help="Reason for this action; it is recorded.")]
 Override = Annotated[
     bool,
     typer.Option("--override", help="Certify although there are objections; the reason must then be a sentence."),
@@ -32,8 +32,8 @@ def fit(
         typer.Option(
             "--effects",
             metavar="A,B,C",
-            help="Ids of effects, which are the model, or are "
-            "added to --model; `name:2` sets the polynomial order to 2.",
+            help="Ids of the effects of the model, or with --model of effects to add to it; `name:2` sets the "
+            "polynomial order to 2.",
         ),
     ] = None,
     accept_warnings: AcceptWarnings = False,
@@ -70,7 +70,8 @@ def certify(
         typer.Option(
             "--due-days",
             metavar="N",
-            help="Days until the next calibration is due; 0: no date; default: the recipe's, else $LABCTL_DUE_DAYS.",
+            help="Days until the next calibration is due; 0: no due date; default: the number in the recipe, "
+            "else $LABCTL_DUE_DAYS.",
         ),
     ] = None,
     override: Override = False,
@@ -140,7 +141,7 @@ def calibration(
     format_: Annotated[str, typer.Option("--format", metavar="NAME", help="json, c ...")] = "json",
     option: Annotated[
         list[str] | None,
-        typer.Option("--option", metavar="KEY=VALUE", help="Option of the format; may be repeated."),
+        typer.Option("--option", metavar="KEY=VALUE", help="Option of the format, as KEY=VALUE; may be repeated."),
     ] = None,
     out: Annotated[
         Path | None,
@@ -160,7 +161,7 @@ def calibration(
         else:
             out.write_bytes(file.content)
     for loss in file.losses:
-        typer.echo(f"format {format_} does not carry: {loss.text}", err=True)
+        typer.echo(f"format {format_} cannot express: {loss.text}", err=True)
 
 
 def compensate(

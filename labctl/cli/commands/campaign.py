@@ -46,7 +46,9 @@ Cron = Annotated[
 ]
 TimeZone = Annotated[
     str | None,
-    typer.Option("--time-zone", metavar="NAME", help="Time zone of --at and --cron; default: that of this computer."),
+    typer.Option(
+        "--time-zone", metavar="NAME", help="Time zone of --at and --cron; default: the time zone of this computer."
+    ),
 ]
 Priority = Annotated[
     int | None,
@@ -70,7 +72,7 @@ ClearConfirmedBy = Annotated[
         "--clear-confirmed-by",
         metavar="NAME",
         help="For a real bench: NAME confirms that the chamber is clear, the table free and "
-        "the limiter on. Default: asked at the terminal.",
+        "the limiter on. Default: labctl asks at the terminal.",
     ),
 ]
 
@@ -83,7 +85,9 @@ Hide = Annotated[
         help="Hide an effect in the units of a simulated bench; may be repeated; SIZE in the unit of the effect.",
     ),
 ]
-NoFit = Annotated[bool, typer.Option("--no-fit", help="Make no draft, whatever [fit] of the recipe says.")]
+NoFit = Annotated[
+    bool, typer.Option("--no-fit", help="Make no draft calibration, even if the recipe has a section [fit].")
+]
 
 
 @app.command("plan")

@@ -62,7 +62,7 @@ def watch(campaign: CampaignId = None, as_json: Json = False, database: Database
 def pause(
     campaign: Id,
     reason: Annotated[
-        str, typer.Option("--reason", metavar="TEXT", help="Reason; it is recorded.")
+        str, typer.Option("--reason", metavar="TEXT", help="Reason for this action; it is recorded.")
     ] = "paused from the command line",
     by: By = None,
     as_json: Json = False,
@@ -83,7 +83,7 @@ def pause(
 def resume(
     campaign: Annotated[
         int | None,
-        typer.Argument(metavar="ID", help="Number of the campaign; default: the newest that was interrupted."),
+        typer.Argument(metavar="ID", help="Number of the campaign; default: the newest interrupted campaign."),
     ] = None,
     bench: BenchName = None,
     power: Annotated[
@@ -91,12 +91,15 @@ def resume(
         typer.Option(
             "--power",
             metavar="lost|kept",
-            help="Whether the units lost power during the interruption; default: lost if this computer was restarted "
-            "meanwhile, else kept.",
+            help="Whether the units lost power during the interruption; default: lost if this computer was "
+            "restarted since then, else kept.",
         ),
     ] = None,
     speed: Annotated[
-        float | None, typer.Option("--speed", metavar="X", help="Speed of a simulated bench: X times real time.")
+        float | None,
+        typer.Option(
+            "--speed", metavar="X", help="Speed of a simulated bench: X times real time; default: as fast as possible."
+        ),
     ] = None,
     by: By = None,
     as_json: Json = False,
@@ -120,7 +123,7 @@ def resume(
 def abort(
     campaign: Id,
     reason: Annotated[
-        str, typer.Option("--reason", metavar="TEXT", help="Reason; it is recorded.")
+        str, typer.Option("--reason", metavar="TEXT", help="Reason for this action; it is recorded.")
     ] = "aborted from the command line",
     as_json: Json = False,
     database: Database = None,
@@ -152,10 +155,15 @@ def _at_its_end(database: str | None, answer: CampaignResponse) -> CampaignRespo
 
 def confirm(
     prompt: Annotated[
-        str, typer.Argument(metavar="QUESTION", help="Id of the question, as `campaign status` or `watch` shows it.")
+        str,
+        typer.Argument(
+            metavar="QUESTION",
+            help="Id of the question, as `labctl campaign status` or `labctl campaign watch` shows it.",
+        ),
     ],
     campaign: Annotated[
-        int | None, typer.Option("--campaign", metavar="ID", help="Number of the campaign; default: the newest.")
+        int | None,
+        typer.Option("--campaign", metavar="ID", help="Number of the campaign; default: the newest campaign."),
     ] = None,
     decline: Annotated[
         str | None,
@@ -192,7 +200,7 @@ def confirm(
 
 def draft(
     campaign: CampaignId = None,
-    again: Annotated[bool, typer.Option("--again", help="Also try those again that failed before.")] = False,
+    again: Annotated[bool, typer.Option("--again", help="Also try again the drafts that failed before.")] = False,
     as_json: Json = False,
     database: Database = None,
 ) -> None:

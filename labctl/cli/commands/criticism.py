@@ -21,7 +21,10 @@ from labctl.cli.stage_line import stage_line
 if TYPE_CHECKING:
     from labctl.fitting.effects import Formula
 
-VersionOption = Annotated[int | None, typer.Option("--version", metavar="N", help="Version; default: the newest.")]
+VersionOption = Annotated[
+    int | None,
+    typer.Option("--version", metavar="N", help="Number of the version; default: the unit's newest version."),
+]
 FormulaOption = Annotated[
     list[str] | None,
     typer.Option(

@@ -11,17 +11,17 @@ from labctl.cli.options import Database, Json
 from labctl.cli.output import console, print_json, stderr, table
 
 app = typer.Typer(
-    no_args_is_help=True, help="API keys, which allow people and programs to read, change or approve over HTTP."
+    no_args_is_help=True, help="API keys: they allow persons and programs to read, change or approve over HTTP."
 )
 
 KeyName = Annotated[str, typer.Argument(metavar="NAME", help="Name of the key's owner; the audit trail shows it.")]
-Reason = Annotated[str, typer.Option("--reason", metavar="TEXT", help="Reason; it is recorded.")]
+Reason = Annotated[str, typer.Option("--reason", metavar="TEXT", help="Reason for this action; it is recorded.")]
 
 
 @app.command("create")
 def create(
     name: KeyName,
-    role: Annotated[str, typer.Option("--role", metavar="ROLE", help="viewer, operator or approver.")],
+    role: Annotated[str, typer.Option("--role", metavar="ROLE", help="Role of the key: viewer, operator or approver.")],
     as_json: Json = False,
     database: Database = None,
 ) -> None:

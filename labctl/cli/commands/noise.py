@@ -24,7 +24,8 @@ StopEvery = Annotated[
     typer.Option(
         "--stop-every-s",
         metavar="S",
-        help="Of a record at rest: declare a stop of 10 s every S seconds and motion between, and print the drift.",
+        help="For a recording at rest: treat 10 s in every S seconds as a stop and the rest as motion, and "
+        "print the drift.",
     ),
 ]
 
@@ -65,29 +66,58 @@ def allan(
 
 def orientation(
     source: Annotated[
-        str, typer.Argument(metavar="SERIAL|FILE", help="A unit, or a table of t_s, gyro_z ... and temperature_c.")
+        str,
+        typer.Argument(
+            metavar="SERIAL|FILE",
+            help="Serial number of a unit, or path of a table with columns t_s, gyro_z ... and temperature_c.",
+        ),
     ],
-    axis: Annotated[str | None, typer.Option("--axis", help="x, y or z; default: the only one.")] = None,
+    axis: Annotated[
+        str | None, typer.Option("--axis", help="Axis x, y or z; default: the only axis of the data.")
+    ] = None,
     rest_s: Annotated[
-        float, typer.Option("--rest-s", metavar="S", min=0, help="At rest so long at first: take its static bias off.")
+        float,
+        typer.Option(
+            "--rest-s",
+            metavar="S",
+            min=0,
+            help="The unit is at rest for the first S seconds: subtract the mean rate of that time (static bias).",
+        ),
     ] = 0.0,
     instability_dps: Annotated[
-        float, typer.Option("--instability-dps", metavar="X", min=0, help="Bias instability, for the uncertainty.")
+        float,
+        typer.Option(
+            "--instability-dps",
+            metavar="X",
+            min=0,
+            help="Bias instability of the gyro, deg/s; it is part of the uncertainty of the static bias.",
+        ),
     ] = 0.0,
     standstill: Annotated[
-        bool, typer.Option("--standstill/--no-standstill", help="Hold the angle and learn the offset at standstill.")
+        bool,
+        typer.Option(
+            "--standstill/--no-standstill",
+            help="While the unit stands still, hold the angle and estimate the offset again.",
+        ),
     ] = True,
     warm_up_s: WarmUp = 0.0,
     stop_every_s: StopEvery = None,
     calibration: Annotated[
-        Path | None, typer.Option("--calibration", metavar="FILE", help="Of a table: correct it by this calibration.")
+        Path | None,
+        typer.Option("--calibration", metavar="FILE", help="Calibration file by which a table is corrected."),
     ] = None,
-    out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Of a table: write the angle too.")] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE", help="Path of a file to write: the table and its angle.")
+    ] = None,
     recording: RecordingId = None,
     version: Annotated[
         int | None,
         typer.Option(
-            "--version", metavar="N", min=0, help="Of a unit: its version; 0: none; default: the certified one."
+            "--version",
+            metavar="N",
+            min=0,
+            help="Version of the calibration that corrects a unit's recording; "
+            "0: no correction; default: the certified version.",
         ),
     ] = None,
     as_json: Json = False,
@@ -103,7 +133,10 @@ def orientation(
         if Path(source).is_file():
             answer = orientation_of_file(Path(source), calibration, out, options)
         elif calibration is not None or out is not None:
-            raise BadInput(f"{source}: no such file; --calibration and --out are for a table, --version for a unit")
+            raise BadInput(
+                f"{source}: there is no such file; leave out --calibration and --out, which need a "
+                f"file, if {source} is the serial number of a unit"
+            )
         else:
             with open_readonly(database) as store:
                 answer = orientation_of_unit(store, source, recording, version, options)

@@ -35,10 +35,15 @@ def plugins(as_json: Json = False, database: Database = None) -> None:  # noqa: 
 
 @driver_app.command("test")
 def driver_checks(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="Driver, as a bench file names it.")],
+    name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the driver, as bench files give it.")],
     bench: Annotated[
         str | None,
-        typer.Option("--bench", metavar="FILE", help="Simulated bench that has the driver; else the driver's own."),
+        typer.Option(
+            "--bench",
+            metavar="FILE",
+            help="Bench file of a simulated bench that uses the driver; "
+            "default: the bench of the driver's package, else a shipped bench.",
+        ),
     ] = None,
     as_json: Json = False,
     database: Database = None,  # noqa: ARG001  every command takes it

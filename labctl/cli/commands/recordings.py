@@ -33,7 +33,7 @@ ImporterName = Annotated[
 ]
 ImporterOptions = Annotated[
     list[str] | None,
-    typer.Option("--option", metavar="KEY=VALUE", help="Option of the importer; may be repeated."),
+    typer.Option("--option", metavar="KEY=VALUE", help="Option of the importer, as KEY=VALUE; may be repeated."),
 ]
 MapFile = Annotated[
     Path | None,
@@ -107,8 +107,10 @@ def import_(
 def export_recording(
     recording: Annotated[int, typer.Argument(metavar="ID", help="Number of the recording.")],
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="New folder to write; it must not exist.")],
-    csv: Annotated[bool, typer.Option("--csv", help="CSV instead of Parquet.")] = False,
-    points: Annotated[bool, typer.Option("--points", help="One row per data set instead of every reading.")] = False,
+    csv: Annotated[bool, typer.Option("--csv", help="Write CSV instead of Parquet.")] = False,
+    points: Annotated[
+        bool, typer.Option("--points", help="Write one row per data set instead of every reading.")
+    ] = False,
     as_json: Json = False,
     database: Database = None,
 ) -> None:
@@ -130,7 +132,11 @@ def simulate(
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="New folder to write; it must not exist.")],
     bench: Annotated[
         str | None,
-        typer.Option("--bench", metavar="FILE", help="Bench file, or name of a shipped bench; default: one that fits."),
+        typer.Option(
+            "--bench",
+            metavar="FILE",
+            help="Bench file, or the name of a shipped bench; default: the shipped bench that suits the recipe best.",
+        ),
     ] = None,
     gyro: Annotated[
         str | None,
@@ -151,7 +157,7 @@ def simulate(
     sample_rate_hz: Annotated[
         float | None, typer.Option("--sample-rate", metavar="HZ", help="Readings per second; default: 10.")
     ] = None,
-    csv: Annotated[bool, typer.Option("--csv", help="CSV instead of Parquet.")] = False,
+    csv: Annotated[bool, typer.Option("--csv", help="Write CSV instead of Parquet.")] = False,
     as_json: Json = False,
     database: Database = None,  # noqa: ARG001  every command takes it
 ) -> None:

@@ -14,14 +14,14 @@ from labctl.cli.printing.campaigns import print_start
 if TYPE_CHECKING:
     pass
 
-app = typer.Typer(no_args_is_help=True, help="The schedule: campaigns that begin later, in a running service.")
+app = typer.Typer(no_args_is_help=True, help="Schedule: campaigns that a running service starts later.")
 
-StartId = Annotated[int, typer.Argument(metavar="ID", help="Entry of the schedule.")]
+StartId = Annotated[int, typer.Argument(metavar="ID", help="Number of the scheduled start.")]
 
 
 @app.command("list")
 def list_(
-    ended: Annotated[bool, typer.Option("--all", help="List entries that have ended too.")] = False,
+    ended: Annotated[bool, typer.Option("--all", help="List starts that have ended as well.")] = False,
     as_json: Json = False,
     database: Database = None,
 ) -> None:
@@ -45,7 +45,9 @@ def list_(
         )  # fmt: skip
     console.print(rows)
     if answers and not served:
-        stderr.print("no service uses this database, so no start is carried out; run `labctl serve`", style="yellow")
+        stderr.print(
+            "no service uses this database, so no scheduled start will begin; run `labctl serve`", style="yellow"
+        )
 
 
 @app.command("show")

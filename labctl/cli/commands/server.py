@@ -16,10 +16,14 @@ from labctl.cli.output import console, print_json, stderr
 
 def serve(
     bench: BenchName = None,
-    simulate: Annotated[bool, typer.Option("--simulate", help="Run a simulated bench; default: triaxial-sim.")] = False,
+    simulate: Annotated[
+        bool, typer.Option("--simulate", help="Run a simulated bench; default bench: triaxial-sim.")
+    ] = False,
     speed: Annotated[
         float,
-        typer.Option("--speed", metavar="X", help="Simulated bench: X times real time; 0: as fast as possible."),
+        typer.Option(
+            "--speed", metavar="X", help="Speed of a simulated bench: X times real time; 0: as fast as possible."
+        ),
     ] = 1.0,
     host: Annotated[str, typer.Option("--host", metavar="ADDRESS", help="Address to listen on.")] = "127.0.0.1",
     port: Annotated[int, typer.Option("--port", metavar="N", help="TCP port; 0 chooses a free port.")] = 8420,
@@ -83,7 +87,9 @@ def simulator(
     out: Annotated[
         Path | None,
         typer.Option(
-            "--out", metavar="FILE", help="Path of a bench file to write, with the addresses of the simulator."
+            "--out",
+            metavar="FILE",
+            help="Path of a bench file to write; it names the addresses of the simulated instruments.",
         ),
     ] = None,
     speed: Annotated[

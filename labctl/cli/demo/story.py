@@ -60,7 +60,9 @@ def _fresh(folder: Path) -> Path:
     """Return an empty folder; one that an earlier demo made is emptied, any other is left alone."""
     if folder.exists() and any(folder.iterdir()):
         if not (folder / DATABASE).exists():
-            raise BadInput(f"{folder}: not empty, and not from an earlier demo; name another with --out DIR")
+            raise BadInput(
+                f"{folder}: the folder is not empty and not from an earlier demo; name another folder with --out DIR"
+            )
         shutil.rmtree(folder)
     folder.mkdir(parents=True, exist_ok=True)
     return folder

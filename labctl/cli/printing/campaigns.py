@@ -91,7 +91,7 @@ def print_campaign(answer: CampaignResponse) -> None:
     _print_instruments(answer)
     _print_question(answer)
     if answer.wish is not None:
-        console.print(f"  {answer.wish} was requested and will be carried out", style="yellow", markup=False)
+        console.print(f"  requested and still to be carried out: {answer.wish}", style="yellow", markup=False)
     for unit, why in answer.dropped.items():
         console.print(f"  {unit} is excluded from the rest of the campaign: {why}", style="red", markup=False)
     if answer.last_error:
@@ -123,7 +123,7 @@ def print_drafts(drafts: Sequence[DraftResponse]) -> None:
 def _print_instruments(answer: CampaignResponse) -> None:
     """Print what reference instruments read, and links that are not well."""
     for column, value in answer.references.items():
-        console.print(f"  {column} {format_number(value)} by a reference instrument", markup=False)
+        console.print(f"  {column} {format_number(value)} (reference instrument)", markup=False)
     for device, state in answer.links.items():
         console.print(f"  {device}: link {state}", style="red", markup=False)
 

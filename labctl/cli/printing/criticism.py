@@ -109,7 +109,7 @@ def _print_static(static: StaticRecordJson) -> None:
         said = ", ".join(
             f"{letter} {format_number(f['value'], 3)} +- {format_number(f['u'], 2)} {f['unit']}" for letter, f in shown
         )
-        instead = "; B is that of the data sheet" if noise["replaces_datasheet"] else ""
+        instead = "; B is the value of the data sheet" if noise["replaces_datasheet"] else ""
         text = f"axis {axis} at rest for {static['duration_s']:.0f} s: {said or 'no slope shows'}{instead}"
         console.print(text, style="dim", markup=False)
 

@@ -22,7 +22,11 @@ def print_uncertainty(answer: UncertaintyResponse) -> None:
     if not answer.inside:
         console.print("this rate or temperature was not calibrated: the figures are extrapolated", style="yellow")
     if answer.not_stated:
-        console.print(f"not stated, and not in U: {', '.join(answer.not_stated)}", style="yellow", markup=False)
+        console.print(
+            f"uncertainties that the bench does not state, and that U does not contain: {', '.join(answer.not_stated)}",
+            style="yellow",
+            markup=False,
+        )
     if answer.overdue:
         late = {line.name: line.due for one in answer.budget.values() for line in one.lines if line.overdue}
         for name, due in late.items():

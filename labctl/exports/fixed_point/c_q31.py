@@ -79,8 +79,10 @@ static inline int {name}_q31_correct(const int32_t *w, int32_t temperature_q16, 
 
 def write(calibration: Calibration, options: Mapping[str, str]) -> Written:
     """Return the header; raises BadInput for a model that depends on more than output and temperature."""
-    needs_thermometer(calibration, NAME, "its error is the same at every temperature; use c or json")
-    part = static_part(calibration, NAME, carries="the table is over output and temperature alone")
+    needs_thermometer(
+        calibration, NAME, "the error of this calibration is the same at every temperature; use format c or json"
+    )
+    part = static_part(calibration, NAME, carries="the table of this format depends on output and temperature only")
     nodes = whole_number(options, "temperatures", (2, MOST_NODES), NODES, NAME)
     fixed = fixed_point(part, nodes, NAME)
     differs = largest_difference(part, fixed)

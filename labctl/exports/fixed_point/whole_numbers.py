@@ -105,16 +105,16 @@ def fixed_point(part: StaticPart, nodes: int, format_name: str) -> FixedPoint:
             break
     if off > NEAR_ENOUGH * full_scale:
         raise BadInput(
-            f"format {format_name}: polynomials of order {MOST_ORDER} in the output are up to {off:.2g} deg/s from "
-            f"model {part.calibration.fitted.model.name}; use c or json"
+            f"format {format_name}: polynomials of order {MOST_ORDER} in the output differ from model "
+            f"{part.calibration.fitted.model.name} by up to {off:.2g} deg/s; use format c or json"
         )
     largest = float(np.abs(coefficients).max(axis=-1).sum(axis=(1, 2)).max())
     room = FILLED * full_scale
     shift = max(0, math.floor(math.log2(room / max(largest, full_scale * 2.0**-20))))
     if largest > room:
         raise BadInput(
-            f"format {format_name}: the coefficients of {part.calibration.serial} add up to {largest:.3g} deg/s, more "
-            f"than {room:.3g} deg/s that fit in its full scale; use c or json"
+            f"format {format_name}: the coefficients of {part.calibration.serial} add up to {largest:.3g} "
+            f"deg/s, more than the full scale of the format, {room:.3g} deg/s; use format c or json"
         )
     tables = np.rint(coefficients * (2.0 ** (Q31 + shift) / full_scale)).astype(np.int64)
     inside = (math.floor((low - MARGIN_C) * 2**Q16), math.ceil((high + MARGIN_C) * 2**Q16))

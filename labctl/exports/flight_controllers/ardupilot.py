@@ -40,8 +40,8 @@ def write(calibration: Calibration, options: Mapping[str, str]) -> Written:
     low, high = calibration.temperature_c
     if low < LIMITS_C[0] or high > LIMITS_C[1]:
         raise BadInput(
-            f"format {NAME}: {calibration.serial} is calibrated from {low:g} to {high:g} deg C; TMIN and TMAX of "
-            f"ArduPilot go from {LIMITS_C[0]:g} to {LIMITS_C[1]:g} deg C; use c or json"
+            f"format {NAME}: {calibration.serial} is calibrated from {low:g} to {high:g} deg C; TMIN and TMAX "
+            f"of ArduPilot go only from {LIMITS_C[0]:g} to {LIMITS_C[1]:g} deg C; use format c or json"
         )
     t_min, t_max = np.float32(low), np.float32(high)
     at_c = np.float32(min(max(REFERENCE_C, float(t_min)), float(t_max)))

@@ -21,7 +21,10 @@ NODES = 64
 AXES = ("x", "y", "z")
 TOLERANCE = "tolerance_dps"
 #: Options that both controllers' formats have.
-COMMON_OPTIONS = {TOLERANCE: "refuse a file that loses more than this, deg/s; default: write it and say what is lost"}
+COMMON_OPTIONS = {
+    TOLERANCE: "largest part of the correction that may be lost, deg/s; default: no limit, and "
+    "labctl reports what is lost"
+}
 
 
 @dataclass(frozen=True)
@@ -60,18 +63,18 @@ def bias_cubic(calibration: Calibration, format_name: str, consumer: str, refere
     if missing:
         raise BadInput(
             f"format {format_name}: {calibration.serial} is calibrated along {', '.join(calibration.axes)} alone; "
-            f"{consumer} corrects x, y and z by one set of temperature limits; measure {', '.join(missing)} too, or "
-            "use c or json"
+            f"{consumer} needs x, y and z over one range of temperatures; measure {', '.join(missing)} too, or "
+            "use format c or json"
         )
     needs_thermometer(
         calibration, format_name, f"a bias that is the same at every temperature needs no {consumer} thermal parameters"
     )
-    part = static_part(calibration, format_name, carries=f"{consumer} corrects by temperature alone")
+    part = static_part(calibration, format_name, carries=f"{consumer} corrects by the temperature only")
     low, high = calibration.temperature_c
     if not high > low:
         raise BadInput(
-            f"format {format_name}: {calibration.serial} is calibrated at {low:g} deg C alone; a bias over temperature "
-            "needs two temperatures; use c or json"
+            f"format {format_name}: {calibration.serial} is calibrated at one temperature, {low:g} deg C, but "
+            "this format describes the bias over temperature; use format c or json"
         )
     middle, half = (low + high) / 2, (high - low) / 2
     at = np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
@@ -101,5 +104,5 @@ def hold_tolerance(options: Mapping[str, str], seen: Differences, format_name: s
         raise BadInput(
             f"format {format_name}: up to {at_most(seen.together):.3g} deg/s of the correction would be lost (scale "
             f"factor {at_most(float(seen.own.max())):.3g}, misalignment {at_most(float(seen.cross.max())):.3g} deg/s), "
-            f"more than {TOLERANCE} = {limit:g}; use c or json, or raise {TOLERANCE}"
+            f"more than option {TOLERANCE} = {limit:g} deg/s allows; use format c or json, or raise {TOLERANCE}"
         )

@@ -76,7 +76,10 @@ def _notes(prefix: str, *, has_id: bool) -> list[str]:
     """Return what a person has to know who loads the file."""
     found = [
         "Axes are the sensor's own, as in its raw output, before the rotations of sensor and board.",
-        "The bias is in here whole: set CAL_GYROn_XOFF, _YOFF and _ZOFF of this sensor to 0, or calibrate them anew.",
+        (
+            "This file contains the whole bias: set CAL_GYROn_XOFF, _YOFF and _ZOFF of this sensor to 0, or "
+            "calibrate them anew."
+        ),
         "Vehicle, component, parameter, value, type (6: integer, 9: float):",
     ]
     if not has_id:
@@ -91,7 +94,7 @@ FORMAT = Format(
     "params",
     write,
     {
-        "device_id": "device id of the sensor, as CAL_GYROn_ID says it; default: TC_Gn_ID is left out",
+        "device_id": "device id of the sensor, as in CAL_GYROn_ID; default: TC_Gn_ID is left out",
         "instance": "n of TC_Gn, 0 to 3; default 0",
         **COMMON_OPTIONS,
     },

@@ -25,11 +25,11 @@ def write(calibration: Calibration, options: Mapping[str, str]) -> Written:
     noise = noise_of(calibration, options, NAME)
     if noise.walk is None:
         raise BadInput(
-            f"format {NAME}: the rate random walk of {calibration.serial} is not known, and Kalibr asks for one above "
-            f"0; record the unit at rest for longer, or give option {WALK}"
+            f"format {NAME}: the rate random walk of {calibration.serial} is not known, but Kalibr needs a "
+            f"value above 0; record the unit at rest for longer, or give option {WALK}"
         )
     losses = (
-        *correction_losses(calibration, "Kalibr's file has noise alone"),
+        *correction_losses(calibration, "the file of Kalibr contains noise figures only"),
         Loss("lower noise of other axes (one number for all; the largest is written)",
              float(noise.white.max() / noise.white.min()), "times"),
     )  # fmt: skip

@@ -36,7 +36,9 @@ def write(calibration: Calibration, options: Mapping[str, str]) -> Written:
     residual = error["heldout_rms_dps"] if error["heldout_rms_dps"] is not None else error["rms_dps"]
     of_calibration = float(np.deg2rad(residual or 0.0)) ** 2
     covariance = np.diag(white + of_calibration)
-    losses = correction_losses(calibration, "a covariance is of readings that were corrected")
+    losses = correction_losses(
+        calibration, "the covariance is that of corrected readings, so correct the readings first"
+    )
     head = head_lines(calibration, "the covariance of corrected rates at one rate of messages", None, losses, [
         "Correct the readings by the calibration (format python, c or json) before they are published.",
         f"White noise at {noise.rate_hz:.6g} Hz, (rad/s)^2 of x, y, z: " + ", ".join(f"{v:.6e}" for v in white),

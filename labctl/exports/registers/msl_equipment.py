@@ -27,11 +27,11 @@ OUTPUTS, TEMPERATURES, MOST = 21, 11, 201
 NEEDED = {
     "id": "number of the gyro in the register",
     "team": "team that keeps the register",
-    "entered_by": "person who enters it",
+    "entered_by": "person who enters the gyro in the register",
     "manufacturer": "maker of the gyro",
     "laboratory": "laboratory that calibrated it",
     "report": "number of the certificate",
-    "started": "first day of the calibration, as 2027-03-01",
+    "started": "first day of the calibration, such as 2027-03-01",
     "stopped": "last day of the calibration",
 }
 OTHER = {
@@ -48,11 +48,14 @@ def write(calibration: Calibration, options: Mapping[str, str]) -> Written:
     """Return the entry; raises BadInput for a fact that is not given, and for a model that no table can hold."""
     if lacking := [name for name in NEEDED if not options.get(name, "").strip()]:
         raise BadInput(
-            f"format {NAME}: {', '.join(lacking)} of the register's entry are not known; give --option KEY=VALUE for "
-            "each"
+            f"format {NAME}: the entry in the register needs {', '.join(lacking)}; give --option KEY=VALUE for each"
         )
-    needs_thermometer(calibration, NAME, "its error is the same at every temperature; use python, c or json")
-    part = static_part(calibration, NAME, carries="the table is over output and temperature alone")
+    needs_thermometer(
+        calibration,
+        NAME,
+        "the error of this calibration is the same at every temperature; use format python, c or json",
+    )
+    part = static_part(calibration, NAME, carries="the table of this format depends on output and temperature only")
     m = whole_number(options, "outputs", (2, MOST), OUTPUTS, NAME) if part.has_rates else 1
     n = whole_number(options, "temperatures", (2, MOST), TEMPERATURES, NAME)
     table = table_of(part, part.outputs(m), part.temperatures(n))
@@ -136,7 +139,9 @@ def _day(options: Mapping[str, str], name: str) -> str:
     try:
         return date.fromisoformat(options[name].strip()).isoformat()
     except ValueError:
-        raise BadInput(f"format {NAME}: option {name} = {options[name]!r} is no date; write it as 2027-03-01") from None
+        raise BadInput(
+            f"format {NAME}: option {name} = {options[name]!r} is not a date; write it as 2027-03-01"
+        ) from None
 
 
 FORMAT = Format(

@@ -34,7 +34,10 @@ def polar(k: Matrix) -> tuple[Matrix, Matrix]:
     left, sizes, right = np.linalg.svd(k)
     rotation = left @ right
     if np.linalg.det(rotation) < 0:
-        raise ValueError("the matrix mirrors: an odd number of axes has its sign reversed")
+        raise ValueError(
+            "the matrix is a reflection, not a rotation: one axis, or all three, have the wrong "
+            "sign; correct the sign of the output"
+        )
     return left @ np.diag(sizes) @ left.T, rotation
 
 

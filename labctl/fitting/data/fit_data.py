@@ -133,8 +133,8 @@ def refuse_poses(info: RecordingInfo) -> None:
     """Raise BadInput for a recording in poses: none of its data sets has a known rate."""
     if info.motion == "poses":
         raise BadInput(
-            f"{info.serial}: in a recording of poses no rate is known, only the direction of gravity before and "
-            "after each turn; use `fit --model poses` and `verify`: other models and criticism need a rate"
+            f"{info.serial}: a recording of poses contains the direction of gravity before and after each turn, "
+            "but no rate, which other models and criticism need; use `labctl fit --model poses` and `labctl verify`"
         )
 
 

@@ -115,19 +115,19 @@ def _require_alike(order: Sequence[int], parts: Mapping[int, Recording]) -> None
         info = parts[number].info
         if info.kind == "coefficients":
             raise BadInput(
-                f"recording {number} of {info.serial} is a table of coefficients; leave it out; "
-                "only readings or means are fitted together"
+                f"recording {number} of {info.serial} is a table of coefficients, but only recordings of "
+                "readings or means can be fitted together; leave the recording out"
             )
         for name in SAME:
             if getattr(info, name) != getattr(first, name):
                 raise BadInput(
                     f"recordings {order[0]} and {number} differ in {name} ({getattr(first, name)} and "
-                    f"{getattr(info, name)}); fit them one by one"
+                    f"{getattr(info, name)}); fit the recordings one by one"
                 )
         if info.motion != first.motion and not {info.motion, first.motion} <= WITH_TABLE_RATE:
             raise BadInput(
                 f"recordings {order[0]} and {number} differ in motion ({first.motion} and {info.motion}); only "
-                f"{' and '.join(sorted(WITH_TABLE_RATE))} go together: fit them one by one"
+                f"{' and '.join(sorted(WITH_TABLE_RATE))} can be fitted together; fit the recordings one by one"
             )
 
 

@@ -51,10 +51,12 @@ def _checked(found: Any) -> Kinds:
     made = []
     for kind in kinds:
         if not (isinstance(kind, type) and issubclass(kind, Effect)):
-            raise TypeError(f"{kind!r} is no subclass of labctl.fitting.effects.Effect")
+            raise TypeError(f"{kind!r} is not a subclass of labctl.fitting.effects.Effect; derive it from that class")
         effect = kind()
         if not NAME.fullmatch(effect.id):
-            raise ValueError(f"effect id {effect.id!r}: small letters, digits and _ only, beginning with a letter")
+            raise ValueError(
+                f"effect id {effect.id!r} is not valid; use small letters, digits and _ only, beginning with a letter"
+            )
         refuse_useless(effect)
         made.append(effect)
     return tuple(made)

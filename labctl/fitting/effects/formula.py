@@ -86,7 +86,10 @@ class Formula(Effect):
         )
         if not np.all(np.isfinite(values)):
             row = int(np.argmin(np.isfinite(values)))
-            raise BadInput(f"formula {self.name!r}: {self.text} is {values[row]} at row {row + 1}; keep it finite")
+            raise BadInput(
+                f"formula {self.name!r}: {self.text} has the value {values[row]} at row {row + 1}; "
+                "change the formula so that every value is finite"
+            )
         return [Column(self.name, "deg/s per unit of the formula", np.array(values))]
 
     def options(self, span: Span) -> list[Term]:
@@ -118,8 +121,8 @@ class Formula(Effect):
             if name == "table_rate_dps" and len(channels.rates) == 1:  # in use the unit turns without a table
                 return channels.rate_dps(axis)
             raise BadInput(
-                f"formula {self.name!r}: there is no column {name!r} here; use a column of the recording; the rate "
-                f"along the gyro's own axis is {OWN_RATE}"
+                f"formula {self.name!r}: the recording has no column {name!r}; use another column ({OWN_RATE} "
+                "is the rate along the gyro's own axis)"
             )
         values = channels[name]
         if values.dtype.kind not in "fiub":
@@ -131,7 +134,7 @@ class Formula(Effect):
 
 def _parsed(name: str, text: str) -> ast.Expression:
     if len(text) > LONGEST:
-        raise BadInput(f"formula {name!r}: {len(text)} characters; shorten it to at most {LONGEST}")
+        raise BadInput(f"formula {name!r} has {len(text)} characters; shorten it to at most {LONGEST}")
     try:
         with _PARSER:
             tree = ast.parse(text.strip(), mode="eval")
@@ -143,7 +146,9 @@ def _parsed(name: str, text: str) -> ast.Expression:
     while level:
         depth += 1
         if depth > DEEPEST:
-            raise BadInput(f"formula {name!r}: operations stand more than {DEEPEST} deep in each other; shorten it")
+            raise BadInput(
+                f"formula {name!r}: operations are nested more than {DEEPEST} levels deep; shorten the formula"
+            )
         for node in level:
             _check(name, node)
         level = [below for node in level for below in ast.iter_child_nodes(node)]
@@ -183,11 +188,11 @@ def read_formulas(lines: Sequence[str]) -> list[Formula]:
 def checked_formulas(written: list[Formula]) -> list[Formula]:
     """Return the formulas of one request; raises BadInput for too many, and for two of one name."""
     if len(written) > MOST_FORMULAS:
-        raise BadInput(f"more than {MOST_FORMULAS} formulas, the limit of one comparison; leave some out")
+        raise BadInput(f"more than {MOST_FORMULAS} formulas were given, the limit of one comparison; leave some out")
     names = [each.id for each in written]
     for name in names:
         if names.count(name) > 1:
-            raise BadInput(f"formula {name!r} is given twice; give each a name of its own")
+            raise BadInput(f"formula {name!r} is given twice; give each formula a different name")
     return written
 
 
@@ -213,10 +218,12 @@ def _from_file(path: Path) -> list[Formula]:
     except (OSError, UnicodeDecodeError, TOMLDecodeError) as error:
         raise BadInput(f"formulas {path}: {error}") from error
     except (KeyError, TypeError) as error:
-        raise BadInput(f"formulas {path}: an [[effects]] entry lacks {error}; give id and formula") from error
+        raise BadInput(f"formulas {path}: an entry in [[effects]] has no key {error}; give id and formula") from error
 
 
 def _made(name: str, text: str, sentence: str) -> Formula:
     if not NAME.fullmatch(name):
-        raise BadInput(f"formula name {name!r}: use small letters, digits and _ only, beginning with a letter")
+        raise BadInput(
+            f"formula name {name!r} is not valid; use small letters, digits and _ only, beginning with a letter"
+        )
     return Formula(name, text, sentence)

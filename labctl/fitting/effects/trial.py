@@ -37,11 +37,14 @@ def first_column(effect: Effect) -> Column:
 def refuse_useless(effect: Effect) -> None:
     """Raise TypeError or ValueError, or what the effect raises, where it cannot be fitted."""
     if missing := [name for name in TOLD if not getattr(effect, name, "")]:
-        raise TypeError(f"effect {effect.id!r} does not say its {', '.join(missing)}")
+        raise TypeError(f"effect {effect.id!r} does not define {', '.join(missing)}; add it to the class")
     column = first_column(effect)
     n = len(made_up_channels(effect.needs))
     if np.shape(column.values) != (n,):
-        raise ValueError(f"effect {effect.id!r} gives values of shape {np.shape(column.values)} for {n} data sets")
+        raise ValueError(
+            f"effect {effect.id!r} returns values of shape {np.shape(column.values)} for {n} data "
+            "sets; return one value for each data set"
+        )
     span = Span(100.0, 10.0, (10.0, 20.0, 40.0, 60.0, 80.0, 100.0), frozenset(effect.needs))
     if not all(isinstance(term, Term) for term in effect.options(span)):
         raise TypeError(f"effect {effect.id!r} has options that are not of class Term; return Terms")

@@ -121,8 +121,8 @@ def _law_coefficients(design: AxisDesign, solution: Solution) -> dict[str, NDArr
 def _solve_axis(data: FitData, model: ErrorModel, axis: str, design: AxisDesign, fixed: Solution | None) -> Solution:
     if design.columns.shape[1] == 0:
         raise NotEnoughData(
-            f"{data.info.serial}, axis {axis}: the recording exercises no effect of model {model.name} "
-            f"({', '.join(model.effect_ids)}); record rates about the unit's other axes too"
+            f"{data.info.serial}, axis {axis}: the rates in this recording cause none of the effects of model "
+            f"{model.name} ({', '.join(model.effect_ids)}); record rates about the other axes of the unit too"
         )
     y = data.outputs[axis] - data.true_rate_dps(axis) - design.offset_dps
     known, random = data.scatter(axis), None
@@ -149,8 +149,8 @@ def _with_white_noise(design: AxisDesign, y: Array, scatter: Scatter) -> Scatter
     rank = rank_of(columns)
     if len(y) <= rank:
         raise NotEnoughData(
-            f"{len(y)} data sets are too few to estimate an error beside {rank} coefficients and shifts of "
-            "recordings; measure more, or leave effects out"
+            f"{len(y)} data sets are too few: {rank} coefficients (shifts between recordings included) leave "
+            "none to estimate the error of the fit; measure more data sets, or leave effects out"
         )
     taken, *_ = np.linalg.lstsq(columns, y, rcond=1e-12)
     left = y - columns @ taken

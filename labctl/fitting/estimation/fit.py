@@ -122,7 +122,7 @@ def _environment(data: FitData, turning: Mapping[str, Array]) -> FitEnvironment:
     info = data.info
     found: FitEnvironment = {}
     if is_chambers(data.channels.columns):
-        found["temperature"] = "the chamber's: the recording has no thermometer of the unit's own"
+        found["temperature"] = "the thermometer of the chamber, because the recording has no thermometer of the unit"
     if info.latitude_deg is None:
         return {**found, "earth_rate": "not subtracted: the latitude of the bench is not known"}
     found |= {

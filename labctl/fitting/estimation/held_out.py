@@ -39,7 +39,10 @@ def held_out_errors(data: FitData, preset: Preset, solutions: Mapping[str, Solut
             left = residuals(FittedModel(model, found.fits), left_out, found.nuisance)
         except NotConverged as error:
             at_c = float(left_out.temperature_c.mean())
-            raise NotConverged(f"{error}; the model was fitted without the data sets near {at_c:.1f} deg C") from None
+            raise NotConverged(
+                f"{error}; this fit left out the data sets near {at_c:.1f} deg C, to test the "
+                "model at a temperature that it was not fitted to"
+            ) from None
         for axis, values in left.items():
             errors[axis].append(values)
     return {axis: np.concatenate(parts) for axis, parts in errors.items() if parts}

@@ -50,8 +50,8 @@ def _require_rates(data: FitData, model: ErrorModel) -> None:
             least, _ = kind_of(term).least(term)
             if rates < least:
                 raise NotEnoughData(
-                    f"{data.info.serial}, axis {axis}: {term.effect} needs at least {least} different rates; the "
-                    f"recording has {rates}, measure at {least - rates} more"
+                    f"{data.info.serial}, axis {axis}: {term.effect} needs at least {least} different rates; "
+                    f"the recording has {rates}; measure at {least - rates} more rates"
                 )
 
 
@@ -63,11 +63,11 @@ def _require_temperatures(data: FitData, model: ErrorModel) -> None:
         if temperatures < least:
             raise NotEnoughData(
                 f"{serial}: {term.effect} needs at least {least} different temperatures; the recording has "
-                f"{temperatures}, measure at {least - temperatures} more"
+                f"{temperatures}; measure at {least - temperatures} more temperatures"
             )
         if span < SPAN_PER_ORDER_C * (least - 1):
             raise NotEnoughData(
                 f"{serial}: the temperatures span {span:.2f} deg C, too little for order {least - 1} of "
-                f"{term.effect}; measure over at least"
-                f" {SPAN_PER_ORDER_C * (least - 1):.0f} deg C, or a lower order (`{term.effect}:N`)"
+                f"{term.effect}; measure over a span of at least {SPAN_PER_ORDER_C * (least - 1):.0f} deg C, or "
+                f"fit a lower order (`{term.effect}:N`)"
             )

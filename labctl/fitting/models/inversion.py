@@ -88,8 +88,9 @@ def _by_bisection(outputs: Mapping[str, Array], error_dps: ErrorOfRates, name: s
             _require_roots(outputs, outside, name)
             return rates
     raise NotConverged(
-        f"model {name!r} could not be inverted: the last step still changed the rate by {change:.3g} "
-        "deg/s; its coefficients are not those of a gyro (check the fit's validity range and the output's scale)"
+        f"model {name!r} cannot be inverted: the last iteration still changed the rate by {change:.3g} deg/s; "
+        "check the validity range of the fit and the scale of the output: these coefficients are implausible "
+        "for a gyro"
     )
 
 
@@ -99,9 +100,10 @@ def _require_roots(outputs: Mapping[str, Array], outside: Mapping[str, NDArray[n
         if rows.any():
             row = int(np.argmax(rows))
             raise NotConverged(
-                f"model {name!r} could not be inverted: no rate within {_reach(outputs[axis])[-1]:.3g} deg/s of output "
-                f"{outputs[axis][row]:.6g} deg/s of axis {axis} has that output ({int(rows.sum())} of {len(rows)} "
-                "rows); its coefficients are not those of a gyro (check sign, unit and axes of the output)"
+                f"model {name!r} cannot be inverted: on axis {axis}, no true rate within "
+                f"{_reach(outputs[axis])[-1]:.3g} deg/s of the output explains the output "
+                f"{outputs[axis][row]:.6g} deg/s ({int(rows.sum())} of {len(rows)} rows); check sign, unit and "
+                "axes of the output: these coefficients are implausible for a gyro"
             )
 
 

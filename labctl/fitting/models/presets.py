@@ -40,17 +40,15 @@ def _centre(data: FitData) -> Reference:
 def _nodes(data: FitData, points: int, name: str) -> tuple[float, ...]:
     if data.levels is None:
         raise NotEnoughData(
-            f"{data.info.serial}: model {name} needs discrete temperature levels; these temperatures are continuous "
-            "from "
-            f"{data.temperature_c.min():.1f} to {data.temperature_c.max():.1f} deg C without gaps: fit `--effects` "
-            "instead, or measure at fixed temperatures"
+            f"{data.info.serial}: model {name} needs discrete temperature levels; the temperatures of this "
+            f"recording vary continuously from {data.temperature_c.min():.1f} to {data.temperature_c.max():.1f} "
+            "deg C; fit `--effects` instead, or measure at fixed temperatures"
         )
     means = level_means(data.temperature_c, data.levels)
     if len(means) < points:
         raise NotEnoughData(
             f"{data.info.serial}: model {name} interpolates between {points} temperatures; the recording has "
-            f"{len(means)}, measure at {points - len(means)} more; a recording at fewer is fitted by "
-            "`--effects bias,scale_factor,misalignment`"
+            f"{len(means)}; measure at {points - len(means)} more, or fit `--effects bias,scale_factor,misalignment`"
         )
     return tuple(float(t) for t in means)
 

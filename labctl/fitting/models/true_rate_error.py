@@ -31,6 +31,7 @@ def errors_at_true_rates(fitted: FittedModel, here: Channels) -> dict[str, Array
         if change < CLOSE_DPS * max(1.0, fastest):
             return errors
     raise NotConverged(
-        f"model {fitted.model.name!r} has no output for some true rates within its validity: the last iteration "
-        f"still changed the output by {change:.3g} deg/s; fit the model in the forward form (`labctl improve`)"
+        f"model {fitted.model.name!r} gives no output for some true rates within its calibrated range: the last "
+        f"iteration still changed the output by {change:.3g} deg/s; fit the model as a function of the true "
+        "rate (`labctl improve`)"
     )

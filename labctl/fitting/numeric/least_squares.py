@@ -119,8 +119,8 @@ def solve(
     m, k = design.shape
     if m < k or rank_of(design) < k:
         raise NotEnoughData(
-            f"{m} data sets at these rates and temperatures determine {min(m, rank_of(design))} of {k} coefficients; "
-            "measure at other rates and temperatures, or leave effects out"
+            f"{m} data sets at these rates and temperatures determine only {min(m, rank_of(design))} of the {k} "
+            "coefficients of the model; measure at other rates and temperatures, or leave effects out"
         )
     fits = _at(design, y, scatter, [drift]) if drift is not None else _over_grid(design, y, scatter)
     found = _collect(fits, design, y, scatter)

@@ -63,7 +63,8 @@ def _moves(readings: PoseReadings, rests: Rests, accelerometer: Accelerometer, b
     """Return the moves, with what the specific force adds to the output taken off."""
     if len(rests) < 2:
         raise NotEnoughData(
-            f"{readings.info.serial}: one rest, and so no turn between rests; record rests in many poses"
+            f"{readings.info.serial}: the recording has only one rest, so it contains no turn between rests; "
+            "record rests in many poses"
         )
     force_g = corrected(readings.accel_g, accelerometer.errors, accelerometer.bias_g)
     return moves_between(readings, rests, readings.gyro_dps - force_g @ bias.per_g.T)

@@ -109,7 +109,7 @@ def _why_not(readings: PoseReadings, rows: slice, rails: NDArray[np.float64], no
     for i, axis in enumerate(AXES):
         for rail in rails[:, i]:
             if _is_clipped(readings.gyro_dps[rows, i], float(rail), float(noise[i])):
-                return f"gyro_{axis} is saturated at {rail:.4g} deg/s: turn slower"
+                return f"gyro_{axis} is saturated at {rail:.4g} deg/s: turn the unit more slowly"
     return ""
 
 

@@ -53,13 +53,14 @@ def readings_of(recording: Recording) -> PoseReadings:
         )
     if info.kind != "samples":
         raise BadInput(
-            f"{serial}: poses need every reading of the turns (kind = 'samples'), not {info.kind!r}; import them"
+            f"{serial}: poses need every reading of the turns (kind = 'samples'), but the recording has kind = "
+            f"{info.kind!r}; import the readings"
         )
     absent = [axis for axis in AXES if axis not in info.axes]
     if absent:
         raise BadInput(
-            f"{serial}: poses need gyros about x, y and z, since a turn by hand is about all three; the recording has "
-            f"no column gyro_{absent[0]}; add it"
+            f"{serial}: poses need gyros about x, y and z, but the recording has no column gyro_{absent[0]}; "
+            "add the column"
         )
     columns = recording.columns
     valid = np.asarray(columns["valid"]) != 0 if "valid" in columns else np.ones(len(recording), dtype=bool)

@@ -11,7 +11,7 @@ from labctl.fitting.uncertainty.use import AxisEvidence
 #: Why a part is unknown.
 PUBLISHED = "published coefficients come without uncertainties"
 NO_DATA_SETS = "published coefficients have no data sets from which it could be estimated"
-NOT_KEPT = "the version was made by an older labctl, which did not store it: fit it again"
+NOT_KEPT = "the version was made by an older version of labctl, which did not store it: fit it again"
 BY_HAND = (
     "the rate during turns between rests is not known, so it cannot be estimated; measure the unit on a table as well"
 )

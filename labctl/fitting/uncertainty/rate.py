@@ -68,7 +68,8 @@ def require_law_of_rate_and_temperature(fitted: FittedModel, name: str) -> None:
     if fitted.model.needs:
         raise BadInput(
             f"{name}: its model also needs {', '.join(fitted.model.needs)};"
-            " an uncertainty at a rate and a temperature alone is not defined; use a version without these"
+            " an uncertainty at a rate and a temperature alone is not defined; use a version whose model does "
+            "not need them"
         )
     if any(np.isnan(fit.covariance).any() for fit in fitted.axes.values()):
         raise NotEnoughData(

@@ -15,11 +15,11 @@ RAD_PER_DEG = math.pi / 180.0
 #: Quantities whose error is the same at all rates of a campaign, and in proportion to the rate.
 COMMON = frozenset({"clock", "table_rate", "turn_angle"})
 OWN_THERMOMETER = "cancels: the unit's own thermometer is read in the calibration and in use"
-NOT_STATED = "not stated; add it to [[standards]] of the bench file: what it contributes is not in U"
-NOT_KEPT = "the version was made by an older labctl, which did not store its standards: fit it again"
+NOT_STATED = "not stated, so its contribution is not in U; add the standard to [[standards]] of the bench file"
+NOT_KEPT = "the version was made by an older version of labctl, which did not store its standards: fit it again"
 NO_TIME_BASE = (
-    "not stated; state it with u = 0 where the certificate of table_rate includes the time base: what it contributes "
-    "is not in U"
+    "not stated, so its contribution is not in U; if the certificate of table_rate includes the time base, "
+    "state the standard with u = 0"
 )
 NO_LATITUDE = "not known: latitude_deg is not stated, so the Earth's rate is part of the bias"
 IN_COEFFICIENTS = "in the coefficients: the fit takes turn_common_u of the recipe"

@@ -73,9 +73,9 @@ class MappedColumn(_Strict):
     @model_validator(mode="after")
     def _scale_with_lsb(self) -> MappedColumn:
         if self.scale == 0:
-            raise ValueError("scale is 0; write words per unit, such as 131 (LSB per deg/s)")
+            raise ValueError("scale is 0; write the number of converter counts per unit, such as 131 (LSB per deg/s)")
         if self.scale is not None and not is_lsb(self.unit):
-            raise ValueError(f"scale goes with unit = {LSB!r} (unit is {self.unit!r})")
+            raise ValueError(f"scale is only for unit = {LSB!r}, but the unit is {self.unit!r}; leave scale out")
         return self
 
 
@@ -117,7 +117,7 @@ class DataSets(_Strict):
     def _column_named(self) -> DataSets:
         if (self.by == "column") != (self.column is not None):
             raise ValueError(
-                f'by = "column" and column = NAME go together (by = {self.by!r}, column = {self.column!r})'
+                f'by = "column" and column = NAME go together; give both (by = {self.by!r}, column = {self.column!r})'
             )
         return self
 
@@ -144,7 +144,10 @@ class ColumnMap(_Strict):
     def _targets(cls, columns: dict[str, MappedColumn]) -> dict[str, MappedColumn]:
         for target, column in columns.items():
             if target in _MADE:
-                raise ValueError(f"{target}: this column is made from [datasets], or belongs to coefficients")
+                raise ValueError(
+                    f"{target}: a map cannot fill this column (labctl makes it from [datasets], or "
+                    "it belongs to a table of coefficients); leave it out"
+                )
             if not _usable_name(target):
                 raise ValueError(
                     f"{target[:80]}: not a name for a column; use letters, digits and _ (at most 60), and end "

@@ -36,7 +36,7 @@ def free_motion(columns: Columns, found: Movement, t_s: Array) -> str:
     """Return why a log of a unit that moved cannot be used, and what would do instead, as one sentence."""
     n = _poses(columns, found, t_s)
     seen = f"; its accelerometer shows {n} poses at rest, {LEAST_POSES} are needed" if n else ""
-    spread = f"its output spreads over {found.spread_dps:.3g} deg/s"
+    spread = f"its output varies by {found.spread_dps:.3g} deg/s"
     return (
         f"the unit moves in {100 * found.share:.0f} % of the time ({spread}) and no column gives the rate or the "
         f"angle{seen}: free motion without a reference cannot calibrate a gyro; add a column with the table's rate "

@@ -63,7 +63,9 @@ def _read(path: Path) -> dict[str, NDArray[np.generic]]:
                 for column, values in zip(columns, piece.columns, strict=True):
                     column.add(values)
     if any(column.rows != rows for column in columns):
-        raise BadRecording(f"{path}: {rows} rows by its footer, {columns[0].rows} in the file; write it again")
+        raise BadRecording(
+            f"{path}: its footer states {rows} rows, but the file has {columns[0].rows}; write the file again"
+        )
     return {column.name: column.whole() for column in columns}
 
 

@@ -40,7 +40,7 @@ def joined(table: RawTable, others: Sequence[RawTable], column_map: ColumnMap | 
             taken = name in columns or name.startswith(_NAMELESS)
             called = f"{other.path.stem}: {name}" if taken else name
             if called in columns:
-                raise _refused(other, f"column {called!r} is there already; give the files different names")
+                raise _refused(other, f"both files have a column {called!r}; give the files different names")
             columns[called] = replace(column, name=called)
     return replace(table, columns=columns, problems=tuple(problems), first_rows=()) if others else table
 
@@ -66,8 +66,9 @@ def _at(table: RawTable, time: RawColumn | None, other: RawTable, theirs: RawCol
         without = table if time is None else other
         raise _refused(
             other,
-            f"{other.rows} rows beside {table.rows} of {table.path.name}, and {without.path.name} has no column known "
-            "to be its time; name it in [columns.t_s], under the same name or number in both files",
+            f"the file has {other.rows} rows and {table.path.name} has {table.rows}, but no column of "
+            f"{without.path.name} is known to be the time; name the column of time in [columns.t_s], with the "
+            "same name or number in both files",
         )
     if np.array_equal(time.values, theirs.values):
         return dict(other.columns)
@@ -81,7 +82,7 @@ def _refuse_apart(table: RawTable, at: Array, other: RawTable, theirs: Array) ->
     if not (np.isfinite(at).all() and np.isfinite(theirs).all() and len(steps) and (steps > 0).all()):
         raise _refused(
             other,
-            f"its times, or the times of {table.path.name}, are not all increasing numbers; correct or sort the rows",
+            f"its times, or the times of {table.path.name}, do not increase from row to row; correct or sort the rows",
         )
     most = MOST_STEPS * float(np.median(steps))
     nearest = theirs[np.searchsorted((theirs[:-1] + theirs[1:]) / 2, at)]
@@ -90,9 +91,10 @@ def _refuse_apart(table: RawTable, at: Array, other: RawTable, theirs: Array) ->
         row = int(np.argmax(apart))
         raise _refused(
             other,
-            f"no reading near time {at[row]:.9g} of {table.path.name} (row {row + 1}; {int(apart.sum())} rows so): its "
-            f"times go from {theirs[0]:.9g} to {theirs[-1]:.9g}, in steps of {np.median(steps):.3g}; at most "
-            f"{MOST_STEPS:.0f} steps may lie between. Both files need one clock and one unit of time",
+            f"there is no reading within {MOST_STEPS:.0f} steps of time {at[row]:.9g} of {table.path.name} (row "
+            f"{row + 1}; {int(apart.sum())} rows without a reading): its own times go from {theirs[0]:.9g} to "
+            f"{theirs[-1]:.9g}, in steps of {np.median(steps):.3g}. Give both files the same clock and the same "
+            "unit of time",
         )
 
 

@@ -30,8 +30,8 @@ def encoding_of(path: Path, head: bytes) -> str:
     for position, byte in enumerate(head):
         if byte < 32 and byte not in _ALLOWED:
             raise BadRecording(
-                f"{path}: byte {position + 1} is {byte:#04x}, which does not occur in text: a binary file "
-                "that no installed importer reads; export it as CSV, or install the package of an importer of it"
+                f"{path}: the file is binary (byte {position + 1} is {byte:#04x}), and no installed importer "
+                "reads it; export it as CSV, or install the package of an importer for it"
             )
     try:
         codecs.getincrementaldecoder("utf-8-sig")().decode(head)
@@ -87,8 +87,8 @@ class TextStream:
             ) from error
         if "\0" in text:
             raise BadRecording(
-                f"{self.path}: a NUL byte after byte {self._taken}: binary, or a log whose end was lost at power-off; "
-                "remove what follows"
+                f"{self.path}: the file has a NUL byte after byte {self._taken}, so it is binary, or a log "
+                f"whose end was lost when the power was switched off; remove everything after byte {self._taken}"
             )
         self._taken += len(block)
         if not self.blanks:

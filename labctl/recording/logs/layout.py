@@ -57,7 +57,10 @@ def layout_of(path: Path, head: bytes, given: FileKeys) -> tuple[FileLayout, lis
         raise BadRecording(f"{path}: no row of readings below the header; expected at least one")
     decimal = given.decimal or _decimal(below, separator)
     if header > len(lines):
-        raise BadRecording(f"{path}: header = {header}, and the file begins with {len(lines)} lines; correct [file]")
+        raise BadRecording(
+            f"{path}: header = {header} is beyond the {len(lines)} lines at the beginning of the "
+            "file that labctl reads; correct header in [file]"
+        )
     return FileLayout(encoding, separator, decimal, header, data), _names(cells[header - 1] if header else [], width)
 
 
@@ -101,8 +104,8 @@ def _first_data(path: Path, lines: list[str], cells: list[list[str]]) -> int:
         if numbers >= 0.3 * sum(cell != "" for cell in row) and len(row) == Counter(ahead).most_common(1)[0][0]:
             return index + 1
     raise BadRecording(
-        f"{path}: no line of numbers among the first {len(lines)}: no readings (it begins {lines[0][:60]!r}); expected "
-        "one row for each reading, columns separated by , ; tab or blanks"
+        f"{path}: the first {len(lines)} lines contain no row of numbers, so the file has no readings (it begins "
+        f"{lines[0][:60]!r}); expected one row for each reading, columns separated by , ; tab or blanks"
     )
 
 

@@ -80,7 +80,8 @@ def _opened(path: Path) -> Iterator[Any]:
         raise
     except Exception as error:
         raise BadRecording(
-            f"{path}: not a whole bag ({type(error).__name__}: {' '.join(str(error).split())[:200]}); run `rosbag "
+            f"{path}: not a complete ROS bag ({type(error).__name__}: {' '.join(str(error).split())[:200]}); "
+            "run `rosbag "
             "reindex` or `ros2 bag reindex` on it, or record again"
         ) from error
 
@@ -90,7 +91,9 @@ def _topic(path: Path, bag: Any, asked: str | None, kind: str, option: str) -> s
     there = sorted(name for name, info in bag.topics.items() if info.msgtype == kind)
     if asked is not None:
         if asked not in there:
-            raise BadInput(f"{path}: no topic {asked!r} of {kind} (there are {', '.join(there) or 'none'})")
+            raise BadInput(
+                f"{path}: the bag has no topic {asked!r} of {kind}; choose one of {', '.join(there) or 'none'}"
+            )
         return asked
     if len(there) == 1:
         return str(there[0])
@@ -99,9 +102,12 @@ def _topic(path: Path, bag: Any, asked: str | None, kind: str, option: str) -> s
     if not there:
         names = ", ".join(f"{name} ({info.msgtype})" for name, info in list(bag.topics.items())[:10])
         raise BadRecording(
-            f"{path}: no topic of {kind} (it has {names or 'none'}); record one that has the gyro's output"
+            f"{path}: the bag has no topic of {kind} (its topics: {names or 'none'}); record a topic with the "
+            "output of the gyro"
         )
-    raise BadInput(f"{path}: {' and '.join(there)} are of {kind}; choose one with --option {option}=NAME")
+    raise BadInput(
+        f"{path}: the topics {' and '.join(there)} are all of {kind}; choose one with --option {option}=NAME"
+    )
 
 
 def _messages(bag: Any, topic: str) -> Iterator[tuple[int, Any]]:

@@ -78,7 +78,7 @@ def _refuse_names(path: Path, names: list[str]) -> None:
     doubled = sorted({name for name in names if names.count(name) > 1})
     if doubled:
         listed = ", ".join(repr(name[:60]) for name in doubled[:5])
-        raise BadRecording(f"{path}: {listed} stands more than once in the header; give each column a name of its own")
+        raise BadRecording(f"{path}: {listed} occurs more than once in the header; give each column a different name")
 
 
 def _blocks(path: Path, layout: FileLayout, names: list[str]) -> tuple[list[Any], list[tuple[int, int]]]:

@@ -63,12 +63,13 @@ def read(path: Path, options: ULogOptions) -> RawTable:
     if topic is None:
         names = ", ".join(sorted({name for name, _ in data})[:12])
         raise BadRecording(
-            f"{path}: none of {', '.join(TOPICS)} is in this log (it has {names or 'no topic'}); log one of them "
+            f"{path}: the log has none of the topics {', '.join(TOPICS)} (it has {names or 'no topic'}); log "
+            "one of them "
             "(SDLOG_PROFILE: sensor comparison, or high rate), or take another log"
         )
     if (topic, options.instance) not in data:
         raise BadInput(
-            f"{path}: {topic} has no instance {options.instance} (there are {listed}); choose one with "
+            f"{path}: {topic} has no instance {options.instance} (instances: {listed}); choose one with "
             "--option instance=N, and --option topic=NAME"
         )
     columns = _gyro(path, topic, data[topic, options.instance])
@@ -88,7 +89,7 @@ def _parsed(path: Path) -> Any:
         raise
     except Exception as error:  # the parser raises whatever broken bytes lead it to
         raise BadRecording(
-            f"{path}: not a whole ULog file ({type(error).__name__}: {str(error)[:200]}); take the log off the "
+            f"{path}: not a complete ULog file ({type(error).__name__}: {str(error)[:200]}); take the log off the "
             "card again"
         ) from error
 

@@ -57,7 +57,9 @@ def read(path: Path, options: ParameterOptions) -> Recording:
         values = {name: float(number) for name, number in _LINE.findall(text)}
         warm, bias_rad_s = _px4(values, found[1]) if found[0] == "PX4" else _ardupilot(values, found[1])
     except KeyError as error:
-        raise BadRecording(f"{path}: parameter {error.args[0]} is missing; export all of the set") from error
+        raise BadRecording(
+            f"{path}: parameter {error.args[0]} is missing; export the complete set of parameters"
+        ) from error
     except ValueError as error:
         raise BadRecording(f"{path}: {error}; correct the file") from error
     notes = f"bias over temperature of {found[0]}, gyro {found[1]}; scale factor and misalignment are not in its file"
@@ -87,7 +89,7 @@ def _kind(text: str) -> tuple[str, int] | None:
 
 def _temperatures(low: float, high: float) -> Array:
     if not (np.isfinite([low, high]).all() and high > low):
-        raise ValueError(f"TMIN {low:g} and TMAX {high:g} deg C span no range")
+        raise ValueError(f"TMIN = {low:g} deg C must be below TMAX = {high:g} deg C")
     return np.linspace(low, high, NODES)
 
 

@@ -123,7 +123,7 @@ def _of_axis(summary: Summary, axis: str, known: list[tuple[str, Response]]) -> 
 
 
 def _sign(where: str, gain: float, do: str) -> Finding:
-    said = f"the output falls when the table turns faster: gain {gain:.3g}"
+    said = f"the output decreases when the table turns faster: gain {gain:.3g} (output rate divided by table rate)"
     return Finding("sign", "certain", where, said, gain, "1", "a gain near 1", do)
 
 
@@ -143,7 +143,10 @@ def _size(summary: Summary, axis: str, signed: list[tuple[str, float, Response]]
         return
     where = f"axis {axis}" if len(signed) == 1 else f"axis {axis}, position {position}"
     if size < max(SIGNIFICANT * one.u, 1e-9):
-        said = f"the output does not follow the table: gain {gain:.3g} with u = {one.u:.2g}"
+        said = (
+            f"the output does not follow the table: gain {gain:.3g} (output rate divided by table rate), u = "
+            f"{one.u:.2g}"
+        )
         do = "check that the table turned, that this axis is along it, and which column is the output"
         yield Finding("no_response", "certain", where, said, gain, "1", EXPECTED, do)
         return
@@ -151,7 +154,7 @@ def _size(summary: Summary, axis: str, signed: list[tuple[str, float, Response]]
     right = f"with [output.{axis}] scale = {output.scale * gain:.6g} the gain is 1"
     cause = next((f.cause for f in FACTORS if abs(size / f.gain - 1) < NEAR_FACTOR), None)
     if cause is not None:
-        said = f"gain {gain:.4g} is near {cause}"
+        said = f"the gain (output rate divided by table rate) is {gain:.4g}, near {cause}"
         yield Finding(
             "unit", "certain", where, said, gain, "1", EXPECTED, f"correct the unit in recording.toml; {right}"
         )

@@ -42,7 +42,8 @@ def check_reference(summary: Summary) -> list[Finding]:
     return [
         Finding(
             "table_rate_ratio", "likely", "column table_rate_dps",
-            f"table_rate_ratio: by its logged angle the table turns faster than that by {each}", worst_ppm, "ppm",
+            f"table_rate_ratio: the logged table angle shows a rate that is larger than the commanded rate by "
+            f"{each}", worst_ppm, "ppm",
             f"the same rate within {NO_PPM:g} ppm or {COVERAGE:g} u",
             "make the rate of the angle the reference (reference = \"measured\" in the bench file): the output of a "
             "gyro does not tell this from its scale factor, which contains it",

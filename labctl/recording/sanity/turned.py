@@ -120,11 +120,11 @@ def turn_in_words(off: OffTurn) -> str:
     """Return what came out of a turn, in words."""
     came = round(off.came_deg)
     only = "only " if 0 <= off.came_deg / off.said_deg < 1 else ""
-    return f"{only}{came:d} deg came out of {off.said_deg:g}"
+    return f"the integral of the output is {only}{came:d} deg instead of {off.said_deg:g} deg"
 
 
 def what_to_do(off: OffTurn) -> str:
     """Return what to do about a turn that came out otherwise."""
     if off.came_deg * off.said_deg < 0:
         return "correct the sign of turn_deg or of the position, or turn again"
-    return "turn again, or correct turn_deg"
+    return "repeat the turn, or correct turn_deg"

@@ -50,7 +50,7 @@ def identify(store: Store, authorization: str) -> Caller:
     row = store.keys.by_digest(digest) if scheme.lower() == SCHEME else None
     if row is None or row.revoked_at is not None or not hmac.compare_digest(row.digest, digest):
         raise NotIdentified(
-            "the key is not one in force here (unknown or revoked); send `Authorization: Bearer KEY`; "
+            "the API key is unknown or revoked; send `Authorization: Bearer KEY`; "
             "`labctl key create NAME --role ROLE` makes one"
         )
     return Caller(row.name, Role(row.role), "key")
@@ -59,10 +59,13 @@ def identify(store: Store, authorization: str) -> Caller:
 def require_role(caller: Caller, needed: Role) -> None:
     """Raise NotAllowed when a caller's role does not reach as far as an act needs."""
     if not caller.role.may(needed):
-        raise NotAllowed(f"{caller.name} is {caller.role.value}; use a key of the role {needed.value}")
+        raise NotAllowed(
+            f"key {caller.name} has the role {caller.role.value}, but this request needs the role "
+            f"{needed.value}; use a key with that role"
+        )
 
 
 def require_an_api_key(store: Store, why: str) -> None:
     """Raise BadInput when a service has to ask for keys and none is in force; `why` says what makes it ask."""
     if all(row.revoked_at is not None for row in store.keys.all()):
-        raise BadInput(f"{why}, and no key exists yet; make one first: labctl key create NAME --role operator")
+        raise BadInput(f"{why}, but no API key exists yet; make one first: labctl key create NAME --role operator")

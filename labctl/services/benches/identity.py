@@ -75,12 +75,11 @@ def _refuse_other_adapter(
     if not was or not found or was == found or section.adapter is not None:  # a named one is checked when it is opened
         return
     owner = _owner(before, ADAPTER, found)
-    swapped = f", which {owner} was on: two adapters may have changed places" if owner else ""
+    swapped = f", which {owner} was on: two adapters may be exchanged" if owner else ""
     raise Conflict(
-        f"{name}: port {section.port} is on USB adapter {found}{swapped}; in campaign {before.id} it was {was}. Give "
-        "the "
-        f"right port by its path in /dev/serial/by-id, or, if this is right, set adapter = '{found}' in its section of "
-        "the bench file"
+        f"{name}: port {section.port} is on USB adapter {found}{swapped}; in campaign {before.id} the adapter "
+        f"was {was}. Give the correct port by its path in /dev/serial/by-id, or, if the adapter was replaced, "
+        f"set adapter = '{found}' in the section of the instrument in the bench file"
     )
 
 
@@ -89,11 +88,9 @@ def _other_unit(name: str, serial: str, own: tuple[str, str], before: CampaignRo
     owner = _owner(before, OWN, found)
     swapped = f", which {owner} had: the two are exchanged" if owner and owner != name else ""
     return (
-        f"{name}: the unit says serial number {found}{swapped}; in campaign {before.id} unit {serial} said {was}. "
-        "Connect "
-        f"the right unit, give this one a `serial` of its own, or, if it is right, set own_serial = '{found}' in the "
-        "bench "
-        "file"
+        f"{name}: the unit reports serial number {found}{swapped}, but in campaign {before.id} unit {serial} "
+        f"reported {was}. Connect the right unit; or, for another unit, give it a different `serial`; or, if "
+        f"this is the right unit, set own_serial = '{found}' in the bench file"
     )
 
 

@@ -58,18 +58,18 @@ class BenchHold:
     @property
     def why_not(self) -> str:
         """Why the bench may not be driven."""
-        return self._why_lost or f"its lease could not be renewed for {STOP_S:g} s"
+        return self._why_lost or f"its reservation of the bench could not be renewed for {STOP_S:g} s"
 
     def check(self) -> None:
         """Raise BenchBusy when the bench may not be driven."""
         if not self.held:
-            raise BenchBusy(f"bench {self._bench} may not be driven from here: {self.why_not}")
+            raise BenchBusy(f"this process may not drive bench {self._bench}: {self.why_not}")
 
     def take(self) -> None:
         """Take the bench. Raises Conflict naming the holder; waits a term for one that may be dead."""
         found = self._store.leases.holder(self._bench)
         if found is not None and not self._gone(found):
-            raise Conflict(f"{described(found)}; wait until that process ends, or stop it")
+            raise Conflict(f"{described(found)}; wait until that process ends, or stop that process")
         begun_s, now = self._clock.now_s(), self._clock.utc()
         mine = LeaseRow(
             self._bench, self._owner, socket.gethostname(), this_machine(), os.getpid(), since=now,
@@ -77,7 +77,7 @@ class BenchHold:
             url=self._store.leases.address.url, calls=self._store.leases.address.calls,
         )  # fmt: skip
         if not self._store.leases.claim(mine, replacing=found):
-            raise Conflict(f"bench {self._bench}: another process has just taken it; try again")
+            raise Conflict(f"bench {self._bench}: another process has just reserved the bench; try again")
         _HELD_HERE.add(self._owner)
         self._renewed_s, self._why_lost = begun_s, ""
         log.info("lease.taken", bench=self._bench, instead_of="" if found is None else described(found))
@@ -117,7 +117,7 @@ class BenchHold:
             else:
                 self._renewed_s = None
                 found = self._store.leases.holder(self._bench)
-                self._note_loss(described(found) if found else "another process has taken its lease")
+                self._note_loss(described(found) if found else "another process has taken its reservation of the bench")
         except Exception as error:  # noqa: BLE001  the next try may do better; until then `held` counts the time
             self._note_loss(str(error) or type(error).__name__)
 
@@ -132,7 +132,7 @@ class BenchHold:
 
     def loss(self) -> str:
         """Return why the bench may no longer be driven; an empty text while it may."""
-        return "" if self.held else f"the bench may no longer be driven from here: {self.why_not}"
+        return "" if self.held else f"this process may no longer drive the bench: {self.why_not}"
 
     def keep(self) -> None:
         """Renew from now on, in a thread, until `close`."""

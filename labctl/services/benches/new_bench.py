@@ -42,7 +42,7 @@ def new_bench(
     missing or wrong.
     """
     if file.exists() and not force:
-        raise BadInput(f"{file} exists and stays as it is; give another name, or --force to replace it")
+        raise BadInput(f"{file} exists already and was not changed; give another name, or --force to replace the file")
     clock = SystemClock()
     found, lines = [], []
     for info, each in search(request.ports, request.hosts, clock):
@@ -64,7 +64,7 @@ def search(ports: Sequence[str], hosts: Sequence[str], clock: Clock) -> Iterator
     for host in hosts:
         name, _, number = host.partition(":")
         if number and not number.isdigit():
-            raise BadInput(f"--host {host}: {number!r} is no TCP port; give NAME or NAME:NUMBER")
+            raise BadInput(f"--host {host}: {number!r} is not a TCP port number; give NAME or NAME:NUMBER")
         yield None, find_on_host(name, int(number or MODBUS_PORT), clock)
 
 
@@ -76,8 +76,8 @@ def sections_of(found: Sequence[tuple[PortInfo | None, Found]]) -> list[Section]
             continue
         if each.kind != "gyro" and (other := next((one for one in made if one.kind == each.kind), None)):
             raise BadInput(
-                f"two {each.kind}s answer, at {other.found.address} and {each.address}, but a bench has only one; "
-                "name the ports of this bench with --port and --host"
+                f"two {each.kind}s answer, at {other.found.address} and {each.address}, but a bench has only "
+                f"one {each.kind}; name the ports of this bench with --port and --host"
             )
         section = Section(_name(each, made), each.kind, each, dict(each.recognised.settings))
         section.values = {"driver": each.driver, **_address(each, info), **section.values}
@@ -96,7 +96,7 @@ def complete(sections: Sequence[Section], settings: Mapping[str, object], clock:
     names = {section.name for section in sections}
     for key in settings:
         if key.rpartition(".")[0] not in names | {""}:
-            raise BadInput(f"--set {key}: there is no such section; there are {', '.join(sorted(names))}")
+            raise BadInput(f"--set {key}: the bench file has no such section; choose one of {', '.join(sorted(names))}")
     for section in sections:
         for key, value in ask_itself(section.name, section.values, clock).items():
             section.values.setdefault(key, value)
@@ -141,7 +141,7 @@ def parse_setting(text: str) -> tuple[str, object]:
     """Return SECTION.KEY and value of `SECTION.KEY=VALUE`; a value that is not TOML is a text. Raises BadInput."""
     key, equals, value = text.partition("=")
     if not equals or not key.strip():
-        raise BadInput(f"--set {text}: give SECTION.KEY=VALUE, as table.max_rate_dps=100")
+        raise BadInput(f"--set {text}: give SECTION.KEY=VALUE, such as table.max_rate_dps=100")
     try:
         return key.strip(), tomllib.loads(f"value = {value}")["value"]
     except tomllib.TOMLDecodeError:

@@ -30,7 +30,8 @@ def reference_channels(bench: Bench, bench_file: BenchFile) -> tuple[RawChannelJ
             warm = next((each for each in channels if each["unit"] == "deg C"), None)
             if warm is None:
                 raise BadInput(
-                    f"{settings.name}: is_temperature is set, and it measures none; set it for a thermometer"
+                    f"{settings.name}: is_temperature is set, but this instrument measures no temperature; set "
+                    "is_temperature for a thermometer"
                 )
             warm["stands_for"] = TEMPERATURE
         found += channels

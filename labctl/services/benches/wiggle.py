@@ -86,7 +86,7 @@ class _Test:
         for name, gyro in gyros.items():
             outputs = nominal_outputs(tuple(gyro.channels), gyro.identify().output)
             if not outputs:
-                raise BadInput(f"{name}: it has no gyro channel to compare; leave it out of the bench file")
+                raise BadInput(f"{name}: the unit has no gyro channel to compare; leave the unit out of the bench file")
             self._outputs[name] = outputs
             gyro.start()
             gyro.read_latest()
@@ -102,7 +102,10 @@ class _Test:
             mean = np.mean(rates, axis=0)
             scatter = float(np.std(rates, axis=0, ddof=1).max())
             if scatter > LEAST_DPS:
-                raise BadInput(f"{name}: it moved while it was to be at rest ({scatter:.2g} deg/s); start again")
+                raise BadInput(
+                    f"{name}: the unit moved ({scatter:.2g} deg/s) during the time in which it must "
+                    "be at rest; start again, and leave it at rest"
+                )
             self._rest[name] = AtRest(mean, scatter)
 
     def moved(self) -> list[str]:
@@ -149,18 +152,20 @@ def _rates(readings: Readings, outputs: Mapping[str, Nominal]) -> Rates:
 
 
 def _said(asked: str, found: list[str]) -> str:
-    return f"{asked} was asked for; {' and '.join(found) or 'nothing'} moved"
+    return f"unit {asked} was to be turned; {' and '.join(found) or 'nothing'} moved"
 
 
 def _unit(bench: BenchFile, name: str, found: list[str], moved: Mapping[str, list[str]]) -> WiggleUnit:
     settings = {gyro.name: gyro for gyro in bench.gyros}
     port = settings[name].port or settings[name].host or ""
     if found == [name]:
-        text = f"it is on {port}"
+        text = f"the unit is on {port}"
     elif not found:
-        text = f"nothing moved within {WITHIN_S:g} s: turn it further than a quarter turn, and check its port {port}"
+        text = (
+            f"no unit moved within {WITHIN_S:g} s: turn the unit by more than a quarter turn, and check its port {port}"
+        )
     elif len(found) > 1:
-        text = f"{' and '.join(found)} moved: turn it alone, and start again"
+        text = f"{' and '.join(found)} moved: turn only the named unit, and start again"
     else:
         (other,) = found
         there = settings[other].port or settings[other].host

@@ -25,7 +25,7 @@ def compensate_file(calibration: Path, source: Path, target: Path, outside: str)
     Raises BadCalibrationFile, BadRecording, BadInput.
     """
     if outside not in {"clamp", "refuse"}:
-        raise BadInput(f"--outside {outside!r} is not known (expected clamp or refuse)")
+        raise BadInput(f"--outside {outside!r} is not known; give clamp or refuse")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", CalibrationWarning)  # the answer says it
         compensator = Compensator.from_file(calibration, outside=outside)  # type: ignore[arg-type]

@@ -52,7 +52,7 @@ def _criticised(store: Store, row: CalibrationRecord) -> tuple[CriticismResponse
     if row.recording is None:
         return None, "the version was made without a recording", []
     if store.recordings.get(row.recording).kind == "coefficients":
-        return None, f"recording {row.recording} is a table of coefficients: no measurements to judge by", []
+        return None, f"recording {row.recording} is a table of coefficients and has no measurements to compare with", []
     try:
         return criticise_unit(store, row.serial, row.version, None, recordings=row.recordings), "", []
     except (BadInput, NotEnoughData, NotFound) as error:

@@ -66,10 +66,12 @@ def _label(budget: Budget, index: int) -> str:
 def write_figure(answer: UncertaintyResponse, target: Path) -> None:
     """Write the contributions over rate and over temperature, one panel for each axis. Raises BadInput."""
     if target.suffix != ".html":
-        raise BadInput(f"{target}: a figure is written as a page; name a file that ends in .html")
+        raise BadInput(f"{target}: the figure is an HTML page; name a file that ends in .html")
     grid = answer.grid
     if grid is None:
-        raise BadInput(f"{target}: no contributions were computed; ask for the grid")
+        raise BadInput(
+            f"{target}: the contributions over rate and temperature were not computed; request them with grid = true"
+        )
     over = {
         axis: cast(ContributionsOverJson, each.model_dump(mode="json")) for axis, each in grid.contributions.items()
     }

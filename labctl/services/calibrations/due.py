@@ -49,8 +49,8 @@ def _of_environment() -> int | None:
         return None
     if not (text.isascii() and text.isdecimal() and 0 < int(text) <= MOST_DAYS):
         raise BadInput(
-            f"${config.DUE_VARIABLE} = {text[:40]!r}: give the days between two calibrations as a whole number from 1 "
-            f"to {MOST_DAYS}, or unset it"
+            f"${config.DUE_VARIABLE} = {text[:40]!r}: give the days between two calibrations as a whole number "
+            f"from 1 to {MOST_DAYS}, or unset the variable"
         )
     return int(text)
 
@@ -59,5 +59,7 @@ def span(text: str) -> timedelta:
     """Return the span of time in "30d", "12h" or "2w". Raises BadInput."""
     found = _SPAN.fullmatch(text.strip())
     if found is None:
-        raise BadInput(f"due_within {text[:40]!r}: give a whole number with h, d or w for hours, days, weeks: 30d")
+        raise BadInput(
+            f"due_within {text[:40]!r}: give a whole number and h, d or w for hours, days or weeks, such as 30d"
+        )
     return timedelta(days=int(found[1]) * _UNITS[found[2]])

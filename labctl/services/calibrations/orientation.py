@@ -72,7 +72,10 @@ def orientation_of_recording(
     """
     row = store.recordings.get(recording)
     if row.kind != "samples":
-        raise BadInput(f"recording {recording} holds {row.kind}: an angle needs single readings; name one of readings")
+        raise BadInput(
+            f"recording {recording} holds {row.kind}, but an angle is integrated from single "
+            "readings; name a recording of readings"
+        )
     info = RecordingInfo.model_validate(row.info)
     parts = [columns for _, columns in store.recordings.iter_datasets(recording)]
     columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]} if parts else {}
@@ -94,7 +97,10 @@ def orientation_of_file(
     if target is not None and (target.suffix not in TABLES or target.resolve() == source.resolve()):
         raise BadInput(f"{target}: name a result file other than the input, ending in .csv or .parquet")
     if source.suffix not in TABLES:
-        raise BadInput(f"{source}: give a table, .csv or .parquet; import anything else, then name the unit")
+        raise BadInput(
+            f"{source}: the file must be a .csv or .parquet table; import any other file with "
+            "`labctl import`, then give the serial number of its unit"
+        )
     known = None if calibration is None else read_calibration(calibration)
     columns = read_table(source)
     answer, angle = _follow(_Source(str(source), columns, {}), known, options)
@@ -176,8 +182,8 @@ def _rows(source: _Source, axis: str, t_s: Array, rate: Array, warm_up_s: float)
     warm = rows[t_s[rows] - t_s[rows[0]] >= warm_up_s]
     if len(warm) == 0:
         raise NotEnoughData(
-            f"{source.what}: its readings last {t_s[rows[-1]] - t_s[rows[0]]:.0f} s, and the warm-up is "
-            f"{warm_up_s:g} s; give a shorter one, or record for longer"
+            f"{source.what}: its readings last {t_s[rows[-1]] - t_s[rows[0]]:.0f} s, but the warm-up to leave "
+            f"out is {warm_up_s:g} s; give a shorter warm-up, or record for longer"
         )
     return warm, len(t_s) - len(rows)
 
@@ -188,7 +194,8 @@ def _declared(t_s: Array, options: OrientationOptions) -> list[bool | None]:
         return [None if options.standstill else False] * len(t_s)
     if not options.stop_every_s > 2 * STOP_S:
         raise BadInput(
-            f"stops every {options.stop_every_s:g} s: a stop lasts {STOP_S:g} s; take more than {2 * STOP_S:g} s"
+            f"a stop every {options.stop_every_s:g} s is too often: a stop lasts {STOP_S:g} s; give more than "
+            f"{2 * STOP_S:g} s"
         )
     return [bool(since % options.stop_every_s < STOP_S) for since in (t_s - t_s[0]).tolist()] if len(t_s) else []
 
@@ -211,7 +218,9 @@ def _axis(source: _Source, asked: str | None) -> str:
         return there[0]
     if asked is None or asked not in there:
         said = ", ".join(there) or "none"
-        raise BadInput(f"{source.what}: axis {asked or 'not named'}; name one that it has a column gyro_ of ({said})")
+        raise BadInput(
+            f"{source.what}: axis {asked or 'not named'}; name an axis that the data have a column for ({said})"
+        )
     return asked
 
 
@@ -221,7 +230,9 @@ def _rate_dps(source: _Source, axis: str, calibration: Calibration | None) -> tu
         unit = source.units.get(axis, OutputUnit())
         return (_column(source, f"gyro_{axis}") - unit.offset) / unit.scale, ""
     if axis not in calibration.axes:
-        raise BadInput(f"{source.what}: the calibration has axes {', '.join(calibration.axes)}, not {axis}; name one")
+        raise BadInput(
+            f"{source.what}: the calibration has axes {', '.join(calibration.axes)}, not {axis}; name one of these axes"
+        )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", CalibrationWarning)  # the answer says it
         compensator = Compensator(calibration)

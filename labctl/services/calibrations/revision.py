@@ -151,7 +151,7 @@ def _refuse_what_changes_nothing(
             raise BadInput(f"effect {term.effect!r} is both added and removed; give one of the two")
         if term.effect in fixed and term == Term(term.effect):
             raise BadInput(
-                f"effect {term.effect!r} is in version {version} already; add another one (it has "
+                f"effect {term.effect!r} is in version {version} already; add another effect (the version has "
                 f"{', '.join(model.effect_ids)})"
             )
 
@@ -182,7 +182,7 @@ def _terms(texts: Sequence[str]) -> list[Term]:
     counts = Counter(term.effect for term in terms)
     repeated = next((effect for effect, count in counts.items() if count > 1), None)
     if repeated is not None:
-        raise BadInput(f"effect {repeated!r} is given {counts[repeated]} times in one change; give it once")
+        raise BadInput(f"effect {repeated!r} is given {counts[repeated]} times in one change; give each effect once")
     return terms
 
 

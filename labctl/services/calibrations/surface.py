@@ -78,9 +78,9 @@ def _held(store: Store, row: CalibrationRecord, calibration: Calibration) -> dic
     columns = store.recordings.points(row.recording).columns if row.recording is not None else {}
     if lacking := [name for name in needs if name not in columns]:
         raise BadInput(
-            f"{calibration.serial} version {calibration.version}: its model also needs {', '.join(lacking)}, and its "
-            "recording does not say at which value; a surface over rate and temperature alone is not defined; use a "
-            "version without these"
+            f"{calibration.serial} version {calibration.version}: its model also needs {', '.join(lacking)}, "
+            "which its recording does not contain, so a surface over rate and temperature alone is not "
+            "defined; use a version whose model does not need them"
         )
     return {name: float(np.mean(np.asarray(columns[name], dtype=np.float64))) for name in needs}
 

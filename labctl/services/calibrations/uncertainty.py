@@ -123,7 +123,7 @@ class _Known:
 
     fitted: FittedModel
     evidence: Mapping[str, AxisEvidence]
-    bench: BenchConditions | None  #: None: an older labctl made the version
+    bench: BenchConditions | None  #: None: an older version of labctl made the version
     name: str
 
     @staticmethod

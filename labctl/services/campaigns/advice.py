@@ -80,7 +80,7 @@ FAILURES: tuple[Failure, ...] = (
         f"Check that the chamber heats and cools and that its door is closed, {RESUME}.",
     ),
     Failure(
-        r"set point .* read back",
+        r"set point .* (?:read back|was written, but)",
         "The chamber did not accept the set point that labctl sent.",
         f"Check the controller's panel for a profile, a lock or a limit, {RESUME}.",
     ),
@@ -95,7 +95,7 @@ FAILURES: tuple[Failure, ...] = (
         f"Let chamber and unit return to room temperature, find out why the limit was passed, {RESUME}.",
     ),
     Failure(
-        r"the air left its set point|is off the air's",
+        r"the air left its set point|is off the air's|differs from the air",
         "The temperature was not steady while readings were taken.",
         f"Check the chamber's door, air flow and controller, {RESUME}.",
     ),
@@ -110,20 +110,24 @@ FAILURES: tuple[Failure, ...] = (
         LOOK,
     ),
     Failure(
-        r"readings lost or damaged|readings marked bad|not one of about|the counter on .* stands at",
+        r"readings lost or damaged|readings marked bad|not one of about|none of about|the (?:sample "
+        r")?counter on .* stands at",
         "The readings of a unit were missing, damaged or marked bad.",
         f"Check the unit's power, cable and baud rate, {RESUME}.",
     ),
     Failure(
-        r"nothing heard|no answer|gave no answer|no intact |no whole line|does not answer|link .* broke|"
+        r"nothing heard|no answer|gave no (?:complete )?answer|no intact |no whole line|no complete "
+        r"line|does not answer|link .* broke|"
         r"cannot be opened|no Modbus TCP|reply belongs to another request|not reached again|"
-        r"link is gone|came that are no reply|answered instead of unit|reply to request|line was never silent|"
-        r"no Modbus instrument|, no Modbus;",
+        r"link is gone|the link (?:.* )?was lost|(?:came|arrived) that are no|answered instead of "
+        r"unit|reply to request|line was never silent|"
+        r"no Modbus instrument|not a Modbus instrument|, no Modbus;|instead of a Modbus reply",
         "An instrument did not answer.",
         f"Check the instrument's power and cable, run `labctl bench check`, {RESUME}.",
     ),
     Failure(
-        r"check address and driver|not a C4|, serial |is set otherwise|readings/s on |has serial number|on USB adapter",
+        r"check (?:the )?address(?: and|, or the) driver|not a C4|not the answer of a C4|, serial |is set otherwise|"
+        r"is not configured as|readings/s on |has serial number|on USB adapter",
         "The instrument that answered is not the instrument in the bench file.",
         f"Compare the bench file with the bench, {RESUME}.",
     ),

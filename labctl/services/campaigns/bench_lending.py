@@ -51,7 +51,7 @@ class BenchLending:
     def stop(self, table: RateTable, clock: Clock, within_s: float) -> str | None:
         """Stop the table once the bench is lent; returns what could not be confirmed, None when it stands."""
         if not self._lock.acquire(timeout=within_s):
-            return "the engine did not release the bench"
+            return "the running campaign did not release the bench in time; try again"
         try:
             return stop_table(table, clock)
         finally:

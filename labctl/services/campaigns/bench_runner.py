@@ -135,10 +135,13 @@ class BenchRunner:
 
     def _refuse_unless_free(self) -> None:
         if self._stops:
-            raise BenchBusy(f"bench {self._bench.name}: {STOPS} and starts no campaign any more; start it again first")
+            raise BenchBusy(
+                f"bench {self._bench.name}: {STOPS} and starts no more campaigns; start the service again first"
+            )
         if self._job is not None:
             raise BenchBusy(
-                f"bench {self._bench.name} runs campaign {self._job.row.id} now; wait for its end or abort it"
+                f"bench {self._bench.name} runs campaign {self._job.row.id} now; wait for the end of that "
+                "campaign, or abort it"
             )
         self._recovery.record_end()
         if self._hold is not None:
@@ -205,7 +208,8 @@ class BenchRunner:
         operator = self._running(campaign).prepared.operator
         if not isinstance(operator, HumanOperator):
             raise StalePrompt(
-                f"question {request.prompt!r} was not asked: this bench turns its units itself; send no answer"
+                f"question {request.prompt!r} does not exist: this bench turns its units without a person; send "
+                "no answer"
             )
         operator.reply(Answer(request.prompt, request.confirmed, request.by, request.reason, request.again))
         return self.status(campaign) or campaign_status(self._store, campaign)
@@ -216,7 +220,8 @@ class BenchRunner:
         if job is None or job.row.id != campaign or over:
             state = self._store.campaigns.get(campaign).state
             raise Conflict(
-                f"campaign {campaign} does not run on bench {self._bench.name} now, it is {state}; check its number"
+                f"campaign {campaign} does not run on bench {self._bench.name} now (its state: {state}); check "
+                "the number of the campaign"
             )
         return job
 

@@ -109,7 +109,7 @@ def _unwritten(store: Store, campaign: int, bench: str, engine: Engine, error: S
         ended, marked = store.campaigns.get(campaign).state in ENDED, store.benches.unconfirmed(bench)
     left = describe_safe_state(bench, complaints)
     if complaints and not marked:  # nothing that `labctl bench clear` could take back
-        left = f"bench {bench} is NOT confirmed safe, and that could not be recorded: {complaints}; inspect it"
+        left = f"bench {bench} is NOT confirmed safe, and that could not be recorded: {complaints}; inspect the bench"
     elif not complaints and not ended:
         left += ", but that could not be recorded"
     again = "there is free space again" if isinstance(error, DiskFull) else "the database can be written again"
@@ -152,7 +152,10 @@ def run_here(
         SafeStateRetry(store, bench_file, lambda: clock).attempt()
         for text in _left_on(store, bench_file):
             if not bench_file.is_simulated:
-                raise Conflict(f"bench {bench_file.name}: {text}; inspect and clear it before a campaign starts")
+                raise Conflict(
+                    f"bench {bench_file.name}: {text}; inspect the bench, then run `labctl bench "
+                    "clear` before a campaign starts"
+                )
             if say is not None:
                 say(text)
         refuse_unconfirmed(store, bench_file.name)

@@ -73,8 +73,8 @@ def _runnable(recipe: Recipe, *, fit: bool) -> Recipe:
     """
     if recipe.profiles:
         raise BadInput(
-            f"recipe {recipe.name}: its {len(recipe.profiles)} [[profiles]] can be simulated only (`labctl simulate`): "
-            "no driver runs a table along a course of rates; leave them out"
+            f"recipe {recipe.name}: its {len(recipe.profiles)} [[profiles]] can only be simulated (`labctl "
+            "simulate`), because no table driver can follow a rate profile; leave them out"
         )
     return recipe if fit else recipe.model_copy(update={"fit": None})
 
@@ -88,9 +88,8 @@ def refuse_unconfirmed(store: Store, bench: str) -> None:
         raise Conflict(describe_bench(row))
     tried = f" (tried again {row.attempts} times)" if row.attempts else ""
     raise Conflict(
-        f"bench {bench} was not confirmed safe{tried}: {row.unconfirmed}. Inspect it, then `labctl bench clear  "
-        f"{bench} "
-        "--by NAME`"
+        f"bench {bench} was not confirmed safe{tried}: {row.unconfirmed}. Inspect the bench, then run `labctl "
+        f"bench clear {bench} --by NAME`"
     )
 
 

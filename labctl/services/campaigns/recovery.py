@@ -32,7 +32,7 @@ def describe_recovery(store: Store, bench: str) -> str:
         return f"{text} and is not resumed: bench {bench} was not confirmed safe, and has not been checked since"
     if why_not := retries_exhausted(store.resume_points.of_campaign(row.id)):
         return f"{text} and is not resumed: {why_not}"
-    return f"{text} and is resumed now, safe state first"
+    return f"{text}; labctl sets the safe state and then resumes the campaign"
 
 
 def secure_bench(store: Store, bench_file: BenchFile, clock: Clock) -> None:
@@ -90,8 +90,8 @@ class CampaignRecovery:
             return
         at = self._make_clock().utc()
         text = (
-            f"campaign {unwritten.campaign} ended while nothing could be written; whether the bench is safe is not "
-            "known"
+            f"campaign {unwritten.campaign} ended while the database could not be written; it is not known "
+            "whether the bench is safe: inspect the bench"
         )
         self._store.benches.mark(self._bench.name, text, at)
         if self._store.campaigns.get(unwritten.campaign).state not in ENDED:

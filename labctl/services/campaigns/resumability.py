@@ -11,14 +11,16 @@ from procedures.contracts.campaign_state import CampaignState
 
 #: A campaign that was resumed so often without finishing a step needs a person.
 MAX_RESUMES = 5
-NO_BENCH = "this service has no bench; a service on the campaign's bench or `labctl campaign resume` resumes it"
+NO_BENCH = "this service has no bench; start a service on the bench of the campaign, or run `labctl campaign resume`"
 
 
 def retries_exhausted(standing: ResumePoint) -> str | None:
     """Return why a campaign is not resumed automatically any more, or None."""
     if standing.tries < MAX_RESUMES:
         return None
-    return f"resumed {standing.tries} times without finishing a step; inspect the bench, then `labctl campaign resume`"
+    return (
+        f"resumed {standing.tries} times without finishing a step; inspect the bench, then run `labctl campaign resume`"
+    )
 
 
 def _nothing() -> None:
@@ -57,9 +59,9 @@ def _refusal(store: Store, answer: CampaignResponse, bench: BenchFile | None, ru
     """Return why a resume would be refused, empty when it would not."""
     name = answer.bench if bench is None else bench.name
     if bench is not None and {gyro.serial for gyro in bench.gyros} != set(answer.recordings):
-        return f"bench {name} has other units than the campaign measures"
+        return f"bench {name} has other units than those that the campaign measures; name the bench of the campaign"
     if running not in {None, answer.id}:  # its own end is being written: by the time of a resume it is over
-        return f"campaign {running} runs on bench {name} now; wait for its end or abort it"
+        return f"campaign {running} runs on bench {name} now; wait for the end of that campaign, or abort it"
     if text := store.benches.unconfirmed(name):
         return f"the safe state of bench {name} is not confirmed ({text}); inspect the bench first"
     return ""

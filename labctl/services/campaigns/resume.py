@@ -49,7 +49,7 @@ def plan_of(store: Store, row: CampaignRow) -> Plan:
 def with_original_simulation(row: CampaignRow, bench_file: BenchFile) -> BenchFile:
     """Return a simulated bench with the simulation that a campaign was begun in: the same units, on the same day.
 
-    A real bench is what it is. Raises Conflict for a simulation that this labctl does not know any more.
+    A real bench is what it is. Raises Conflict for a simulation that this version of labctl does not know any more.
     """
     was = row.bench.get("simulation")
     if not bench_file.is_simulated or was is None:
@@ -59,8 +59,8 @@ def with_original_simulation(row: CampaignRow, bench_file: BenchFile) -> BenchFi
     except ValidationError as error:
         first = error.errors()[0]
         raise Conflict(
-            f"campaign {row.id} was simulated by another labctl: simulation.{'.'.join(map(str, first['loc']))}: "
-            f"{first['msg']}; abort it, and start a new one"
+            f"campaign {row.id} was simulated by another version of labctl, whose settings are not valid here: "
+            f"simulation.{'.'.join(map(str, first['loc']))}: {first['msg']}; abort the campaign, and start a new one"
         ) from error
 
 
@@ -93,7 +93,7 @@ def prepare_resume(
     t_s = max(standing.last_t_s, (clock.utc() - row.started_at).total_seconds() if row.started_at else 0.0)
     gap_s = t_s - standing.last_t_s
     added = standing.added_runs + int(new_session)
-    power = "the power failed meanwhile" if lost else "the units stayed on"
+    power = "the power failed during the interruption" if lost else "the units stayed on"
     changed = _other_drivers(row, bench_file)
     reason = f"resumed by {request.by} after {gap_s:.0f} s without supervision; {power}{changed}"
     bench = opened or open_bench(bench_file, clock)
@@ -144,8 +144,8 @@ def _same_units(row: CampaignRow, bench_file: BenchFile) -> BenchFile:
     here = {gyro.serial for gyro in bench_file.gyros}
     if set(row.recordings) != here:
         raise Conflict(
-            f"campaign {row.id} measures {', '.join(sorted(row.recordings))}, bench {bench_file.name} carries "
-            f"{', '.join(sorted(here))}; name the campaign's own bench with --bench"
+            f"campaign {row.id} measures the units {', '.join(sorted(row.recordings))}, but bench "
+            f"{bench_file.name} has the units {', '.join(sorted(here))}; name the bench of the campaign with --bench"
         )
     return pinned(with_drivers(bench_file), reported_in(row))
 

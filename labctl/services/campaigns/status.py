@@ -158,12 +158,12 @@ def how_far(answer: CampaignResponse) -> str:
 def describe_interrupted(answer: CampaignResponse) -> str:
     """Say that a campaign was left, and what a person can do about it."""
     resumes, ends = f"`labctl campaign resume {answer.id}`", f"`labctl campaign abort {answer.id}`"
-    return f"{how_far(answer)}; {resumes} resumes it, {ends} ends it"
+    return f"{how_far(answer)}; {resumes} resumes the campaign, {ends} ends it"
 
 
 def outlives_its_process(row: CampaignRow) -> bool:
     """Return whether a campaign's bench is still there, as it was, when the process that drove it is gone."""
-    # the simulation may be another labctl's, whose settings are not known any more
+    # the simulation may be that of another version of labctl, whose settings are not known any more
     return not BenchFile.model_validate({**row.bench, "simulation": None}).is_simulated
 
 
@@ -172,11 +172,10 @@ def mark_abandoned(answer: CampaignResponse, *, attended: bool) -> CampaignRespo
     if answer.state in ENDED or attended:
         return answer
     left_safe = answer.state is CampaignState.INTERRUPTED
-    why = answer.reason if left_safe else "no process runs it any more: inspect the bench"
+    why = answer.reason if left_safe else "no process runs the campaign any more: inspect the bench"
     reason = (
-        f"{why}; `labctl campaign resume` or a service on its bench resumes it where it stopped, `labctl campaign "
-        "abort` "
-        "ends it"
+        f"{why}; `labctl campaign resume` or a service on its bench resumes the campaign where it stopped, "
+        "`labctl campaign abort` ends it"
     )
     return answer.model_copy(update={"reason": reason, "abandoned": True, "active": False})
 

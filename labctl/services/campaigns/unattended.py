@@ -28,7 +28,10 @@ def abort_abandoned(store: Store, campaign: int, reason: str, at: datetime) -> C
             f"campaign {campaign} has already ended ({answer.state}); start a new one, or resume it if it failed"
         )
     if not store.is_sole_writer and (driver := driver_of(store, answer.bench, at)) is not None:
-        raise Conflict(f"campaign {campaign} may be running: {described(driver)}; abort it there. Nothing was changed")
+        raise Conflict(
+            f"campaign {campaign} may still be running: {described(driver)}. Nothing was changed; "
+            "abort the campaign at that process"
+        )
     record_action(store, at, "abort", campaign, reason)
     row = store.campaigns.get(campaign)
     said = f"left unfinished; {reason}"

@@ -22,8 +22,9 @@ def conformity(ordered: OrderedConformity, left: StateOfItem, results: tuple[Res
     acceptance = ordered.limit_dps - band
     if acceptance <= 0:
         raise NoAcceptance(
-            f"conformity to {ordered.specification}: the guard band, U = {expanded:.3g} deg/s, reaches the limit, "
-            f'{ordered.limit_dps:g} deg/s; measure with a smaller uncertainty, or agree on rule = "simple"'
+            f"conformity to {ordered.specification}: the guard band, U = {expanded:.3g} deg/s, is not smaller than the "
+            f"limit, {ordered.limit_dps:g} deg/s; measure with a smaller uncertainty, or agree with the customer on "
+            'rule = "simple"'
         )
     passed = largest <= acceptance
     rule = "guard band w = U" if ordered.rule == "guard-band" else "simple acceptance, no guard band (w = 0)"

@@ -59,8 +59,8 @@ def _unchanged(kept: CertificateRow, request: CertificateRequest) -> Certificate
     if given and given != kept.order:
         other = ", ".join(sorted(name for name in {*given, *kept.order} if given.get(name) != kept.order.get(name)))
         raise CertificateRefused(
-            f"certificate {kept.number} of {kept.serial} version {kept.version} was issued with another {other}; "
-            "to replace it: --amend REASON (amend)"
+            f"certificate {kept.number} of {kept.serial} version {kept.version} was issued with another "
+            f"{other}; to replace that certificate, give the reason with --amend REASON (over HTTP: `amend`)"
         )
     return kept
 
@@ -72,8 +72,8 @@ def refuse(facts: Facts, found: Found) -> None:
     act = facts.authorised
     if act is not None and act.act == "revoke":
         raise CertificateRefused(
-            f"{facts.what} was revoked at {act.at:%Y-%m-%d %H:%M} UTC by {act.by} ({act.reason}); certify a version "
-            "that holds, and issue its certificate"
+            f"{facts.what} was revoked at {act.at:%Y-%m-%d %H:%M} UTC by {act.by} ({act.reason}); certify "
+            "another version, and issue the certificate of that version"
         )
     _refuse_dates(facts)
 
@@ -91,8 +91,8 @@ def _refuse_dates(facts: Facts) -> None:
     if bad := [each for each in facts.standards if _off(each, first, last)]:
         said = "; ".join(f"{each.label}: calibrated {each.calibrated or 'not stated'}, due {each.due}" for each in bad)
         raise CertificateRefused(
-            f"no certificate of {facts.what}: measured from {first} to {last} with a reference standard outside its "
-            f"dates. {said}. Have it calibrated and measure again"
+            f"no certificate of {facts.what}: measured from {first} to {last}, when the calibration of a "
+            f"reference standard was not valid ({said}). Have the standard calibrated, and measure again"
         )
 
 

@@ -160,7 +160,7 @@ def uncorrected(measured: Measurements, axes: tuple[str, ...]) -> StateOfItem:
     """Return the errors of the output by its nominal scale, nothing subtracted."""
     data = fit_data_of(measured.points)
     errors = {axis: np.asarray(data.outputs[axis] - data.true_rate_dps(axis), dtype=np.float64) for axis in axes}
-    return _state("the output by its nominal scale, without correction", errors)
+    return _state("the output converted with its nominal scale factor, without correction", errors)
 
 
 def corrected(measured: Measurements, calibration: Calibration, basis: str) -> StateOfItem:

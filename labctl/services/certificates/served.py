@@ -29,7 +29,7 @@ def format_of(name: str) -> CertificateFormat:
     for known in get_args(CertificateFormat):
         if name.lower().removeprefix(".") == known:
             return known
-    raise BadInput(f"{name!r} is no format of a certificate; give pdf, xml or json")
+    raise BadInput(f"{name!r} is not a format of a certificate; give pdf, xml or json")
 
 
 def certificate_file(

@@ -82,7 +82,8 @@ class ForegroundControl:
         for option, value in (("--speed", asked.speed), ("--seed", asked.seed)):
             if value is not None:
                 raise BadInput(
-                    f"{option} {value}: the service that runs a scheduled start sets it; leave the option out"
+                    f"{option} {value}: only the service that runs scheduled starts sets this option; leave the "
+                    "option out"
                 )
         bench = load_bench(asked.bench or bench_for(load_recipe(asked.body.recipe)))
         answer = queue.add_start(context.store, asked.body, bench, context.now())

@@ -72,7 +72,7 @@ class ServiceControl:
             return abort_abandoned(context.store, asked.campaign, reason, context.now())
         answer = runner.abort(asked.campaign, reason)
         if missing := self._recorded(context, asked.campaign, reason, runner.safe_within_s):
-            text = f"it was aborted, but that is not in the audit trail{missing}"
+            text = f"the campaign was aborted, but that is not in the audit trail{missing}"
             return answer.model_copy(update={"unrecorded": text})
         return answer
 
@@ -105,7 +105,10 @@ class ServiceControl:
         """Check this service's bench. Raises NotFound for another one, BenchBusy while a campaign runs."""
         runner = self._bench_runner()
         if asked.bench != runner.bench.name:
-            raise NotFound(f"this service drives bench {runner.bench.name}, not {asked.bench!r}; check that one")
+            raise NotFound(
+                f"this service drives bench {runner.bench.name}, not {asked.bench!r}, and can check "
+                f"only its own bench; name bench {runner.bench.name}"
+            )
         found = runner.check()
         context.store.audit.record(context.now(), "bench check", f"bench {found.bench}", {"ok": found.ok})
         return found

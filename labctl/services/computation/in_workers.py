@@ -116,8 +116,7 @@ class InWorkers(Pool):
             if not ready:
                 raise ComputationEnded(
                     f"the computation was ended after {self.limits.deadline_s:g} s, the limit of one computation; "
-                    "send less at a time:"
-                    " a recording of fewer data sets, or fewer effects that compete"
+                    "request less at a time: a recording with fewer data sets, or fewer effects to compare"
                 )
             try:
                 message = receiving.recv() if receiving.poll() else None
@@ -132,7 +131,7 @@ class InWorkers(Pool):
     def _died(self, job: Job, worker: ForkServerProcess) -> Exception:
         """Return the error of a worker that ended without a result."""
         if job.is_abandoned:
-            return Cancelled("its clients have left")
+            return Cancelled("its clients have disconnected")
         if self._closed:
             return ComputationEnded(ENDS)
         with _processes:
@@ -161,5 +160,5 @@ def _end_in_words(code: int | None) -> str:
     if code is None or code >= 0:
         return f"ended (status {code})"
     name = signal.Signals(-code).name if -code in set(signal.Signals) else f"signal {-code}"
-    short = ", as the system does where memory is short" if -code == signal.SIGKILL else ""
+    short = ", as the operating system does when memory is short" if -code == signal.SIGKILL else ""
     return f"was killed ({name}{short})"

@@ -94,9 +94,8 @@ class Pool(ABC):
         if len(self._waiting) >= self.limits.waiting:
             wait_s = self._retry_after_s()
             raise TooBusy(
-                f"{len(self._attended)} computations run and {len(self._waiting)} wait, the limit of this service; "
-                "try again in about"
-                f" {wait_s} s",
+                f"{len(self._attended)} computations are running and {len(self._waiting)} are waiting, which is "
+                f"the limit of this service; try again in about {wait_s} s",
                 retry_after_s=wait_s,
             )
         self._waiting.append(job)

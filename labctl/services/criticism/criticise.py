@@ -75,6 +75,7 @@ def write_next(answer: CriticismResponse, path: Path) -> None:
     """Write the best next experiment as a recipe that a campaign can be started from. Raises BadInput without one."""
     if not answer.experiments:
         raise BadInput(
-            f"{path}: there is no experiment to write, since the verdict is {answer.verdict!r}; leave --next out"
+            f"{path}: the verdict is {answer.verdict!r}, so no further experiment is needed and no recipe was "
+            "written; leave --next out"
         )
     path.write_text(answer.experiments[0]["toml"], encoding="utf-8")

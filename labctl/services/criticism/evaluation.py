@@ -83,7 +83,8 @@ def model_of(row: CalibrationRecord) -> ErrorModel:
     record = row.answer["model"]
     if "terms" not in record:
         raise BadInput(
-            f"version {row.version} was made by an older labctl; fit the recording again, then criticise the new "
+            f"version {row.version} was made by an older version of labctl; fit the recording "
+            "again, then criticise the new "
             "version"
         )
     return ErrorModel.from_dict(record)

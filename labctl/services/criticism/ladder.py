@@ -31,8 +31,8 @@ def ladder(store: Store, serial: str, recording: int | None = None) -> LadderRes
         fitted = sorted({row.recording for row in rows if row.recording is not None})
         raise BadInput(
             f"no version of {serial} was fitted to recording {recording} (the unit's versions were fitted to "
-            f"recordings {', '.join(map(str, fitted)) or 'none'}); `labctl fit {serial} --recording {recording}` "
-            "makes one"
+            f"recordings {', '.join(map(str, fitted)) or 'none'}); `labctl fit {serial} --recording "
+            f"{recording}` makes a version"
         )
     steps = [_step(row) for row in _by_parentage(here)]
     newest = max(steps, key=lambda step: step.version)

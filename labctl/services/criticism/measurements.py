@@ -122,8 +122,8 @@ def load_reduced_readings(store: Store, row: RecordingRow, points: Recording, de
     """
     if row.kind == "coefficients":
         raise BadInput(
-            f"recording {row.id} is a table of coefficients: a model is compared with readings or means; name a "
-            "recording of these"
+            f"recording {row.id} is a table of coefficients, but a model is compared with measurements; name a "
+            "recording of readings or means"
         )
     if row.kind == "samples":
         refuse_poses(points.info)

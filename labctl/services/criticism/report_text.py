@@ -37,10 +37,9 @@ def with_warnings(answer: CriticismResponse, warnings: list[DataWarning]) -> Cri
 AT_FLOOR = 1.25
 #: Of a recording whose rates were commanded, and not measured.
 UNMEASURED = (
-    "The reference is the commanded rate of the table, not a measured one: table_rate_ratio and "
-    "scale_factor are the same column in these data, so a constant error of the table is part of the scale factor, and "
-    "no reading of the gyro can distinguish them; the angle of an encoder, an index pulse or a counted number of turns "
-    "can."
+    "The reference is the commanded rate of the table, not a measured one: a constant error of the table rate "
+    "(table_rate_ratio) therefore looks exactly like an error of the scale factor (scale_factor) and is part of "
+    "it. No reading of the gyro can distinguish the two; an encoder, an index pulse or a count of whole turns can."
 )
 #: Channels that run on while temperatures rise.
 HISTORY = frozenset({"t_s", "power_s"})
@@ -255,7 +254,7 @@ def _ambiguous(verdict: Verdict, words: list[str]) -> str:
     if len(words) > 1:
         return f"Missing: {'; and '.join(words)}; this recording cannot distinguish the effects joined by 'or'."
     if not verdict.indistinguishable:
-        return f"Something like {words[0]} is missing, but it explains only a part of the residual."
+        return f"An effect similar to {words[0]} is missing, but it explains only a part of the residual."
     names = "; ".join(map(_word, verdict.indistinguishable))
     return f"One of these effects is missing, and this recording cannot tell which: {names}."
 

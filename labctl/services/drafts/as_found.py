@@ -68,8 +68,8 @@ def drift_from(in_force: CalibrationRecord, draft: CalibrationRecord, measured: 
 def _difference(in_force: CalibrationRecord, draft: CalibrationRecord, measured: Measurements) -> dict[str, Array]:
     if motion_of(measured.row) == "poses":
         raise BadInput(
-            "in poses no data set has a rate of its own, so that corrected rates cannot be compared; compare versions "
-            "by `labctl verify`"
+            "a recording of poses has no data sets at known rates, so corrected rates cannot be compared; "
+            "compare the versions with `labctl verify`"
         )
     old, _ = applied_errors(read_calibration(in_force.document), measured.points)
     new, _ = applied_errors(read_calibration(draft.document), measured.points)

@@ -32,7 +32,8 @@ def make_drafts(store: Store, campaign: int, request: DraftsRequest, at: datetim
     row = store.campaigns.get(campaign)
     if row.state is not CampaignState.DONE:
         raise Conflict(
-            f"campaign {campaign} is {row.state}: its drafts are made when it is done; resume it, or wait for its end"
+            f"campaign {campaign} is in the state {row.state}, but its drafts (proposed calibrations) are made "
+            "when it is done; wait for its end, or resume the campaign"
         )
     asked = row.recipe.get("fit")
     if asked is not None:
@@ -45,7 +46,7 @@ def make_drafts(store: Store, campaign: int, request: DraftsRequest, at: datetim
 
 def _make(store: Store, draft: DraftRow, rules: FitRules, at: datetime) -> None:
     if why := store.drafts.dropped(draft.recording):
-        fail_draft(store, draft, rules, f"the unit took no further part in the campaign: {why}", at)
+        fail_draft(store, draft, rules, f"the unit was excluded from the campaign: {why}", at)
         return
     version = draft.version  # of a draft that was kept, and not yet reported on
     if version is None:

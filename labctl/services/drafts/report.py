@@ -17,7 +17,7 @@ from labctl.services.schemas.reports.drafts import AppliedDraft, ComparedModel, 
 from labctl.store import CalibrationRecord, Store
 from procedures.recipe.fit_rules import FitRules
 
-NOT_ASKED = "the recipe does not ask for it"
+NOT_ASKED = "the recipe does not request this comparison"
 
 
 def report_on(store: Store, draft: CalibrationRecord, recording: int, rules: FitRules) -> DraftReport:

@@ -22,7 +22,7 @@ def _sentences(serial: str, version: int, report: DraftReport) -> Iterator[str]:
     error = report.error
     heldout = "" if error.heldout_rms_dps is None else f", held-out {error.heldout_rms_dps:.3g} deg/s"
     left = "not known" if error.rms_dps is None else f"{error.rms_dps:.3g} deg/s RMS"
-    yield f"Draft: version {version} of {serial} ({report.model}), error {left}{heldout}."
+    yield f"Draft calibration: version {version} of {serial} ({report.model}), error {left}{heldout}."
     if report.verdict is not None:
         yield f"Verdict: {report.verdict}."
     if report.smallest_heldout is not None and report.smallest_heldout != report.model:
@@ -39,7 +39,7 @@ def _limits(report: DraftReport) -> Iterator[str]:
     broken = [limit_text(each) for each in report.limits if each.passed is False]
     unknown = [LIMITS[each.limit] for each in report.limits if each.passed is None]
     if broken:
-        yield f"Limits not kept: {'; '.join(broken)}."
+        yield f"Limits of the recipe that are exceeded: {'; '.join(broken)}."
     if unknown:
         yield f"Not decided, because the figure is not known: {', '.join(unknown)}."
     if report.within_limits:

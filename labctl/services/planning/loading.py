@@ -130,7 +130,8 @@ def bench_for(recipe: Recipe) -> str:
             fitting.append((not _can_do(recipe, bench), len(recorded), -bench.gyros[0].max_rate_dps, has_encoder, name))
     if not fitting:
         raise BadBench(
-            f"recipe {recipe.name}: no shipped bench records axes {sorted(axes)}; name one with --bench FILE"
+            f"recipe {recipe.name}: no bench that comes with labctl measures the axes {sorted(axes)}; name a "
+            "bench file with --bench FILE"
         )
     return min(fitting)[-1]
 

@@ -55,7 +55,10 @@ def _lacking(positions: Sequence[str], bench: BenchFile) -> str:
     """Say which axes a recipe turns that no unit of the bench records, if any; it would run, and show little."""
     recorded = {axis for gyro in bench.gyros for axis in gyro.axes}
     if lacking := sorted({position.lstrip("-") for position in positions} - recorded):
-        return f"it turns the units about {', '.join(lacking)}, an axis that no unit of bench {bench.name} measures"
+        return (
+            f"the recipe turns the units about {', '.join(lacking)}, but no unit of bench {bench.name} "
+            "measures that axis"
+        )
     return ""
 
 
@@ -73,9 +76,9 @@ def plan_steps(
     plan = make_plan(recipe, limits_of(on), clip=request.clip)
     if request.visibility and plan.expected_s > LONGEST_LOOK_S:
         raise BadInput(
-            f"visibility: the plan takes {plan.expected_s / 86_400:.0f} days; what it can detect can be computed "
-            "only for shorter plans; leave it out, or plan at most "
-            f"{LONGEST_LOOK_S / 86_400:.0f} days"
+            f"visibility: the plan takes {plan.expected_s / 86_400:.0f} days, but the effects that a plan can "
+            f"detect are computed only up to {LONGEST_LOOK_S / 86_400:.0f} days; leave visibility out, or "
+            "shorten the plan"
         )
     answer = plan_answer(plan, on, look if request.visibility else None, start)
     columns = timeline_columns([step_json(step) for step in plan.steps])

@@ -32,8 +32,8 @@ def allan_unit(store: Store, recording: int, dataset: int | None) -> AllanRespon
     info = RecordingInfo.model_validate(head.info)
     if info.motion == "poses":
         raise BadInput(
-            f"recording {recording} is in poses, turned by hand between rests, and has no Allan deviation; import one "
-            "long rest of it with motion = 'rest'"
+            f"recording {recording} is of poses (turned by hand between rests), from which no Allan deviation "
+            "can be computed; import one long rest of it with motion = 'rest'"
         )
 
     def work() -> AllanResponse:
@@ -57,7 +57,9 @@ def _of_set(recording: Recording, dataset: int) -> StaticRecord:
     valid = np.asarray(columns["valid"]) != 0 if "valid" in columns else np.ones(n, dtype=bool)
     t_s = np.asarray(columns["t_s"], dtype=np.float64)[valid]
     if len(t_s) < LEAST_READINGS:
-        raise NotEnoughData(f"data set {dataset} has {len(t_s)} valid readings; name one with {LEAST_READINGS} or more")
+        raise NotEnoughData(
+            f"data set {dataset} has {len(t_s)} valid readings; name a data set with {LEAST_READINGS} or more"
+        )
     period_s = float((t_s[-1] - t_s[0]) / (len(t_s) - 1))
     found = {str(axis): allan(recording.gyro_dps(axis)[valid], period_s) for axis in recording.info.axes}
     axes = {axis: noise for axis, noise in found.items() if noise is not None}

@@ -73,12 +73,15 @@ def _of_recording(recording: Recording, column: str | None, number: int | None) 
 def _of_table(path: Path, columns: Columns, column: str | None) -> AllanResponse:
     if "t_s" not in columns:
         raise BadRecording(
-            f"{path}: column 't_s' is missing (seconds; there are {', '.join(list(columns)[:12])}); rename the column "
+            f"{path}: column 't_s' (time, s) is missing (the columns are {', '.join(list(columns)[:12])}); "
+            "rename the column "
             "of times, or import the file with a column map"
         )
     names = [column] if column is not None else [name for name in columns if name.startswith("gyro_")]
     if not names:
-        raise BadInput(f"{path}: no column begins with gyro_; name one with --column ({', '.join(list(columns)[:12])})")
+        raise BadInput(
+            f"{path}: no column name begins with gyro_; choose a column with --column ({', '.join(list(columns)[:12])})"
+        )
     for name in names:
         _refuse_unknown(str(path), name, columns)
     found = _of_course(str(path), {name: _floats(columns[name]) for name in names}, _floats(columns["t_s"]))
@@ -90,7 +93,9 @@ def _of_course(what: str, courses: dict[str, NDArray[np.float64]], t_s: NDArray[
     steps = np.diff(t_s)
     spacing = float(np.median(steps)) if len(steps) else 0.0
     if not spacing > 0:
-        raise BadRecording(f"{what}: column 't_s' does not rise (its median step is {spacing:g} s); check the column")
+        raise BadRecording(
+            f"{what}: the times in column 't_s' do not increase (the median step is {spacing:g} s); check the column"
+        )
     edges = np.concatenate([[0], np.flatnonzero((steps <= 0) | (steps > GAP * spacing)) + 1, [len(t_s)]])
     longest = int(np.argmax(np.diff(edges)))
     rows = slice(int(edges[longest]), int(edges[longest + 1]))
@@ -106,7 +111,7 @@ def _of_course(what: str, courses: dict[str, NDArray[np.float64]], t_s: NDArray[
         if not np.all(np.isfinite(values[rows])):
             row = rows.start + int(np.argmin(np.isfinite(values[rows])))
             raise BadRecording(
-                f"{what}: column {name!r}, row {row + 1}: {values[row]} where a number is needed; leave the row out"
+                f"{what}: column {name!r}, row {row + 1}: {values[row]} is not a number; leave the row out"
             )
         if (noise := allan(values[rows], period_s)) is not None:
             axes[name] = noise
@@ -117,9 +122,9 @@ def _of_course(what: str, courses: dict[str, NDArray[np.float64]], t_s: NDArray[
 
 def _refuse_unknown(what: str, column: str, columns: Columns) -> None:
     if column not in columns:
-        raise BadInput(f"{what}: there is no column {column!r} (there are {', '.join(list(columns)[:20])})")
+        raise BadInput(f"{what}: there is no column {column!r}; choose one of {', '.join(list(columns)[:20])}")
     if np.asarray(columns[column]).dtype.kind not in "fiu":
-        raise BadInput(f"{what}: column {column!r} holds text, not numbers; name another")
+        raise BadInput(f"{what}: column {column!r} holds text, not numbers; name another column")
 
 
 def _floats(values: NDArray[np.generic]) -> NDArray[np.float64]:

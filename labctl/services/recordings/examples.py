@@ -24,7 +24,7 @@ def example(name: str) -> Path:
     """Return an example's folder; raises BadInput naming those that there are."""
     known = examples()
     if name not in known:
-        raise BadInput(f"no example {name!r} comes with labctl (there are {', '.join(known)})")
+        raise BadInput(f"no example {name!r} comes with labctl; choose one of {', '.join(known)}")
     return known[name]
 
 

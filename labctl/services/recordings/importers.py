@@ -93,12 +93,14 @@ def surest(path: Path) -> str:
         if path.is_file():
             known = ", ".join(f"{name}: {importer.title}" for name, importer in IMPORTERS.all().items())
             raise BadRecording(
-                f"{path}: no installed importer reads this file (there are {known}); install the package of one that "
-                "does, or name one with --format"
+                f"{path}: no installed importer recognises this file (installed: {known}); install the package "
+                "of an importer for it, or name an importer with --format"
             )
         return INTERCHANGE
     if len(names) > 1:
-        raise BadInput(f"{path}: {' and '.join(names)} recognise the file equally well; name one with --format")
+        raise BadInput(
+            f"{path}: the importers {' and '.join(names)} recognise the file equally well; choose one with --format"
+        )
     return names[0]
 
 
@@ -164,7 +166,7 @@ def _nothing_beside(name: str) -> BadInput:
 
 
 def _no_map(name: str) -> BadInput:
-    return BadInput(f"--map: importer {name} determines the columns itself; leave the map out")
+    return BadInput(f"--map: importer {name} determines the columns by itself; leave --map out")
 
 
 def _importer_and_options(name: str, options: Mapping[str, str]) -> tuple[Importer[Any] | TableImporter[Any], Any]:
@@ -178,7 +180,7 @@ def _importer_and_options(name: str, options: Mapping[str, str]) -> tuple[Import
         first = error.errors()[0]
         key = ".".join(map(str, first["loc"]))
         known = ", ".join(key for key in importer.options.model_fields if key != "file") or "none"
-        raise BadInput(f"importer {name}: option {key}: {first['msg']} (there are {known})") from error
+        raise BadInput(f"importer {name}: option {key}: {first['msg']} (the options are {known})") from error
 
 
 def _confidence(name: str, importer: Importer[Any] | TableImporter[Any], path: Path) -> float:
@@ -207,7 +209,7 @@ def _arrays(path: Path, columns: Mapping[str, Any], read_by: str) -> dict[str, A
     if len(shapes) != 1 or len(next(iter(shapes))) != 1 or next(iter(shapes)) == (0,):
         lengths = ", ".join(f"{name}: {'x'.join(map(str, values.shape))}" for name, values in arrays.items())
         raise BadRecording(
-            f"{path}: {read_by}: the importer returned columns of different or no length (are {lengths or 'none'}); "
-            "report this to its author"
+            f"{path}: {read_by}: the importer returned columns of different length, or none (lengths: "
+            f"{lengths or 'none'}); report this to the author of the importer"
         )
     return arrays

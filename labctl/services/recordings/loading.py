@@ -83,15 +83,17 @@ def newest_row(store: Store, serial: str, recording: int | None, *, other_unit: 
     store.units.get(serial)
     rows = store.recordings.of_unit(serial) if recording is None else [store.recordings.get(recording)]
     if not rows:
-        raise NotFound(f"unit {serial!r} has no recording; `labctl import DIR` or a campaign creates one")
+        raise NotFound(f"unit {serial!r} has no recording; `labctl import DIR` or a campaign creates a recording")
     row = next((row for row in rows if _measured(row)), rows[0])
     if row.serial != serial and not other_unit:
         raise NotFound(
-            f"recording {recording} is of unit {row.serial!r}, not of {serial!r}; name another, or give --other-unit"
+            f"recording {recording} is of unit {row.serial!r}, not of {serial!r}; name another recording, or "
+            "give --other-unit"
         )
     if not _measured(row):
         raise NotEnoughData(
-            f"recording {row.id} of unit {serial!r} holds no complete data set yet; wait for its first, or name another"
+            f"recording {row.id} of unit {serial!r} has no complete data set yet; wait for its first data set, "
+            "or name another recording"
         )
     return row
 
@@ -110,7 +112,9 @@ def chosen_rows(
             "one of the two"
         )
     if len(wanted) > MOST_TOGETHER:
-        raise BadInput(f"{len(wanted)} recordings; at most {MOST_TOGETHER} are fitted together; name fewer")
+        raise BadInput(
+            f"{len(wanted)} recordings were given, but at most {MOST_TOGETHER} can be fitted together; name fewer"
+        )
     if len(wanted) < 2:
         return (newest_row(store, serial, wanted[0] if wanted else recording, other_unit=other_unit),)
     return tuple(newest_row(store, serial, number, other_unit=other_unit) for number in wanted)

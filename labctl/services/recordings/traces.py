@@ -35,13 +35,13 @@ def trace(
         table = dict(store.recordings.points(recording).columns)
         if "t_s" not in table:
             raise BadInput(
-                f"recording {recording} holds {head.kind} without times (no column t_s), so it has no trace; show "
-                "its data sets instead"
+                f"recording {recording} holds {head.kind} without times (no column t_s), so no channel can be "
+                "shown over time; show its data sets instead"
             )
         known = courses_of(table)
         begins = ends = np.asarray(table["t_s"], dtype=np.float64).tolist()
     if known and channel not in known:
-        raise BadInput(f"recording {recording} has no channel {channel!r} (there are {', '.join(sorted(known))})")
+        raise BadInput(f"recording {recording} has no channel {channel!r}; choose one of {', '.join(sorted(known))}")
     low, high = _window(from_s, until_s, [t for t in begins if t is not None], [t for t in ends if t is not None])
     raw = True
     if head.kind != "samples":
@@ -76,7 +76,7 @@ def _window(
     low = from_s if from_s is not None else min(begins, default=None)
     high = until_s if until_s is not None else max(ends, default=None)
     if low is not None and high is not None and (low > high or (low == high and from_s is not None)):
-        raise BadInput(f"from_s = {low:g} s and until_s = {high:g} s: give a window whose start lies before its end")
+        raise BadInput(f"from_s = {low:g} s is not before until_s = {high:g} s; give a start that is before the end")
     return low, high
 
 

@@ -60,7 +60,7 @@ def import_files(
     names = [name for name, _ in files]
     for name in names:
         if name not in FILE_NAMES:
-            raise BadRecording(f"file {name!r} is not part of a recording (expected {', '.join(sorted(FILE_NAMES))})")
+            raise BadRecording(f"file {name!r} is not part of a recording; send only {', '.join(sorted(FILE_NAMES))}")
         if names.count(name) > 1:
             raise BadRecording(f"file {name!r} was sent more than once; send it once")
     with staging_folder() as folder:

@@ -102,7 +102,8 @@ def _of_surface(surface: Surface) -> list[Value]:
         "ratio": (_over(_rms(surface.raw_dps), _rms(surface.left_dps)),
                   f"larger where more of the error is smooth; {_rms(surface.left_dps):.4f} deg/s RMS are left"),
         "heldout_ratio": (_over(error.raw_rms_dps, error.heldout_rms_dps),
-                          "the paper judges the data of its fit; here each temperature is predicted by the others"),
+                          ("the paper tests the fit on its own data; here each temperature is predicted by a fit "
+                          "to the others")),
         "turn_before": (_most(before), "static bias at each temperature from the data sets at rest"),
         "turn_after": (largest_after, "the paper gives a share of the turn only"),
         "turn_after_share": (None if largest_after is None else largest_after / 3.6, "share of 360 deg"),

@@ -35,7 +35,7 @@ def surface_of(measured: Measured, axis: str) -> Surface:
     result = fit(measured.recording, "ojeda2000")
     own = np.char.lstrip(np.asarray(data.channels["position"]).astype(np.str_), "-") == axis
     if not np.any(own):
-        raise BadInput(f"axis {axis} was never turned; name another with --axis")
+        raise BadInput(f"the recording never turns axis {axis}; name another axis with --axis")
     rate, warm = data.true_rate_dps(axis)[own], data.channels.temperature_c(axis)[own]
     table = data.channels.table_rate_dps()[own]
     position = np.asarray(data.channels["position"]).astype(np.str_)[own]

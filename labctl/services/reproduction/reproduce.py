@@ -42,11 +42,12 @@ def paper_named(name: str) -> Paper:
 def check_folder(folder: Path) -> None:
     """Raise BadInput for a folder that holds anything else than reproductions, or a file in its place."""
     if folder.exists() and not folder.is_dir():
-        raise BadInput(f"{folder}: is a file; name a folder with --out")
+        raise BadInput(f"{folder}: this is a file, but a folder is needed; name a folder with --out")
     others = sorted(path.name for path in folder.iterdir() if path.name not in FILE_NAMES) if folder.is_dir() else []
     if others:
         raise BadInput(
-            f"{folder}: holds {others[0]!r}, which is no file of a reproduction; name a new folder with --out"
+            f"{folder}: the folder contains {others[0]!r}, which is not a file of an earlier reproduction; name "
+            "a new folder with --out"
         )
 
 

@@ -151,7 +151,8 @@ def _drift_in(columns: dict[str, Array], name: str, axis: str) -> Findings:
     legs = renewed.drift_between_stops_deg_per_min
     if not legs:
         raise BadInput(
-            f"{name}: no two stops lie in the readings at rest after {paper.WARM_UP_S:g} s; record for longer"
+            f"{name}: the readings at rest after the first {paper.WARM_UP_S:g} s are too short for two stops; "
+            "record for longer"
         )
     once = orientation_of_readings(
         name, columns, OrientationOptions(axis, rest_s=20.0, standstill=False, warm_up_s=paper.WARM_UP_S)

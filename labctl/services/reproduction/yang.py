@@ -54,7 +54,7 @@ def reproduce_own() -> Findings:
 def reproduce(measured: Measured, axis: str | None) -> Findings:
     """Return what a unit's recording gives of the paper. Raises BadInput for an axis: the paper takes all of them."""
     if axis is not None:
-        raise BadInput(f"--axis {axis!r}: yang2018 takes all axes of the recording together; leave --axis out")
+        raise BadInput(f"--axis {axis!r}: paper yang2018 uses all axes of the recording together; leave --axis out")
     found = Findings(sources=[measured.sentence])
     report_stage(f"fit yang2018 to {measured.name}")
     try:

@@ -13,7 +13,7 @@ def planned_start(at: str | None, cron: str | None, time_zone: str | None, now: 
     """Return when a plan would begin, and its time zone. Raises BadInput."""
     zone = times.time_zone(time_zone)
     if at is not None and cron is not None:
-        raise BadInput("a start has a time or a cron line, not both; leave one out")
+        raise BadInput("a scheduled start has either a time or a cron line; leave one of the two out")
     if cron is not None:
         return times.check_cron(cron, zone, now), zone
     return (now if at is None else times.moment(at, zone, now)), zone

@@ -22,14 +22,14 @@ NO_SERVICE = "no service runs: the campaign is started only while `labctl serve`
 def is_scheduled(request: CampaignRequest) -> bool:
     """Return whether a request is for later. Raises BadInput for one that contradicts itself."""
     if request.at is not None and request.cron is not None:
-        raise BadInput("a start has a time or a cron line, not both; leave one out")
+        raise BadInput("a scheduled start has either a time or a cron line; leave one of the two out")
     if request.at is not None or request.cron is not None:
         return True
     given = [name for name in ("time_zone", "priority", "late_limit_s") if name in request.model_fields_set]
     if given:
         raise BadInput(
-            f"{', '.join(given)}: possible only for a start with a time or a cron line; give a time or a "
-            "cron line, or leave it out"
+            f"{', '.join(given)}: only a scheduled start has this option; give a time or a cron line, or leave "
+            "the option out"
         )
     return False
 

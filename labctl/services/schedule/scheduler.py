@@ -118,7 +118,7 @@ class Scheduler:
                 due = row.due_at if row.cron is None else self._last_due(row, row.cron, now)
                 late_s = (now - due).total_seconds()
                 if row.late_limit_s is not None and late_s > max(row.late_limit_s, GRACE_S):
-                    message = f"missed: {_span(late_s)} late, the limit is {_span(row.late_limit_s)}"
+                    message = f"missed: the start was {_span(late_s)} late, and the limit is {_span(row.late_limit_s)}"
                     self._store.starts.take(row, due, self._next(row, now), now, "missed", message)
                     log.warning("schedule.missed", bench=self._bench, start=row.id, recipe=row.recipe, reason=message)
                 elif self._runner.free and self.attended():

@@ -29,7 +29,7 @@ def time_zone(name: str | None) -> ZoneInfo:
     try:
         return ZoneInfo(name) if name is not None else ZoneInfo(tzlocal.get_localzone_name())
     except (KeyError, ValueError, OSError) as error:  # unknown, not a name, a folder
-        raise BadInput(f"time zone {name!r} is not known; name one like Europe/Berlin or UTC") from error
+        raise BadInput(f"time zone {name!r} is not known; give a name such as Europe/Berlin or UTC") from error
 
 
 def moment(text: str, zone: ZoneInfo, now: datetime) -> datetime:
@@ -45,18 +45,18 @@ def moment(text: str, zone: ZoneInfo, now: datetime) -> datetime:
         there = meant.astimezone(UTC)
     except (ValueError, OverflowError) as error:
         raise BadInput(
-            f"time {text!r} cannot be read; write 2026-03-28T22:00, with +01:00 or Z behind it, or now"
+            f"time {text!r} cannot be read; write it as 2026-03-28T22:00, 2026-03-28T22:00+01:00 or "
+            "2026-03-28T22:00Z, or write `now`"
         ) from error
     if there.astimezone(zone).replace(tzinfo=None, fold=0) != meant.replace(tzinfo=None, fold=0):
         raise BadInput(
-            f"time {text!r} does not exist in {zone.key}: it is skipped by the change to summer time; give another"
+            f"time {text!r} does not exist in {zone.key}: the change to summer time skips it; give another time"
         )
     if there <= now:
         here = now.astimezone(zone)
         raise BadInput(
-            f"time {text!r} ({meant:%Y-%m-%d %H:%M %z}) is in the past, it is now {here:%Y-%m-%d %H:%M %z} in "
-            f"{zone.key}; "
-            "name a later one, or now"
+            f"time {text!r} ({meant:%Y-%m-%d %H:%M %z}) is in the past: it is now {here:%Y-%m-%d %H:%M %z} in "
+            f"{zone.key}; give a later time, or `now`"
         )
     return there
 
@@ -83,7 +83,7 @@ def check_cron(line: str, zone: ZoneInfo, now: datetime) -> datetime:
     """Return when a cron line is due for the first time. Raises BadInput naming what is wrong with it."""
     shape = "minute hour day-of-month month day-of-week, such as '30 2 * * MON'"
     if len(line.split()) != FIELDS:
-        raise BadInput(f"cron line {line!r} has {len(line.split())} fields; write {FIELDS}: {shape}")
+        raise BadInput(f"cron line {line!r} has {len(line.split())} fields; write {FIELDS} fields: {shape}")
     try:
         due = next_due(line, zone, now)
     except CronSimError as error:

@@ -132,7 +132,7 @@ class DriverCheckResponse(ResponseModel):
     """One thing that every driver must do."""
 
     check: str
-    problem: str = Field(default="", description="What the driver does instead; empty where it does it.")
+    problem: str = Field(default="", description="How the driver fails this check; empty: it passes.")
 
 
 class DriverTestResponse(ResponseModel):

@@ -10,7 +10,7 @@ from pydantic_core import CoreSchema
 class ResponseModel(BaseModel):
     """A response of the services: the same JSON on the command line and over HTTP. Keys may be added, none renamed."""
 
-    # undeclared keys: of a service that is newer, or of a version that an older labctl kept
+    # undeclared keys: of a service that is newer, or of a version that an older version of labctl kept
     model_config = ConfigDict(defer_build=True, extra="ignore", frozen=True, ser_json_inf_nan="null")
 
     @classmethod

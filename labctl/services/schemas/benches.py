@@ -49,7 +49,7 @@ class FindingResponse(ResponseModel):
     """One thing that was found out about an instrument."""
 
     what: str
-    text: str = Field(description="Of one that is not good: what is wrong and what to do.")
+    text: str = Field(description="The finding in words; if it is doubtful or bad, what is wrong and what to do.")
     state: Literal["good", "doubtful", "bad"]
     value: float | None = None
     unit: str = ""
@@ -60,18 +60,20 @@ class DeviceCheck(ResponseModel):
 
     device: str
     ok: bool
-    text: str = Field(description="What is bad or, where nothing is, everything in one line.")
+    text: str = Field(description="The bad findings or, if there are none, all findings, in one line.")
     kind: Literal["table", "chamber", "reference", "gyro", "other"] = "other"
     state: Literal["good", "doubtful", "bad"] = Field(
         default="good",
-        description="doubtful: a campaign can run, its figures may be worse. bad: it cannot, or they would be wrong.",
+        description="doubtful: a campaign can run, but its results may be less accurate. bad: a campaign cannot "
+        "run, or its results would be wrong.",
     )
-    address: str = Field(default="", description="Its port, or host and TCP port.")
+    address: str = Field(default="", description="Port of the instrument, or its host and TCP port.")
     findings: list[FindingResponse] = Field(default_factory=list)
     reported: dict[str, str] = Field(
-        default_factory=dict, description="What it and its USB adapter say of themselves: serial, firmware, adapter ..."
+        default_factory=dict,
+        description="Identification reported by the instrument and its USB adapter: serial, firmware, adapter ...",
     )
-    driver: str = Field(default="", description="Name of its driver.")
+    driver: str = Field(default="", description="Name of the driver of the instrument.")
     distribution: str = Field(
         default="", description="Python distribution (installed package) that provides the driver."
     )
@@ -135,11 +137,17 @@ class ShippedBench(ResponseModel):
 class PortResponse(ResponseModel):
     """A serial port of this computer."""
 
-    device: str = Field(description="As the system numbers it now.")
-    path: str = Field(description="The name for a bench file: it does not depend on the order of plugging.")
-    adapter: str = Field(description="Serial number of its USB adapter; empty where it has none.")
+    device: str = Field(
+        description="Device file of the port at present, such as /dev/ttyUSB0; it may change "
+        "when adapters are plugged in."
+    )
+    path: str = Field(
+        description="Path of the port for use in a bench file; it does not depend on the order in "
+        "which adapters were plugged in."
+    )
+    adapter: str = Field(description="Serial number of the USB adapter of the port; empty: it has none.")
     product: str
-    trouble: str = Field(description="Why it cannot be used, and what to do; empty when all is well.")
+    trouble: str = Field(description="Why the port cannot be used, and what to do; empty: the port can be used.")
 
 
 class NewBenchRequest(Request):
@@ -147,7 +155,9 @@ class NewBenchRequest(Request):
 
     name: str = Field(min_length=1, max_length=200)
     latitude_deg: float | None = None
-    ports: list[str] = Field(default_factory=list, description="Empty: all of this computer.")
+    ports: list[str] = Field(
+        default_factory=list, description="Serial ports to search; empty: all serial ports of this computer."
+    )
     hosts: list[str] = Field(default_factory=list, description="HOST or HOST:PORT of Modbus TCP instruments.")
     settings: dict[str, JsonValue] = Field(default_factory=dict, description="SECTION.KEY -> value.")
 
@@ -158,7 +168,7 @@ class FoundResponse(ResponseModel):
     address: str
     kind: str = Field(description="table, chamber or gyro; empty where nothing was recognised.")
     driver: str
-    text: str = Field(description="What was recognised, or why nothing was and what to do.")
+    text: str = Field(description="The instrument that was recognised; or why none was recognised, and what to do.")
 
 
 class NewBenchResponse(ResponseModel):
@@ -166,7 +176,7 @@ class NewBenchResponse(ResponseModel):
 
     file: str
     found: list[FoundResponse]
-    bench: dict[str, JsonValue] = Field(description="The document, section by section.")
+    bench: dict[str, JsonValue] = Field(description="Content of the bench file, section by section.")
 
 
 class WiggleUnit(ResponseModel):
@@ -176,7 +186,7 @@ class WiggleUnit(ResponseModel):
     serial: str
     port: str
     moved: list[str] = Field(description="Units whose readings moved, the fastest first.")
-    ok: bool = Field(description="It moved, and it alone.")
+    ok: bool = Field(description="Whether the readings of this unit moved, and those of no other unit.")
     text: str
 
 

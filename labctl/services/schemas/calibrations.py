@@ -26,8 +26,8 @@ from labctl.services.schemas.criticism import ResidualColumns
 from labctl.services.schemas.warnings import WARNINGS, DataWarning
 
 ACCEPT = (
-    "Fit data that are certainly wrong, and keep a fit that is worse than no correction; the response still lists "
-    "the warnings."
+    "Fit the data although labctl found errors in them, and keep the fit even if it is worse than no "
+    "correction; the response still lists the warnings."
 )
 
 
@@ -38,7 +38,9 @@ FITTED_TO = "All recordings that the model was fitted to; `recording` is the new
 class FitRequest(Request):
     """Which model to fit to which recording."""
 
-    recording: int | None = Field(default=None, description="Recording; default: the unit's newest.")
+    recording: int | None = Field(
+        default=None, description="Number of the recording; default: the unit's newest recording."
+    )
     recordings: list[int] = Field(default_factory=list, description=SEVERAL)
     model: str | None = Field(default=None, description="Name of a model, such as yang2018; default: only `effects`.")
     effects: list[str] = Field(
@@ -55,8 +57,12 @@ class ImproveRequest(Request):
     add: list[str] = Field(default_factory=list, description="Ids of effects to add; `name:2` sets polynomial order 2.")
     remove: list[str] = Field(default_factory=list, description="Ids of the version's effects to remove.")
     formula: list[str] = Field(default_factory=list, description="Your own effects to add, each as 'name: expression'.")
-    version: int | None = Field(default=None, description="Version to change; default: the newest.")
-    recording: int | None = Field(default=None, description="Recording; default: the unit's newest.")
+    version: int | None = Field(
+        default=None, description="Number of the version to change; default: the unit's newest version."
+    )
+    recording: int | None = Field(
+        default=None, description="Number of the recording; default: the unit's newest recording."
+    )
     recordings: list[int] = Field(
         default_factory=list,
         description=f"{SEVERAL} Default: the recordings of the version, if it was fitted to several.",
@@ -65,7 +71,7 @@ class ImproveRequest(Request):
 
 
 class ModelResponse(ResponseModel):
-    """Which effects a calibration is made of; null: made by an older labctl, which did not say."""
+    """Which effects a calibration is made of; null: made by an older version of labctl, which did not say."""
 
     name: str
     effects: list[str]
@@ -74,15 +80,23 @@ class ModelResponse(ResponseModel):
         "gyro's output (direct law)."
     )
     terms: list[TermJson] | None = Field(default=None, description="Effects, with orders and parameters.")
-    temperature: TemperatureBasisJson | None = Field(default=None, description="How temperature enters the model.")
+    temperature: TemperatureBasisJson | None = Field(
+        default=None, description="Polynomial or interpolation by which the model depends on the temperature."
+    )
     reference: ReferenceJson | None = Field(default=None, description="Zero point of the temperature terms.")
 
 
 class LegError(ResponseModel):
     """How well one leg, a stretch of heating or of cooling, is predicted by a fit to the others."""
 
-    fitted: str = Field(description="Data sets that were fitted: heating, cooling, or all legs but one.")
-    tested: str = Field(description="Data sets that were predicted by the fit: cooling, heating, or each leg in turn.")
+    fitted: str = Field(
+        description="Data sets that the model was fitted to: those measured while heating, "
+        "while cooling, or all legs but one."
+    )
+    tested: str = Field(
+        description="Data sets that this fit predicted: those measured while cooling, while "
+        "heating, or each leg in turn."
+    )
     rms_dps: float | None = Field(description="RMS prediction error of the data sets tested, deg/s; null: see `why`.")
     datasets: int
     why: str = Field(default="", description="Why `rms_dps` is null; else empty.")
@@ -135,11 +149,15 @@ class FittedResponse(ResponseModel):
     reference_temperature_c: float | None = Field(default=None, description="Zero point of temperature terms, deg C.")
     recording: int | None = Field(default=None, description="The recording that the model was fitted to.")
     poses: PosesJson | None = Field(
-        default=None, description="Only by hand: results for rests, accelerometer, moves, held-out moves."
+        default=None,
+        description="Only for a recording of poses (turned by hand): results for rests, "
+        "accelerometer, moves and held-out moves.",
     )
     recordings: list[int] = Field(default_factory=list, description=FITTED_TO)
     joint: JointJson | None = Field(
-        default=None, description="Only for several: repeatability, agreement, each predicted by the others."
+        default=None,
+        description="Only for several recordings: repeatability, agreement, and the error when "
+        "each is predicted by a fit to the others.",
     )
 
 
@@ -159,7 +177,7 @@ class ChangedModel(FittedResponse):
     improved_from: int = Field(description="The version that was changed.")
     before: ErrorFigures = Field(description="Errors of the model before the change, on the same recording, deg/s.")
     plausible: dict[str, UsualRange] = Field(
-        description="For each effect: its usual range, and whether the size is inside."
+        description="For each effect: the usual range of its size, and whether the fitted size is inside."
     )
     left_out: list[LeftOut] = Field(description="Effects of the fit that are not exported with the calibration.")
 
@@ -189,7 +207,7 @@ class LadderRow(ResponseModel):
     effects: list[str]
     applied_rms_dps: float | None = Field(
         default=None,
-        description="Only in `others`: RMS error on this recording without refitting, deg/s.",
+        description="Only for versions in `others`: RMS error on this recording without refitting, deg/s.",
     )
     raw_rms_dps: float | None
     rms_dps: float | None
@@ -228,10 +246,11 @@ class Follower(ResponseModel):
     """An element that lags behind the temperature, or that is dragged along by it, and the error that it makes."""
 
     kind: Literal["lag", "play"]
-    parameter: float = Field(description="Time constant of a lag, s; width of a play, K.")
+    parameter: float = Field(description="Time constant of a thermal lag, s, or width of a hysteresis (play), K.")
     unit: Literal["s", "K"]
     size: dict[str, float] = Field(
-        description="For each axis, deg/s: error per K of lag, or error at an edge of the play."
+        description="For each axis: error per K of temperature lag, (deg/s)/K, or error at an edge of the "
+        "hysteresis, deg/s."
     )
 
 
@@ -247,14 +266,16 @@ class VersionFacts(ResponseModel):
         description="The newest certification or revocation of this version; null: there was none."
     )
     rate_reference: str = Field(
-        default="", description="What the rates of its recordings were known from; empty: not known."
+        default="", description="How the table rates of the version's recordings were determined; empty: not known."
     )
     left_out: list[LeftOut] = Field(
         default_factory=list,
         description="Effects of the fit that are not exported, each with its RMS, deg/s.",
     )
     remembers: list[Follower] = Field(
-        default_factory=list, description="Lags and plays to be updated with the temperature of every sample."
+        default_factory=list,
+        description="Temperature states (thermal lag or hysteresis) that must be updated "
+        "with the temperature of every sample.",
     )
 
 
@@ -281,4 +302,6 @@ class CompensationResponse(ResponseModel):
     rows: int
     outside: int = Field(description="Number of rows outside the calibrated rates or temperatures.")
     file: str
-    warning: str = Field(default="", description="That the calibration is overdue or was revoked; empty: it is not.")
+    warning: str = Field(
+        default="", description="Warning that the calibration is overdue or was revoked; empty: neither."
+    )

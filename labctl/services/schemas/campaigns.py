@@ -30,7 +30,8 @@ class CampaignRequest(Request):
     )
     fit: bool = Field(
         default=True,
-        description="End in a draft if the recipe has [fit]; false: end in the recordings, whatever the recipe says.",
+        description="Make a draft calibration at the end if the recipe has [fit]; false: make none, even if the "
+        "recipe has [fit].",
     )
     at: str | None = Field(
         default=None,
@@ -82,8 +83,10 @@ class StartRequest(Request):
     recipe: str
     bench: str | None = None
     clip: bool = False
-    hide: list[str] = Field(default_factory=list, max_length=20, description="Same as in `POST /api/campaigns`.")
-    fit: bool = Field(default=True, description="Same as in `POST /api/campaigns`.")
+    hide: list[str] = Field(
+        default_factory=list, max_length=20, description="Has the same meaning as in `POST /api/campaigns`."
+    )
+    fit: bool = Field(default=True, description="Has the same meaning as in `POST /api/campaigns`.")
     speed: float | None = Field(
         default=None,
         gt=0,
@@ -91,8 +94,12 @@ class StartRequest(Request):
         description="Speed of a simulated bench, as a multiple of real time; default: as fast as possible.",
     )
     seed: int | None = Field(default=None, ge=0, description="Seed of the random numbers of a simulated bench.")
-    confirmed_by: str = Field(default="", max_length=200, description="Same as in `POST /api/campaigns`.")
-    checks: list[BenchCheck] = Field(default_factory=list, description="Same as in `POST /api/campaigns`.")
+    confirmed_by: str = Field(
+        default="", max_length=200, description="Has the same meaning as in `POST /api/campaigns`."
+    )
+    checks: list[BenchCheck] = Field(
+        default_factory=list, description="Has the same meaning as in `POST /api/campaigns`."
+    )
 
 
 class ReasonRequest(Request):
@@ -215,7 +222,8 @@ class CampaignResponse(ResponseModel):
     gyro_c: float | None = None
     references: dict[str, float] = Field(
         default_factory=dict,
-        description="Of a campaign that runs here, now: column -> value of a reference instrument.",
+        description="Present values of the reference instruments, by column; empty if this process does not run "
+        "the campaign.",
     )
     rate_dps: float | None = None
     outputs: list[OutputResponse] = Field(
@@ -234,7 +242,9 @@ class CampaignResponse(ResponseModel):
     links: dict[str, str] = Field(
         default_factory=dict, description="Instruments that answer late or not at all: name -> what is wrong."
     )
-    dropped: dict[str, str] = Field(default_factory=dict, description="Units that take no further part: name -> why.")
+    dropped: dict[str, str] = Field(
+        default_factory=dict, description="Units excluded from the rest of the campaign: name -> reason."
+    )
     abandoned: bool = Field(
         default=False,
         description="The process that ran the campaign is gone, and the campaign was neither resumed nor ended.",
@@ -244,8 +254,8 @@ class CampaignResponse(ResponseModel):
     recordings: dict[str, int] = Field(default_factory=dict, description="serial -> recording")
     drafts: list[DraftResponse] = Field(
         default_factory=list,
-        description="The calibrations that it ends in, by recording; empty: the recipe has no [fit], or the campaign "
-        "is not done; empty in lists.",
+        description="Draft calibrations made at the end of the campaign, one per recording; empty: the recipe "
+        "has no [fit], the campaign is not done, or the response is a list.",
     )
     drivers: dict[str, DriverResponse] = Field(
         default_factory=dict,
@@ -257,8 +267,9 @@ class CampaignResponse(ResponseModel):
     )
     reported: dict[str, dict[str, str]] = Field(
         default_factory=dict,
-        description="table, chamber or gyro name -> what it and its USB adapter said of themselves when the campaign "
-        "began: serial, firmware, revision, output_unit, adapter; what says nothing is left out.",
+        description="table, chamber or gyro name -> what it and its USB adapter reported as their "
+        "identification when the campaign began: serial, firmware, revision, output_unit, adapter; instruments "
+        "that reported nothing are left out.",
     )
     simulated_time: bool = Field(
         default=False, description="All times are those of a simulated bench, which may run faster than real time."
@@ -276,10 +287,11 @@ class CampaignResponse(ResponseModel):
         "is false.",
     )
     resumable: bool | None = Field(
-        default=None, description="Whether `resume` would be accepted here now; null in lists."
+        default=None, description="Whether this service would accept `resume` now; null in lists."
     )
     resume_reason: str = Field(
-        default="", description="Why `resume` would be refused; if it would be accepted, objections to it, or empty."
+        default="",
+        description="Why `resume` would be refused; if it would be accepted: objections to resuming, or empty.",
     )
 
 

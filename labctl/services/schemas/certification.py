@@ -10,7 +10,7 @@ from pydantic import Field
 from labctl.services.schemas.base import Request, ResponseModel
 
 DueSource = Literal["user", "recipe", "configuration"]
-DUE_FROM = "Where the interval is from; null: none is given, and there is no date."
+DUE_FROM = "Source of the number of days; null: no number is given, and there is no due date."
 WHEN = "Time of the verdict, which is the time of the certification."
 NO_VERDICT = (
     "Verdict of the newest criticism of the version on the recording that it was fitted to; null: none, see "
@@ -27,8 +27,9 @@ class RevokeRequest(Request):
         default=None,
         ge=0,
         le=36_500,
-        description="Of a certification: days until the unit is due for its next calibration; 0: no date; absent: "
-        "those of the recipe (`recalibrate_after_days`), else of the service ($LABCTL_DUE_DAYS), else no date.",
+        description="Only for a certification: days until the next calibration is due; 0: no due date; absent: "
+        "the number in the recipe (`recalibrate_after_days`), else in the service ($LABCTL_DUE_DAYS), else no "
+        "due date.",
     )
 
 
@@ -72,7 +73,7 @@ class AssessmentResponse(ResponseModel):
     least_reason_characters: int = Field(description="Smallest number of characters of the reason for an override.")
     least_reason_words: int
     due_days: int | None = Field(
-        description="Days that the certification is valid where none are given; null: no date."
+        description="Days for which a certification is valid if the request gives no number; null: no due date."
     )
     due_from: DueSource | None = Field(description=DUE_FROM)
 

@@ -41,9 +41,9 @@ class ComparisonColumns(ResponseModel):
     recording: list[int] = Field(default_factory=list, description="Number of the recording.")
     dataset: list[int] = Field(default_factory=list, description="Number of the data set in its recording.")
     axis: list[str] = Field(default_factory=list, description="The output axis.")
-    position: list[str] = Field(default_factory=list, description="The body axis that lay along the table axis.")
+    position: list[str] = Field(default_factory=list, description="The body axis that pointed along the table axis.")
     table_rate_dps: list[float] = Field(default_factory=list)
-    own_rate_dps: list[float] = Field(default_factory=list, description="True rate along the output axis.")
+    own_rate_dps: list[float] = Field(default_factory=list, description="True rate along the output axis, deg/s.")
     temperature_c: list[float] = Field(default_factory=list)
     temperature_level_c: list[float] = Field(
         default_factory=list, description="Centre of the temperature level that the data set belongs to, deg C."
@@ -51,11 +51,15 @@ class ComparisonColumns(ResponseModel):
     rate_level_dps: list[float] = Field(
         default_factory=list, description="Centre of the table-rate level that the data set belongs to, deg/s."
     )
-    measured_error_dps: list[float] = Field(default_factory=list, description="Output minus own rate.")
-    modelled_error_dps: list[float] = Field(
-        default_factory=list, description="What the version subtracts: output minus corrected rate."
+    measured_error_dps: list[float] = Field(
+        default_factory=list, description="Error of the output: output minus true rate along the axis, deg/s."
     )
-    residual_dps: list[float] = Field(default_factory=list, description="Residual: corrected rate minus own rate.")
+    modelled_error_dps: list[float] = Field(
+        default_factory=list, description="Error that the version subtracts: output minus corrected rate, deg/s."
+    )
+    residual_dps: list[float] = Field(
+        default_factory=list, description="Residual: corrected rate minus true rate along the axis, deg/s."
+    )
     turn_before_deg: list[float | None] = Field(
         default_factory=list,
         description="Error of the integrated angle after a full turn with only the static bias subtracted, deg; "

@@ -85,14 +85,14 @@ class CriticismResponse(ResponseModel):
         "this schedule cannot distinguish them.",
     )
     remainder: Remainder | None = Field(
-        default=None, description="Share of the residual's excess over the noise floor that no named effect explains."
+        default=None, description="Share (0 to 1) of the residual above the noise floor that no named effect explains."
     )
     not_physical: list[str] = Field(
         default_factory=list,
         description="Effects that explain these data equally well, but at a size that the unit cannot have.",
     )
     named_axes: dict[str, list[str]] = Field(
-        default_factory=dict, description="Effect -> the axes on which it was found."
+        default_factory=dict, description="For each effect: the axes on which the effect was found."
     )
     further: list[list[str]] = Field(
         default_factory=list,
@@ -134,14 +134,17 @@ class ResidualColumns(ResponseModel):
     run: list[int] = Field(default_factory=list)
     table_rate_dps: list[float] = Field(default_factory=list)
     own_rate_dps: list[float] = Field(
-        default_factory=list, description="True rate along the axis itself, the Earth's included where it is known."
+        default_factory=list,
+        description="True rate along the output axis, deg/s; it includes the Earth's rate where that is known.",
     )
     temperature_c: list[float] = Field(default_factory=list)
     t_s: list[float | None] = Field(default_factory=list)
     n: list[int | None] = Field(default_factory=list, description="Number of readings in the data set; null: unknown.")
-    measured_error_dps: list[float] = Field(default_factory=list, description="Output minus own rate.")
+    measured_error_dps: list[float] = Field(
+        default_factory=list, description="Error of the output: output minus true rate along the axis, deg/s."
+    )
     modelled_error_dps: list[float] = Field(default_factory=list)
-    residual_dps: list[float] = Field(default_factory=list, description="Measured minus modelled error.")
+    residual_dps: list[float] = Field(default_factory=list, description="Measured error minus modelled error, deg/s.")
     floor_dps: list[float | None] = Field(
         default_factory=list, description="Standard deviation of the data set's mean due to noise alone, deg/s."
     )

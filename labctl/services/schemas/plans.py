@@ -18,7 +18,10 @@ def never_a_path(recipe: str) -> str:
     """Refuse what would be looked for as a file: a request names a shipped recipe or brings its own text."""
     if "\n" in recipe or recipe in shipped_recipes():
         return recipe
-    raise RecipeError(f"no recipe {shown(recipe)}: send its text, or one of {', '.join(shipped_recipes())}")
+    raise RecipeError(
+        f"there is no recipe {shown(recipe)}; send the text of a recipe, or one of the names "
+        f"{', '.join(shipped_recipes())}"
+    )
 
 
 RecipeSource = Annotated[
@@ -57,7 +60,8 @@ class AttendanceResponse(ResponseModel):
     text: str = Field(description="When the campaign needs a person, as a sentence; the times are `needed_at`.")
     warning: str = Field(default="", description="A warning about times at night; empty when there are none.")
     better_start: datetime | None = Field(
-        default=None, description="The next start for which fewer of these times are at night; null: none is better."
+        default=None,
+        description="Next time of start for which fewer of these times are at night; null: no start is better.",
     )
 
 
@@ -126,7 +130,7 @@ class TimelineColumns(ResponseModel):
     )
     expected_s: list[float]
     temperature_c: list[float | None] = Field(
-        description="Set point of the chamber during the step, deg C; null: none was set yet."
+        description="Set point of the chamber during the step, deg C; null: no set point was set yet."
     )
     rate_dps: list[float | None] = Field(
         description="Rate of the table in a data set, deg/s; null: the table is at rest."
@@ -154,7 +158,7 @@ class RunColumns(TimelineColumns):
     started_s: list[float | None] = Field(description="Start of the step, s of campaign time; null: not yet started.")
     ended_s: list[float | None]
     forecast_s: list[float] = Field(
-        description="Start of the step, s of campaign time: measured, or for steps to come forecast from the "
+        description="Start of the step, s of campaign time: measured, or for future steps computed from the "
         "expected times."
     )
 
@@ -165,7 +169,7 @@ class CampaignPlanResponse(ResponseModel):
     campaign: int
     recipe: str
     text: str = Field(
-        description="Text of the recipe that was run, TOML; empty: an older labctl ran the campaign "
+        description="Text of the recipe that was run, TOML; empty: an older version of labctl ran the campaign "
         "and did not store the text."
     )
     bench: str

@@ -75,7 +75,10 @@ class RecordingResponse(ResponseModel):
 
     id: int
     serial: str
-    kind: str = Field(description="samples, points or coefficients.")
+    kind: str = Field(
+        description="Kind of data: samples (every reading), points (one mean per data set) or "
+        "coefficients (a published table)."
+    )
     campaign: int | None = Field(description="The campaign that made the recording; null: the recording was imported.")
     datasets: int
     readings: int
@@ -97,7 +100,10 @@ class RecordingFacts(ResponseModel):
     id: int
     serial: str
     campaign: int | None
-    kind: str = Field(description="samples, points or coefficients.")
+    kind: str = Field(
+        description="Kind of data: samples (every reading), points (one mean per data set) or "
+        "coefficients (a published table)."
+    )
     info: dict[str, JsonValue] = Field(
         description="Content of the file `recording.toml`: unit, axes, bench, data sheet, notes."
     )
@@ -126,7 +132,9 @@ class SamplesResponse(ResponseModel):
     recording: int
     dataset: int
     readings: int
-    columns: Columns = Field(description="For each column: one value per reading, as many as were requested.")
+    columns: Columns = Field(
+        description="For each column: one value per reading, up to the number of readings that was requested."
+    )
 
 
 class ExportedRecording(ResponseModel):
@@ -206,7 +214,10 @@ class StaticBiasResponse(ResponseModel):
     """The mean output at rest before a mission (Ojeda et al. 2000, eqs. 1, 15 and 16); it contains the Earth's rate."""
 
     bias_dps: float
-    u_dps: float = Field(description="Standard uncertainty: white noise of the mean, and the bias instability.")
+    u_dps: float = Field(
+        description="Standard uncertainty of the static bias, deg/s, from the white noise of "
+        "the mean and the bias instability."
+    )
     readings: int
     seconds: float
 
@@ -215,22 +226,35 @@ class OrientationResponse(ResponseModel):
     """The angle of one axis, positive counter-clockwise and never wrapped, from its rate."""
 
     axis: str
-    version: int | None = Field(description="Calibration that the rates were corrected by; null: none.")
+    version: int | None = Field(
+        description="Version of the calibration by which the rates were corrected; null: no correction."
+    )
     readings: int
-    left_out: int = Field(description="Readings that were not valid, or no numbers.")
+    left_out: int = Field(
+        description="Number of readings left out because they were marked invalid or were not numbers."
+    )
     seconds: float
-    static_bias: StaticBiasResponse | None = Field(description="Taken off; null: no rest was named.")
-    angle_deg: float = Field(description="At the end; 0 at the end of the rest.")
+    static_bias: StaticBiasResponse | None = Field(
+        description="Static bias that was subtracted; null: no rest at the beginning was given."
+    )
+    angle_deg: float = Field(
+        description="Angle at the end, deg; the angle is 0 at the end of the rest at the beginning."
+    )
     drift_between_stops_deg_per_min: list[float] = Field(default_factory=list)  #: with declared stops, of each leg
     drift_deg_per_min: float | None = Field(
-        description="Angle over time: the drift where the unit stood; null: no time."
+        description="Angle divided by the time, deg/min: the drift if the unit was at rest; null: the time is 0."
     )
-    offset_dps: float = Field(description="Taken off at the end: the static bias, or learned at standstill since.")
-    standing_s: float = Field(description="Time for which the unit counted as standing, its angle held.")
-    gap_s: float = Field(description="Time without readings, bridged in a straight line.")
-    t_s: list[float] = Field(description="Times of the course below, s.")
+    offset_dps: float = Field(
+        description="Offset that is subtracted at the end, deg/s: the static bias, or the "
+        "offset estimated during the last standstill."
+    )
+    standing_s: float = Field(description="Time for which the unit was taken to stand still and its angle was held, s.")
+    gap_s: float = Field(description="Time without readings, s; the angle is interpolated linearly over it.")
+    t_s: list[float] = Field(description="Times of the values in `course_deg`, s.")
     course_deg: list[float] = Field(description="The angle at these times, deg; at most 2000 points.")
-    warning: str = Field(default="", description="That the calibration is overdue or was revoked; empty: it is not.")
+    warning: str = Field(
+        default="", description="Warning that the calibration is overdue or was revoked; empty: neither."
+    )
 
 
 class LogColumn(ResponseModel):
@@ -263,7 +287,7 @@ class LogTrace(ResponseModel):
 
 
 class LogPreview(ResponseModel):
-    """A log, its column map, and the recording that it would become; nothing of it was kept."""
+    """A log, its column map, and the recording that it would become; nothing was imported."""
 
     file: str
     importer: str
@@ -277,7 +301,7 @@ class LogPreview(ResponseModel):
         description="Assumptions inferred from the data, such as units that no column name states."
     )
     problems: list[str] = Field(description="Everything that prevents the import; empty: the file can be imported.")
-    unused: list[str] = Field(description="Columns of the file that nothing uses.")
+    unused: list[str] = Field(description="Columns of the file that are not used.")
     serial: str | None
     motion: str | None = Field(
         description="How the unit was moved, as `motion` in recording.toml; null: not known because of `problems`."

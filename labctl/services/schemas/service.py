@@ -43,7 +43,9 @@ class ServiceReady(ResponseModel):
     bench_pid: int
     web_pid: int
     unconfirmed: str = Field(description="What is wrong with the service's bench; empty when all is well.")
-    cut_short: str = Field(description="Interrupted campaigns of that bench, and what is done about them; empty: none.")
+    cut_short: str = Field(
+        description="Interrupted campaigns of that bench, and whether labctl resumes them; empty: none."
+    )
 
 
 class SimulatorReady(ResponseModel):

@@ -14,16 +14,19 @@ from labctl.services.schemas.calibrations import Validity
 class BudgetLineResponse(ResponseModel):
     """One source of uncertainty; null is unknown, never 0."""
 
-    source: str = Field(description="coefficients, model, repeatability, or the quantity of a reference standard.")
-    name: str = Field(description="Of the standard, with the number of its certificate.")
+    source: str = Field(
+        description="Source of the uncertainty: coefficients, model, repeatability, or the "
+        "quantity of a reference standard."
+    )
+    name: str = Field(description="Name of the reference standard, with the number of its certificate.")
     type: Literal["A", "B"] = Field(description="Evaluated by statistics (A) or otherwise (B).")
     distribution: str
     u: float | None = Field(description="Standard uncertainty of the input, in `unit`; null: not stated or unknown.")
     unit: str
     sensitivity: float | None = Field(description="Derivative of the result along the input, per `unit`.")
-    contribution: float | None = Field(description="Size of sensitivity times u, in the unit of the result.")
+    contribution: float | None = Field(description="Magnitude of sensitivity times u, in the unit of the result.")
     degrees_of_freedom: float | None = Field(description="null: infinite.")
-    uncorrected: float = Field(description="Known error that nothing corrects for, in the unit of the result.")
+    uncorrected: float = Field(description="Known error that is not corrected, in the unit of the result.")
     common_to_all_rates: bool = Field(
         description="Whether the error is the same at all rates, so that it adds linearly and no mean reduces it."
     )
@@ -36,14 +39,19 @@ class BudgetLineResponse(ResponseModel):
 class BudgetResponse(ResponseModel):
     """A result with its lines (GUM)."""
 
-    result: str = Field(description="corrected_rate, bias, scale_factor, or misalignment with an axis.")
-    unit: str = Field(description="Of the result and of every contribution; 1 is a share of the rate.")
+    result: str = Field(
+        description="Quantity of the budget: corrected_rate, bias, scale_factor, or misalignment with an axis."
+    )
+    unit: str = Field(description="Unit of the result and of every contribution; 1: a ratio to the rate.")
     value: float | None = Field(description="Of a coefficient.")
     lines: list[BudgetLineResponse]
     combined: float | None = Field(description="Combined standard uncertainty; null: a line of type A is unknown.")
     effective_degrees_of_freedom: float | None = Field(description="Welch-Satterthwaite; null: infinite.")
     k: float | None = Field(description="Coverage factor for a probability of 95.45 %.")
-    expanded: float | None = Field(description="k times combined, plus the size of known errors left uncorrected.")
+    expanded: float | None = Field(
+        description="Expanded uncertainty: k times `combined`, plus the magnitude of "
+        "known errors that are not corrected."
+    )
     not_stated: list[str] = Field(description="Standards that are not stated and therefore not in the result.")
     overdue: bool = Field(description="Whether a standard was past its due date when it was used.")
 
@@ -52,7 +60,9 @@ class ContributionLines(ResponseModel):
     """Contributions along one variable, deg/s."""
 
     at: list[float]
-    contributions: dict[str, list[float | None]] = Field(description="Source -> contribution; null: not stated.")
+    contributions: dict[str, list[float | None]] = Field(
+        description="For each source: its contribution, deg/s; null: not stated."
+    )
     combined: list[float | None]
     expanded: list[float | None]
 
@@ -60,8 +70,8 @@ class ContributionLines(ResponseModel):
 class ContributionsOver(ResponseModel):
     """Contributions to the uncertainty of one axis, over rate and over temperature."""
 
-    temperature_c: float = Field(description="Temperature of the lines over rate, deg C.")
-    rate_dps: float = Field(description="Rate of the lines over temperature, deg/s.")
+    temperature_c: float = Field(description="Temperature at which `over_rate` was computed, deg C.")
+    rate_dps: float = Field(description="Rate at which `over_temperature` was computed, deg/s.")
     over_rate: ContributionLines
     over_temperature: ContributionLines
 
@@ -93,7 +103,8 @@ class AxisUncertainty(ResponseModel):
         "deg/s; null if coefficients or model are unknown."
     )
     combined_dps: float | None = Field(
-        description="`expanded_dps` over `coverage_factor`, deg/s; null if coefficients, model or repeatability are "
+        description="`expanded_dps` divided by `coverage_factor`, deg/s; null if coefficients, model or "
+        "repeatability are "
         "unknown."
     )
     expanded_dps: float | None = Field(
@@ -121,14 +132,14 @@ class UncertaintyGrid(ResponseModel):
 
 
 class UncertaintyResponse(ResponseModel):
-    """The uncertainty of a corrected rate on later days; the noise of a single reading comes on top."""
+    """The uncertainty of a corrected rate on later days; the noise of a single reading is not included."""
 
     serial: str
     version: int
     rate_dps: float
     temperature_c: float
     coverage_factor: float = Field(description="`expanded_dps` over `combined_dps`.")
-    coverage: float = Field(description="Probability that the interval covers.")
+    coverage: float = Field(description="Probability that the interval contains the true value.")
     inside: bool = Field(description="Whether rate and temperature are within the calibrated range.")
     axes: dict[str, AxisUncertainty]
     budget: dict[str, BudgetResponse] = Field(description="For each axis: the budget of the corrected rate, deg/s.")

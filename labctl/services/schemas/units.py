@@ -13,10 +13,10 @@ from labctl.services.schemas.reports.drafts import DraftResponse
 class ExportFormatResponse(ResponseModel):
     """A format in which calibrations are available."""
 
-    id: str = Field(description="The value of `format`.")
+    id: str = Field(description="Name of the format, to be sent as `format`.")
     title: str
     suffix: str = Field(description="Suffix of a file in this format, without the dot.")
-    options: dict[str, str] = Field(description="Name of an option -> what it is, its unit and its default.")
+    options: dict[str, str] = Field(description="For each option of the format: its meaning, unit and default.")
 
 
 class RecalibrationResponse(ResponseModel):
@@ -37,16 +37,19 @@ class UnitResponse(ResponseModel):
     calibrations: list[int]
     certified_version: int | None
     due: datetime | None = Field(
-        default=None, description="Until when the version in force is valid; null: no date, or none is in force."
+        default=None,
+        description="Time until which the version in force is valid; null: no due date, or no version is in force.",
     )
-    overdue: bool = Field(default=False, description="Whether that date has passed.")
+    overdue: bool = Field(default=False, description="Whether the date in `due` has passed.")
     recalibration: RecalibrationResponse | None = Field(
         default=None,
-        description="Null: the version in force is not from a campaign. Only of one unit, or with `due_within`.",
+        description="How to recalibrate the unit: the campaign behind the version in force, and its recipe; "
+        "null: that version is not from a campaign, or the response lists units without `due_within`.",
     )
     draft: DraftResponse | None = Field(
         default=None,
-        description="The draft that a campaign ended in last; null: none did. Only of one unit, or with `due_within`.",
+        description="Newest draft calibration of the unit; null: there is none, or the response lists units "
+        "without `due_within`.",
     )
     formats: list[ExportFormatResponse] = Field(description="Formats in which the unit's calibrations are available.")
 
@@ -112,7 +115,7 @@ class Drift(ResponseModel):
         description="Standard deviation of the recordings about the line; null with fewer than three recordings."
     )
     significant: bool = Field(description="Whether 0 is outside the 95 % interval of `per_year`.")
-    line: DriftLine = Field(description="Points of the line, for a picture.")
+    line: DriftLine = Field(description="Points of the straight line through the figures, for drawing.")
 
 
 class DriftLine(ResponseModel):

@@ -14,9 +14,12 @@ class DataWarning(ResponseModel):
     """One thing that is wrong: what, where, its value, what was expected, and what to do."""
 
     what: str = Field(
-        description="Kind of error, as a word for programs: sign, unit, scale, axes, one_data_set, time_unit, worse ..."
+        description="Kind of error, as a fixed word for programs: sign, unit, scale, axes, one_data_set, "
+        "time_unit, worse ..."
     )
-    severity: Severity = Field(description="certain: a fit is refused; likely: a fit is made and shows the warning.")
+    severity: Severity = Field(
+        description="Certainty of the error: certain: labctl refuses to fit; likely: labctl fits and shows the warning."
+    )
     where: str = Field(description="The axis, position, data sets or column that the warning concerns.")
     said: str
     value: float | None

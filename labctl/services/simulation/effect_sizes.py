@@ -32,7 +32,8 @@ class Sizing:
         size = size_for_z(lambda tried: self.z_of(effect, tried)[0], z, start)
         if size is None:
             raise BadInput(
-                f"effect {effect}: no size gives z = {z:g} on recipe {self._plan.recipe.name}; "
-                "this schedule can hardly show the effect, or not at all; give a size in the unit of the effect"
+                f"effect {effect}: no size of the effect gives a signal of {z:g} standard deviations of the "
+                f"noise with recipe {self._plan.recipe.name}, because this recipe can hardly show the effect; "
+                "give a size in the unit of the effect"
             )
         return size

@@ -22,7 +22,7 @@ def hidden_sizes(texts: list[str]) -> dict[str, float]:
     for text in texts:
         name, _, size = text.partition("=")
         if name not in known:
-            raise BadInput(f"effect {name!r} cannot be hidden (there are {', '.join(sorted(known))})")
+            raise BadInput(f"effect {name!r} cannot be hidden; choose one of {', '.join(sorted(known))}")
         try:
             sizes[name] = float(size) if size else known[name]
             if not math.isfinite(sizes[name]):
@@ -41,8 +41,8 @@ def with_hidden_effects(bench: BenchFile, texts: list[str]) -> BenchFile:
         return bench
     if not bench.is_simulated:
         raise BadInput(
-            f"hide {', '.join(texts)}: bench {bench.name} is not simulated here; effects can be hidden in simulated "
-            "units only, leave the key out"
+            f"hide {', '.join(texts)}: bench {bench.name} is not simulated, and effects can be hidden only in "
+            "simulated units; leave the key `hide` out"
         )
     simulation = bench.simulation or SimulationSettings()
     hidden = {**simulation.hidden, **hidden_sizes(texts)}

@@ -30,8 +30,8 @@ def simulate(plan: Plan, bench: BenchFile, gyro: GyroSettings) -> Recording:
     """Return the recording that a plan gives in the simulated world, one row per reading. Raises BadInput."""
     if plan.recipe.turns is not None or bench.table is None or bench.chamber is None:
         raise BadInput(
-            f"recipe {plan.recipe.name} on bench {bench.name}: turns by hand are not simulated from the plan alone; "
-            "`labctl campaign start` carries them out on a simulated bench, such as by-hand-sim"
+            f"recipe {plan.recipe.name} on bench {bench.name}: turns by hand cannot be simulated without a "
+            "campaign; run `labctl campaign start` on a simulated bench, such as by-hand-sim"
         )
     try:
         walk = _Walk(plan, bench, gyro)
@@ -109,8 +109,8 @@ class _Walk:
         fastest, most = float(np.abs(rates).max()), self._table.max_rate_dps
         if fastest > most:
             raise BadInput(
-                f"recipe {self._plan.recipe.name}: a {profile.kind} goes to {fastest:g} deg/s, the table of bench "
-                f"{self._bench.name} to {most:g} deg/s; make it slower"
+                f"recipe {self._plan.recipe.name}: a {profile.kind} reaches {fastest:g} deg/s, but the limit of "
+                f"the table of bench {self._bench.name} is {most:g} deg/s; make it slower"
             )
         lead = self._lead(rates[0], profile.step_s), self._lead(rates[-1], profile.step_s)[::-1]
         self._t = self._world.follow(self._t, profile.step_s, np.concatenate([lead[0], rates, lead[1]]))

@@ -116,7 +116,7 @@ class Database:
     def outlast(self, work: Callable[[], ResultT]) -> ResultT:
         """Do something again for as long as the server does not answer, at most `patience_s`.
 
-        Returns what `work` does. Raises DatabaseUnreachable after that time; then, too, nothing of it was kept.
+        Returns what `work` does. Raises DatabaseUnreachable after that time; then, too, nothing was stored.
         """
         end_s = self._clock.now_s() + self._backend.patience_s
         while True:
@@ -136,9 +136,7 @@ class Database:
         the connection, when it does not come free within 20 s, and DatabaseUnreachable.
         """
         if self.writer is not None:
-            raise StoreError(
-                f"{self._shown}: another process writes to it; send a marked transaction, or wait until it ends"
-            )
+            raise StoreError(f"{self._shown}: another process is writing to the database; wait until that process ends")
         number, ended = 0, False
         with self._turn.take():
             try:

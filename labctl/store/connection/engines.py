@@ -70,4 +70,4 @@ def server_engine(url: str, *, lock_timeout_s: float, idle_timeout_s: float) -> 
             f"--database {shown(url)} needs {error.name}, which is not installed; run "
             f"`pip install 'labctl[postgresql]'`; {known}"
         ) from error
-    raise BadInput(f"--database {shown(url)}: unknown kind of database; {known}")
+    raise BadInput(f"--database {shown(url)}: this kind of database is not known; {known}")

@@ -97,7 +97,8 @@ class PostgresqlServer:
         if state != LOCK_NOT_AVAILABLE:
             return ""
         return (
-            f"no write access within {LOCK_TIMEOUT_S:g} s: another process has it; find out which process writes there"
+            f"no write access within {LOCK_TIMEOUT_S:g} s: another process holds the lock; find out which "
+            "process writes to the database"
         )
 
     def was_committed(self, number: int) -> bool:

@@ -57,8 +57,9 @@ class SqliteFile:
         self._refuse_loss(connection)
         if text := first_damage(connection):
             raise StoreError(
-                f"{self._location}: damaged ({text}); nothing was changed. Restore the newest backup, or save what can "
-                "be read with `sqlite3 FILE .recover`; `labctl check` lists what is found"
+                f"{self._location}: the database is damaged ({text}); nothing was changed. Run `labctl check` "
+                "for a list of the damage, then restore the newest backup, or save the readable part with "
+                "`sqlite3 FILE .recover`"
             )
 
     def before_migration(self, connection: sa.Connection) -> None:

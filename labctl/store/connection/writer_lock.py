@@ -39,11 +39,11 @@ class Holder:
 def _describe(holder: Holder) -> str:
     if holder.campaign is not None:
         return (
-            f"campaign {holder.campaign} runs in process {holder.pid}'s terminal: Ctrl-C there ends it safely; a "
-            "campaign under `labctl serve` can be paused and aborted from here. Everything else has to wait for its end"
+            f"campaign {holder.campaign} runs in process {holder.pid}'s terminal: Ctrl-C there ends it safely. "
+            "Wait for its end: only a campaign under `labctl serve` can be paused or aborted by another command"
         )
-    who = f"the service at {holder.url}" if holder.url else f"another labctl (process {holder.pid})"
-    return f"{who} writes to this database now; wait until it ends, or send the request to it"
+    who = f"the service at {holder.url}" if holder.url else f"process {holder.pid} of labctl"
+    return f"{who} is writing to this database; wait until it ends, or send the request to that process"
 
 
 def holder_of(location: str) -> Holder | None:

@@ -65,7 +65,8 @@ class WriterTurn:
             held_s = self._clock.now_s() - turn.began_s
             who = f"{turn.function} in thread {turn.thread!r}, for {held_s:.3g} s already"
         cause = (
-            f"{self._location}: no write access within {waited_s:.3g} s; the one writing connection is held by {who}"
+            f"{self._location}: no write access within {waited_s:.3g} s; the only connection that writes is in "
+            f"use by {who}"
         )
         return StoreError(f"{cause}; nothing was stored, try again", cause=cause)
 

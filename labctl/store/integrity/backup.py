@@ -33,12 +33,15 @@ def copy_database(location: str, target: Path) -> Copy:
     nothing is left of it.
     """
     if is_url(location):
-        raise BadInput(f"{location.partition('://')[0]} database: use the server's own tool (pg_dump) to back it up")
+        raise BadInput(
+            f"`labctl backup` copies SQLite files only, not a {location.partition('://')[0]} "
+            "database; back it up with the tool of its server (pg_dump)"
+        )
     if not Path(location).is_file():
         raise StoreError(f"{location}: there is no such file; name the database with --database")
     _refuse_existing(target)
     if not target.absolute().parent.is_dir():
-        raise BadInput(f"{target}: the folder does not exist; make it first")
+        raise BadInput(f"{target}: the folder does not exist; create it first")
     handle, name = tempfile.mkstemp(dir=target.absolute().parent, prefix=f".{target.name}-")
     os.fchmod(handle, FILE)
     os.close(handle)
@@ -61,7 +64,7 @@ def copy_database(location: str, target: Path) -> Copy:
 
 def _refuse_existing(target: Path) -> None:
     if target.exists() or target.is_symlink():
-        raise BadInput(f"{target}: exists already; a backup is never written over another, name a new file")
+        raise BadInput(f"{target}: the file exists already, and a backup never replaces a file; name a new file")
 
 
 def _copy(location: str, made: Path) -> None:

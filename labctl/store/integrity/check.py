@@ -118,8 +118,16 @@ class _Check:
         if found is None:
             self.find("schema", "this is not a labctl database, or its content is lost: there are no tables")
         else:
-            hint = "any other command migrates it" if found in migrate.KNOWN else "use a newer labctl"
-            self.find("schema", f"the database is at step {found}, this labctl at {migrate.HEAD}: {hint}")
+            hint = (
+                "any other labctl command migrates the database"
+                if found in migrate.KNOWN
+                else "use a newer version of labctl"
+            )
+            self.find(
+                "schema",
+                f"the schema of the database is number {found}, that of this version of labctl "
+                f"is {migrate.HEAD}: {hint}",
+            )
         return False
 
     def _check_readings(self, connection: sa.Connection) -> bool:
@@ -141,7 +149,7 @@ class _Check:
                 )
         for recording, kind in kinds.items():
             if kind != "samples" and (recording, WHOLE_TABLE) not in valid:
-                self.find("readings", f"recording {recording} ({kind}) has no table any more")
+                self.find("readings", f"recording {recording} ({kind}): its table of data sets is missing")
         for recording, number in sorted(valid.keys() - known):
             if number != WHOLE_TABLE:
                 self.find("readings", f"recording {recording} holds readings of data set {number}, which is missing")

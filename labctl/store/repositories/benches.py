@@ -92,7 +92,9 @@ class Benches:
         clear."""
         found = self.get(name)
         if found is None:
-            raise NotFound(f"bench {name!r} was never used with this database; `labctl bench status` lists them")
+            raise NotFound(
+                f"bench {name!r} was never used with this database; `labctl bench status` lists the benches that were"
+            )
         if not found.unconfirmed:
             raise Conflict(f"bench {name}: its safe state is confirmed already; start a campaign")
         b = tables.benches

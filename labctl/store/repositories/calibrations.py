@@ -193,8 +193,8 @@ class Calibrations:
         if act is None or act.act != "certify":
             raise NotCertified(
                 f"unit {serial!r} has no certified calibration; "
-                f"`labctl certify {serial} VERSION --by NAME --reason TEXT` puts one in force, `--version N` takes "
-                "one that is not in force"
+                f"`labctl certify {serial} VERSION --by NAME --reason TEXT` puts a version in force; `--version "
+                "N` uses a version that is not in force"
             )
         return act.version
 

@@ -115,14 +115,14 @@ class Campaigns:
         """Return one campaign; raises NotFound."""
         found = self._rows(tables.campaigns.c.id == campaign)
         if not found:
-            raise NotFound(f"campaign {campaign} is not in this database; `labctl campaign list` shows them")
+            raise NotFound(f"campaign {campaign} is not in this database; `labctl campaign list` shows the campaigns")
         return found[0]
 
     def newest(self) -> CampaignRow:
         """Return the campaign made last; raises NotFound when there is none."""
         found = self._rows(tables.campaigns.c.id == sa.select(sa.func.max(tables.campaigns.c.id)).scalar_subquery())
         if not found:
-            raise NotFound("there is no campaign in this database yet; `labctl campaign start RECIPE` makes one")
+            raise NotFound("there is no campaign in this database yet; `labctl campaign start RECIPE` starts one")
         return found[0]
 
     def newest_of_unit(self, serial: str) -> CampaignRow | None:
@@ -161,7 +161,7 @@ class Campaigns:
         with self._database.reading() as connection:
             found = connection.scalar(sa.select(tables.campaigns.c.state).where(tables.campaigns.c.id == campaign))
         if found is None:
-            raise NotFound(f"campaign {campaign} is not in this database; `labctl campaign list` shows them")
+            raise NotFound(f"campaign {campaign} is not in this database; `labctl campaign list` shows the campaigns")
         return found
 
     def count_by_state(self) -> dict[str, int]:

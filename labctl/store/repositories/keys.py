@@ -31,7 +31,7 @@ class Keys:
         with self._database.writing() as connection:
             if connection.scalar(sa.select(_k.name).where(_k.name == name)) is not None:
                 raise Conflict(
-                    f"key {name!r} exists already; choose another name: each is used once, also after a revocation"
+                    f"a key with the name {name!r} exists or existed, and a name is used only once; choose another name"
                 )
             connection.execute(
                 sa.insert(tables.api_keys).values(name=name, role=role, digest=digest, created_at=at, revoked_at=None)
@@ -45,7 +45,7 @@ class Keys:
         with self._database.writing() as connection:
             row = connection.execute(_ALL.where(_k.name == name)).first()
             if row is None:
-                raise NotFound(f"there is no key {name!r}; `labctl key list` shows them")
+                raise NotFound(f"there is no key {name!r}; `labctl key list` shows the keys")
             if row.revoked_at is not None:
                 raise Conflict(
                     f"key {name!r} was already revoked at {row.revoked_at.isoformat()}; no further action is needed"

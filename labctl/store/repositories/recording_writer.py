@@ -161,8 +161,8 @@ def _give_sign(connection: sa.Connection, ticket: ImportTicket, *, token: str | 
     signed = sa.update(r).where(mine).values(import_sign_at=sa.func.now(), importing=token or ticket.token)
     if connection.execute(signed).rowcount == 0:
         raise Conflict(
-            f"recording {ticket.recording}: its import was discarded when the writing process was started again; "
-            "nothing was stored; import it again"
+            f"recording {ticket.recording}: the process that wrote it was restarted, so the import was "
+            "discarded and nothing was stored; import the recording again"
         )
 
 

@@ -84,7 +84,7 @@ class Starts:
         found = self._rows(tables.scheduled_starts.c.id == start)
         if not found:
             raise NotFound(
-                f"scheduled start {start} is not in this database; `labctl campaign schedule list` shows them"
+                f"scheduled start {start} is not in this database; `labctl campaign schedule list` shows the starts"
             )
         return found[0]
 
@@ -185,7 +185,8 @@ class Starts:
         with self._database.writing() as connection:
             if connection.execute(waiting.values(state="cancelled")).rowcount != 1:
                 raise Conflict(
-                    f"scheduled start {start} has already ended: {self.get(start).state}; add a new one to the schedule"
+                    f"scheduled start {start} has already ended (state: {self.get(start).state}); add a new "
+                    "start to the schedule"
                 )
             audit.append(
                 connection, at, "schedule cancel", _subject(start, row.bench_name), {"recipe": row.recipe_name}

@@ -17,7 +17,7 @@ recordings = sa.Table(
     sa.Column("info", sa.JSON, nullable=False),
     sa.Column("channels", sa.JSON, nullable=False),
     sa.Column("created_at", Instant, nullable=False),
-    sa.Column("dropped", sa.Text),  #: why the unit took no further part; absent while it does
+    sa.Column("dropped", sa.Text),  #: why the unit was excluded from the campaign; absent while it takes part
     sa.Column("importing", sa.String(32)),  #: token of the import under way; absent once all of it is in
     sa.Column("import_sign_at", sa.DateTime(timezone=True)),  #: its last sign, by the clock of the database server
     sa.Index(None, "serial", "id"),

@@ -35,7 +35,7 @@ class Instant(sa.TypeDecorator[datetime]):
         if value is None:
             return None
         if value.tzinfo is None:
-            raise ValueError(f"give an instant with a time zone, not {value!r}")
+            raise ValueError(f"{value!r} has no time zone; give a time with a time zone")
         return (value - EPOCH) // timedelta(microseconds=1)
 
     def process_result_value(self, value: int | None, dialect: Dialect) -> datetime | None:  # noqa: ARG002

@@ -59,7 +59,7 @@ def _attempt(context: ExecutionContext, step: Turn, rules: TurnRules, shown: Tur
             readings.read_turn(shown)  # what came with the answer
             readings.end_turn()
             again = answer.again
-            refused = (answer.reason or f"{answer.by} wants it again") if again else ""
+            refused = (answer.reason or f"{answer.by} requested the turn again") if again else ""
         else:
             readings.close(refused)
             _ask_for_rest(context, step, rules, refused)
@@ -106,6 +106,10 @@ def _record(context: ExecutionContext, step: Turn, refused: str, results: dict[s
     else:
         for name, result in results.items():
             came = result.came_deg
-            text = f"{asked}: {came:.1f} deg came out" if came is not None else f"{asked}: {name} has no such axis"
+            text = (
+                f"{asked}: the unit turned by {came:.1f} deg"
+                if came is not None
+                else f"{asked}: {name} has no such axis"
+            )
             context.recorder.event(Event("turn.taken", text, "info", name, came, step.turn_deg, "deg"))
     return _Found(refused, figures)

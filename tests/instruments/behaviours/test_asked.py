@@ -72,7 +72,7 @@ def fine(found: Any) -> bool:
 def modbus(driver: str, what: str, unit: int) -> list[Behaviour]:
     """Return what any Modbus instrument may do; `what` is its first request."""
     cannot, refused = f"cannot {what}", f"refused to {what}: Modbus exception"
-    bytes_ = r"\d+ bytes came that are no reply; check line settings and cable"
+    bytes_ = r"\d+ bytes arrived that are not a Modbus reply; check line settings and cable"
     serial = driver == F4
     late = (NoReply, f"no answer to {what}; check power, cable and address {unit} {TRIES}")
     return [
@@ -82,19 +82,20 @@ def modbus(driver: str, what: str, unit: int) -> list[Behaviour]:
         Behaviour(driver, "in pieces", lambda wire: Late(wire, 0.0, 3, 0.002), gives=fine),
         Behaviour(driver, "garbage", through(noise(3)), (MalformedReply, f"{cannot}, .*; (check|find|set) .* {TRIES}")),
         Behaviour(driver, "unplugged (EIO)", Unplugged, (
-            LinkError, f"{cannot}, the link is gone; check cable and power {TRIES}")),
+            LinkError, f"{cannot}, the link was lost; check cable and power {TRIES}")),
         Behaviour(driver, "does not know the function", faults=exception(1), says=(
-            RequestRejected, f"{refused} 1, it does not know the function; check driver and address")),
+            RequestRejected, f"{refused} 1, the instrument does not know the function; check driver and address")),
         Behaviour(driver, "has no such register", faults=exception(2), says=(
-            RequestRejected, f"{refused} 2, it has no such register, .*; check model and driver")),
+            RequestRejected, f"{refused} 2, the instrument has no such register, .*; check model and driver")),
         Behaviour(driver, "fails inside", faults=exception(4), says=(
-            RequestRejected, f"{refused} 4, it failed inside; read its panel")),
+            RequestRejected, f"{refused} 4, the instrument has an internal failure; read its panel")),
         Behaviour(driver, "is busy for ever", faults=exception(6), says=(
-            RequestRejected, f"{refused} 6, it is busy; end at its panel")),
+            RequestRejected, f"{refused} 6, the instrument is busy; end its present task")),
         Behaviour(driver, "is busy twice", faults=lambda faults: faults.arm("modbus_exception", value=6, count=2),
                   gives=fine),
         Behaviour(driver, "memory parity error", faults=exception(8), says=(
-            RequestRejected, f"{refused} 8, memory parity error; switch it off and on, and have it repaired")),
+            RequestRejected, (f"{refused} 8, the instrument has a memory parity error; switch it off "
+            "and on, and have it repaired"))),
         Behaviour(driver, "gateway without a path", faults=exception(10), says=(
             RequestRejected, f"{refused} 10, gateway path unavailable; check the gateway's serial port settings")),
         Behaviour(driver, "gateway without a device", faults=exception(11), says=(
@@ -113,21 +114,25 @@ def http(request: bytes, reply: bytes) -> bytes:
 
 
 TCP = [
-    ("HTTP server instead of Modbus", http, "an HTTP server answered, no Modbus instrument; check host and tcp_port"),
+    (
+        "HTTP server instead of Modbus",
+        http,
+        "an HTTP server answered, not a Modbus instrument; check host and tcp_port",
+    ),
     (
         "SSH server instead of Modbus",
         lambda request, _: b"SSH-2.0-OpenSSH_9.2p1\r\n",
-        r"text came \(SSH-2.0-OpenSSH_9.2p1\), no Modbus; check host and",
+        r"text arrived \(SSH-2.0-OpenSSH_9.2p1\) instead of a Modbus reply; check host and",
     ),
     (
         "reply to another request",
         lambda _, reply: b"\x77\x77" + reply[2:],
-        r"the reply to request 30583 came, not to re",
+        r"the reply to request 30583 arrived instead of that to re",
     ),
     (
         "another protocol number",
         lambda _, reply: reply[:2] + b"\0\1" + reply[4:],
-        r"protocol number 1 came, Modbus TCP h",
+        r"the reply has protocol number 1 instead of 0",
     ),
     (
         "a byte too many",
@@ -143,15 +148,18 @@ FOUND = [
 ]
 SERIAL = [
     Behaviour(F4, "wrong checksum", faults=lambda faults: faults.arm("wrong_crc"), says=(
-        MalformedReply, rf"cannot read .*, \d+ bytes came that are no reply; check line settings and cable {TRIES}")),
+        MalformedReply, (rf"cannot read .*, \d+ bytes arrived that are not a Modbus reply; check "
+        rf"line settings and cable {TRIES}"))),
     Behaviour(F4, "another baud rate", through(another_baud_rate), (
-        MalformedReply, rf"cannot read .*, \d+ bytes came that are no reply; check line settings and cable {TRIES}")),
+        MalformedReply, (rf"cannot read .*, \d+ bytes arrived that are not a Modbus reply; check "
+        rf"line settings and cable {TRIES}"))),
     Behaviour(F4, "echo of the adapter", Echoes, gives=fine),
     Behaviour(F4, "echo of the adapter and no device", answers(lambda request, _: request), (
         NoReply, f"no answer to read .*; check power, cable and address 1 {TRIES}")),
     Behaviour(F4, "zero byte before each reply", answers(lambda _, reply: b"\0" + reply), gives=fine),
     Behaviour(F4, "flood", lambda wire: Flood(wire, b"UUUU"), (
-        MalformedReply, r"the line was never silent for .* s in 20 s without a request; find the second master")),
+        MalformedReply, (r"labctl sent no request for 20 s, but the line was never silent for .* s; "
+        r"find a second Modbus master"))),
     Behaviour(F4, "late once", answers(lambda _, reply: reply, 0.9), gives=fine),
 ]  # fmt: skip
 
@@ -178,7 +186,8 @@ class RefusesMoves(Wire):
 def of_table() -> list[Behaviour]:
     """Return what the controller of the table may do."""
     silent = r"sim://arrick gave no answer in 1.0 s; check power, cable and baud rate"
-    other = r"sim://arrick answered {}, not a C4; check the port's name and the baud rate$"
+    other = r"sim://arrick answered {}, which is not the answer of a C4 controller; check the name "
+    r"of the port and the baud rate$"
     return [
         Behaviour(C4, "mute", Deaf, (NoReply, silent)),
         Behaviour(C4, "always slower than the time-out", lambda wire: Late(wire, 90.0), (NoReply, silent)),
@@ -189,13 +198,15 @@ def of_table() -> list[Behaviour]:
         Behaviour(C4, "is another controller", through(lambda data, _: data.replace(b"C4", b"MD")), (
             WrongInstrument, other.format("'MD simulated'"))),
         Behaviour(C4, "echo of what is sent", Echoes, (
-            WrongInstrument, r"sim://arrick answered '!1fp', not a C4; the line sends back what is sent: switch")),
+            WrongInstrument, (r"sim://arrick answered '!1fp', which is not the answer of a C4 "
+            r"controller; the line echoes what labctl sends: switch"))),
         Behaviour(C4, "flood of a", lambda wire: Flood(wire, b"aaaa"), (
-            NoReply, "sim://arrick gave no answer in 1.0 s; letters come that answer nothing; find what else sends")),
+            NoReply, ("sim://arrick gave no answer in 1.0 s; letters arrive that answer no command; "
+            "find what else sends"))),
         Behaviour(C4, "refuses everything", faults=lambda faults: faults.arm("refusal"), says=(
             WrongInstrument, other.format("'e'"))),
         Behaviour(C4, "refuses a move", RefusesMoves, (
-            RequestRejected, r"answered 'e' where 'a' was expected, so it did not .*; home the table")),
+            RequestRejected, r"answered 'e' instead of 'a', so it did not .*; home the table")),
         Behaviour(C4, "unplugged (EIO)", lambda wire: Unplugged(wire, errno.EIO), (
             LinkError, r"the link sim://arrick broke \(\[Errno 5\] Input/output error\); check the cable, then")),
         Behaviour(C4, "unplugged during a run", lambda wire: Unplugged(wire, errno.EIO, 4.0), (
@@ -203,7 +214,8 @@ def of_table() -> list[Behaviour]:
         Behaviour(C4, "ends lines with LF", through(lambda data, _: data.replace(b"\r\n", b"\n")), gives=fine),
         Behaviour(C4, "ends lines with CR", through(lambda data, _: data.replace(b"\r\n", b"\r")), gives=fine),
         Behaviour(C4, "motor stalls", faults=lambda faults: faults.arm("stall"), says=(
-            MalformedReply, r"\d+ steps took [\d.]+ s instead of [\d.]+ s; check speed_template, .* motor stalls")),
+            MalformedReply, (r"\d+ steps took [\d.]+ s instead of [\d.]+ s; check speed_template, .* "
+            r"motor does not stall"))),
     ]  # fmt: skip
 
 

@@ -49,10 +49,11 @@ def identity(device: Any) -> object:
 
 
 PORT_ERRORS = [
-    (OSError(errno.EACCES, "Permission denied"), "may use it: run `sudo usermod -aG dialout $USER`, then"),
+    (OSError(errno.EACCES, "Permission denied"), "access to the port: run `sudo usermod -aG dialout $USER`, then"),
     (OSError(errno.EBUSY, "Device or resource busy"), "which other process has it open: run `fuser -v /dev/ttyUSB7`"),
     (serial.SerialException("Could not exclusively lock port"), "which other process has it open: run `fuser -v /dev"),
-    (ValueError("Not a valid baudrate: 123"), "(Not a valid baudrate: 123); check the cable, the port's name and"),
+    (ValueError("Not a valid baudrate: 123"), ("(Not a valid baudrate: 123); check the cable, the "
+    "name of the port, and")),
 ]  # fmt: skip
 
 
@@ -80,7 +81,7 @@ def test_a_port_that_is_a_file(tmp_path: Path) -> None:
     (tmp_path / "port").write_bytes(b"")
     line = said_by("gyro", identity, port=str(tmp_path / "port"))
     assert "cannot be opened" in line
-    assert "check the cable, the port's name and who else uses it" in line
+    assert "check the cable, the name of the port, and which other process uses the port" in line
 
 
 def test_a_port_that_goes_away_while_it_is_read() -> None:
@@ -142,10 +143,13 @@ def login(connection: socket.socket) -> None:
 
 
 SERVERS = [
-    (closes, r"^chamber: cannot read part number \(register 16\), the link is gone.*; check cable and power \(3 tries"),
-    (resets, r"^chamber: cannot read part number \(register 16\), the link is gone.*; check cable and power \(3 tries"),
-    (web, r"^chamber: cannot read .*, an HTTP server answered, no Modbus instrument; check host and tcp_port"),
-    (login, r"^chamber: cannot read .*, text came \(SSH-2.0-OpenSSH_9.2p1 Debian\), no Modbus; check host and"),
+    (closes, (r"^chamber: cannot read part number \(register 16\), the link was lost.*; check cable "
+    r"and power \(3 tries")),
+    (resets, (r"^chamber: cannot read part number \(register 16\), the link was lost.*; check cable "
+    r"and power \(3 tries")),
+    (web, r"^chamber: cannot read .*, an HTTP server answered, not a Modbus instrument; check host and tcp_port"),
+    (login, (r"^chamber: cannot read .*, text arrived \(SSH-2.0-OpenSSH_9.2p1 Debian\) instead of a "
+    r"Modbus reply; check host and")),
 ]  # fmt: skip
 
 
@@ -161,5 +165,6 @@ def test_a_host_where_nobody_listens() -> None:
         port = server.getsockname()[1]
     line = said_by("chamber", identity, tcp_port=port)
     assert line.startswith(
-        f"chamber: no Modbus TCP at 127.0.0.1:{port}; check address, cable and that it is switched on"
+        f"chamber: no Modbus TCP instrument answers at 127.0.0.1:{port}; check address, cable and that the instrument "
+        "is switched on"
     )

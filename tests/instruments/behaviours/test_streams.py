@@ -151,11 +151,11 @@ def gyro(**keys: Any) -> Any:
     return lambda record: record["gyros"][0].update(keys)
 
 
-NOTHING, STRANGE = "nothing came; check power, cable and ", r"\d+ bytes came that are none; check "
+NOTHING, STRANGE = "no bytes arrived; check power, cable and ", r"\d+ bytes arrived that are not readings; check "
 WHERE = {
     STIM: r"no intact datagram on sim://\S+ (within|for) [\d.]+ s: {}bit rate 460800, datagram 0x94 and crlf",
-    DSP: r"no whole line on sim://\S+ for [\d.]+ s: {}baud rate 38400 and options.pattern",
-    RD: r"no whole line on sim://\S+ for [\d.]+ s: {}baud rate 9600 and options.pattern",
+    DSP: r"no complete line on sim://\S+ for [\d.]+ s: {}baud rate 38400 and options.pattern",
+    RD: r"no complete line on sim://\S+ for [\d.]+ s: {}baud rate 9600 and options.pattern",
     FORMAT: r"no intact Xsens MTi reading on sim://\S+ for [\d.]+ s: {}baud rate 115200 and that the unit sends",
 }
 BROKE = (
@@ -180,7 +180,7 @@ def of_each(driver: str) -> list[Behaviour]:
         Behaviour(driver, "clock 3 % fast", gives=lambda found: found.lost == 0, changes=clock_off(3e4)),
         Behaviour(
             driver, "clock 8 % fast", None,
-            (WrongInstrument, r"sends [\d.]+ readings/s on sim://\S+, and the bench file says .*; set sample_rate_hz"),
+            (WrongInstrument, r"sends [\d.]+ readings/s on sim://\S+, but the bench file says .*; set sample_rate_hz"),
             changes=clock_off(8e4),
         ),
         Behaviour(driver, "switched off for 1.5 s", Reset, gives=told),
@@ -191,21 +191,27 @@ def of_each(driver: str) -> list[Behaviour]:
     ]  # fmt: skip
 
 
-SET_OTHERWISE = r"the unit on sim://\S+ is set otherwise than needed: {}.*; set the unit in its service mode"
+SET_OTHERWISE = (
+    r"the unit on sim://\S+ is not configured as the bench file requires: {}.*; configure the unit in its service mode"
+)
 STANDS = (
     MalformedReply,
-    r"the counter on sim://\S+ stands at \d+ in \d+ readings in a row; check that the counter's field is the right",
+    (
+        r"the sample counter on sim://\S+ stands at \d+ in \d+ successive readings; check that the "
+        r"field of the counter is the right"
+    ),
 )
 SPECIAL = [
     Behaviour(STIM, "sends increments", changes=device(output_unit="incremental"), says=(
-        WrongInstrument, SET_OTHERWISE.format("gyro output unit INCREMENTAL ANGLE"))),
+        WrongInstrument, SET_OTHERWISE.format("the gyro output unit is INCREMENTAL ANGLE"))),
     Behaviour(STIM, "sends 250 a second", changes=device(sample_rate_hz=250), says=(
-        WrongInstrument, SET_OTHERWISE.format("sample rate 250"))),
+        WrongInstrument, SET_OTHERWISE.format("the sample rate is 250"))),
     Behaviour(STIM, "sends another datagram", changes=device(datagram=0xA5), says=(
-        WrongInstrument, SET_OTHERWISE.format("datagram 0xA5, bench file 0x94"))),
+        WrongInstrument, SET_OTHERWISE.format("the datagram is 0xA5 instead of 0x94"))),
     Behaviour(STIM, "is another unit", changes=lambda record: (
         gyro(serial="N25582018000013")(record), device(serial="N25582018000014")(record)), says=(
-        WrongInstrument, r"the unit on \S+ has serial number N25582018000014, bench file or campaign says N2")),
+        WrongInstrument, (r"the unit on \S+ has serial number N25582018000014, but the bench file or "
+        r"the campaign names N2"))),
     Behaviour(STIM, "hears nothing", Deaf, (
         NoReply, r"sends datagrams on sim://\S+ but does not answer the commands C and I within 1.5 s; check")),
     Behaviour(STIM, "wrong checksum in each", every(STIM, flipped), (NoReply, WHERE[STIM].format(STRANGE))),

@@ -23,21 +23,22 @@ from tests.helpers.spoilt_bench import F4, check_spoilt, terminals
 #: What the check of the spoilt bench says, device by device; {0} stands for the device's port.
 EXPECTED = {
     "table": "port {0} may not be used by this user: run `sudo usermod -aG GROUP $USER`, then log in again",
-    "chamber": "a profile runs or is held on the controller, a set point would have no effect; end it at its panel",
-    "gone": "port {0} is not there: plug the adapter in, or give the port's present name; `labctl bench ports` lists "
-    "those "
-    "that are there",
+    "chamber": "a profile is running or held on the controller, so a set point would have no "
+    "effect; end the profile at the panel of the controller",
+    "gone": "port {0} does not exist: plug the adapter in, or give the present name of the port; "
+    "`labctl bench ports` lists all ports",
     "held": "port {0} cannot be opened (Resource temporarily unavailable); check which other process has it open: run "
-    "`fuser -v {0}`, and end that one",
-    "angle": "the unit on {0} is set otherwise than needed: gyro output unit INCREMENTAL ANGLE in deg, needed ANGULAR "
-    "RATE or "
-    "AVERAGE ANGULAR RATE; set the unit in its service mode (commands u, m, d) or correct the bench file",
-    "moved": "port {0} is on USB adapter B2, bench file or campaign says A1; two adapters may have changed places: "
+    "`fuser -v {0}`, and end that process",
+    "angle": "the unit on {0} is not configured as the bench file requires: the gyro output unit is "
+    "INCREMENTAL ANGLE in deg instead of ANGULAR RATE or AVERAGE ANGULAR RATE; configure the unit "
+    "in its service mode (commands u, m, d), or correct the bench file",
+    "moved": "port {0} is on USB adapter B2, but the bench file or the campaign names A1; two "
+    "adapters may be exchanged: "
     "give the "
-    "port's path in /dev/serial/by-id",
-    "mute": "no intact datagram on {0} within 1.5 s: nothing came; check power, cable and bit rate 460800, "
+    "path of the port in /dev/serial/by-id",
+    "mute": "no intact datagram on {0} within 1.5 s: no bytes arrived; check power, cable and bit rate 460800, "
     "datagram 0x94 and crlf",
-    "fast": "sends 110 readings/s on {0}, and the bench file says 100, limit +-4 %; set sample_rate_hz = 110 or "
+    "fast": "sends 110 readings/s on {0}, but the bench file says 100, limit +-4 %; set sample_rate_hz = 110 or "
     "configure "
     "the unit",
 }
@@ -79,7 +80,7 @@ def test_what_a_technician_needs_is_found_on_the_triaxial_bench() -> None:
     assert unit["counter"] == 16.0
     assert abs(unit["clock"] or 0.0) < 5.0
     assert found["mems"].reported["serial"].startswith("N")
-    assert "u 0" in next(f.text for f in found["mems"].findings if f.what == "clock")
+    assert "u = 0" in next(f.text for f in found["mems"].findings if f.what == "clock")
 
 
 def test_the_drift_of_a_clock_is_measured() -> None:
@@ -105,14 +106,17 @@ def test_a_sensor_break_an_alarm_and_a_manual_mode_are_each_a_line() -> None:
     broken = chamber_of(sensor_code=-32000, mode=2, profile=0)
     assert [f.text for f in broken.findings if f.state == "bad"] == [
         (
-            "air temperature (register 100) reads -32000 counts; that is the code of a sensor break: check the sensor "
-            "and its wires at the controller"
+            "air temperature (register 100) reads -32000 counts; this value is the code of a sensor "
+            "break: check the sensor and its wires at the controller"
         ),
-        "the controller is in manual mode, a set point would have no effect; set the controller to auto at its panel",
+        (
+            "the controller is in manual mode, so a set point would have no effect; set the controller "
+            "to auto at its panel"
+        ),
     ]
     alarm = chamber_of(alarm_words_at=1)
     assert [f.text for f in alarm.findings if f.state == "bad"] == [
-        "alarm 1 high is active: remove its cause at the chamber, then clear it at the controller's panel"
+        "alarm 1 high is active: remove its cause at the chamber, then clear the alarm at the controller's panel"
     ]
 
 
@@ -131,7 +135,7 @@ def test_a_turning_table_and_one_without_a_speed_command_are_told() -> None:
     ]
     simulation.world.table.start(clock.now_s(), 16_000, 100.0, 90.0)
     table = named(check(bench, clock, simulation))["table"]
-    assert "the table turns: stop it, and find out who drives it" in table.text
+    assert "the table is turning: stop it, and find out which program or person drives it" in table.text
 
 
 def test_a_check_moves_nothing_and_sets_nothing() -> None:
@@ -149,7 +153,7 @@ def test_one_port_under_two_names_is_named(tmp_path: Path, monkeypatch: pytest.M
         other.symlink_to(ports.mute)
         found = port_checks.shared({"table": ports.mute, "fog": str(other), "mems": ports.moved})
         assert {name: each.text for name, each in found.items()} == {
-            "fog": f"port {other} is that of table too ({ports.mute}): give each instrument its own port"
+            "fog": f"port {other} is also given for table ({ports.mute}): give each instrument a different port"
         }
 
 
@@ -173,8 +177,8 @@ def test_an_open_port_is_judged_by_name_adapter_users_and_latency(
     ]  # fmt: skip
     assert found[0].text == f"port {port} on USB adapter A9"
     assert found[1].text.endswith(f"set port = '{folder}/usb-FTDI_A9-if00-port0'")
-    assert found[2].text.startswith("process 812 (ModemManager) has ")
-    assert found[3].text == (f"the adapter holds bytes back for up to 16 ms: run `echo 1 | sudo tee {timer}`")
+    assert found[2].text.startswith("process 812 (ModemManager) also has ")
+    assert found[3].text == (f"the adapter delays received bytes by up to 16 ms: run `echo 1 | sudo tee {timer}`")
     by_id = port_checks.of_open_port(str(folder / "usb-FTDI_A9-if00-port0"), wants_quick=False)
     assert [each.state for each in by_id] == ["good", "doubtful", "good"]
     assert "(ttyUSB7) on USB adapter A9" in by_id[0].text

@@ -110,7 +110,7 @@ def test_a_new_process_stops_a_table_that_turns(stand: Make) -> None:
 def test_an_interlock_at_fault_is_named_and_not_reset(stand: Make) -> None:
     s = stand("servo-sim")
     controller(s).trip(0.0, hardware=1 << 9)
-    with pytest.raises(RequestRejected, match=r"interlock is at fault \(master interlock\); find out why"):
+    with pytest.raises(RequestRejected, match=r"interlock is at fault \(master interlock\); remove the cause"):
         s.bench.table.home()
     with pytest.raises(RequestRejected, match="at fault"):
         s.bench.table.spin(10.0, 1.0)
@@ -133,7 +133,7 @@ def test_a_run_that_an_interlock_ends_says_which(stand: Make) -> None:
 
 def test_limits_beyond_the_controllers_own_are_refused(stand: Make) -> None:
     s = stand("servo-sim", simulation={"table": {"absolute_dps": 150.0}})
-    with pytest.raises(WrongInstrument, match=r"max_rate_dps = 200 .* absolute limit 150; lower it"):
+    with pytest.raises(WrongInstrument, match=r"max_rate_dps = 200, but the absolute limit .* is 150; lower the value"):
         s.bench.table.identify()
 
 
@@ -161,7 +161,7 @@ def test_another_instrument_and_no_numbers_are_reported(stand: Make) -> None:
     s = stand("servo-sim")
     handlers = controller(s)._handlers
     handlers["*idn?"] = lambda *_: "KEITHLEY INSTRUMENTS INC.,MODEL 2000"
-    with pytest.raises(WrongInstrument, match="not an ACUTROL 3000"):
+    with pytest.raises(WrongInstrument, match="not the answer of an ACUTROL 3000"):
         s.bench.table.identify()
     handlers["read:position?"] = lambda *_: "OK"
     with pytest.raises(MalformedReply, match="1 numbers were expected"):
@@ -181,7 +181,7 @@ def test_a_direction_turns_rate_and_angle_round(stand: Make) -> None:
 def test_host_or_port_but_not_both() -> None:
     record = read_bench("servo-sim").model_dump()
     for wrong in ({"host": None}, {"port": "/dev/ttyUSB0"}):
-        with pytest.raises(ValueError, match="give either host"):
+        with pytest.raises(ValueError, match="give one address of the controller"):
             resolve(BenchFile.model_validate({**record, "table": {**record["table"], **wrong}}))
 
 

@@ -125,7 +125,7 @@ def test_rest_is_a_rate_too(c4: Any) -> None:
 
 
 def test_a_rate_beyond_the_table_is_refused_before_a_byte_is_sent(c4: Any) -> None:
-    with pytest.raises(LimitError, match=r"100\.1 deg/s is beyond the table's 100 deg/s"):
+    with pytest.raises(LimitError, match=r"100\.1 deg/s is beyond the limit of the table, 100 deg/s"):
         c4.table.spin(100.1, 1.0)
     assert c4.tap.heard == b""
 

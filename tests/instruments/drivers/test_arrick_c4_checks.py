@@ -110,7 +110,8 @@ def test_commands_of_the_bench_file_come_before_any_motion_once_per_link(stand: 
 def test_another_reply_than_expected_ends_it_before_the_table_moves(stand: Make) -> None:
     s = stand(table={"init_commands": [{"send": "!1we11", "expect": "ok"}]})
     with pytest.raises(
-        RequestRejected, match=r"table: answered 'a' to !1we11 where init_commands expects 'ok'; correct"
+        RequestRejected,
+        match=r"table: answered 'a' to !1we11, but init_commands in the bench file expects 'ok'; correct",
     ):
         s.bench.table.home()
     assert not s.world.table.moving(s.clock.now_s())

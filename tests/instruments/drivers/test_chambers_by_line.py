@@ -122,7 +122,11 @@ def test_ascii2_numbers_and_the_line_that_its_maker_prints() -> None:
 
 @pytest.mark.parametrize(
     ("driver", "text"),
-    [("espec", "a profile runs"), ("weiss-simserv", "a profile runs"), ("thermotron", "a profile runs")],
+    [
+        ("espec", "a profile is running"),
+        ("weiss-simserv", "a profile is running"),
+        ("thermotron", "a profile is running"),
+    ],
 )
 def test_a_program_of_somebody_is_refused_and_not_ended(chamber: Callable[..., Any], driver: str, text: str) -> None:
     s = chamber(driver)
@@ -147,7 +151,7 @@ def test_the_way_to_safety_ends_a_program_that_came_later(chamber: Callable[...,
 def test_a_binder_that_runs_a_program_or_is_idle(chamber: Callable[..., Any]) -> None:
     s = chamber("binder")
     s.simulated.mode = 0x0400
-    with pytest.raises(RequestRejected, match="a profile runs or is held"):
+    with pytest.raises(RequestRejected, match="a profile is running or held"):
         s.driver.set_temperature_c(40.0)
     s.simulated.mode = 0
     with pytest.raises(RequestRejected, match=r"idle .* switch it on at its panel"):

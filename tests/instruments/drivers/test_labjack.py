@@ -161,7 +161,9 @@ def test_numbers_go_on_where_the_devices_count_begins_anew() -> None:
     assert np.diff(scans.add(packets)[0]).tolist() == [1] * 7
 
 
-@pytest.mark.parametrize(("status", "text"), [(2942, "cannot be scanned so fast"), (2943, "more than 65535 scans")])
+@pytest.mark.parametrize(
+    ("status", "text"), [(2942, "cannot be scanned at this rate"), (2943, "more than 65535 scans")]
+)
 def test_a_stream_that_ended_says_why(labjack: Callable[..., Any], status: int, text: str) -> None:
     s = labjack()
     s.gyro.start()
@@ -182,15 +184,19 @@ def test_codes_at_the_rails_are_not_valid(labjack: Callable[..., Any]) -> None:
 def test_another_device_and_another_rate_are_refused(labjack: Callable[..., Any]) -> None:
     s = labjack()
     s.registers.product = 9.0
-    with pytest.raises(WrongInstrument, match=r"fog: sim://labjack-t7/fog is product 9, no LabJack T4 or T7"):
+    with pytest.raises(
+        WrongInstrument, match=r"fog: sim://labjack-t7/fog reports product number 9, which is not a LabJack T4 or T7"
+    ):
         s.gyro.identify()
     other = labjack()
     other.registers._cells[lj.SCAN_RATE.number] = float32("big", lambda _: 980.0, lambda _value, _t_s: True)
-    with pytest.raises(WrongInstrument, match=r"scans 980 times per second, bench file 1000; set sample_rate_hz = 980"):
+    with pytest.raises(
+        WrongInstrument, match=r"scans 980 times per second, but the bench file states 1000; set sample_rate_hz = 980"
+    ):
         other.gyro.start()
     bent = labjack()
     bent.registers.constants[1] *= 1.001
-    with pytest.raises(WrongInstrument, match="differ by 1000 ppm, limit 20 ppm; check its calibration"):
+    with pytest.raises(WrongInstrument, match="differ by 1000 ppm, limit 20 ppm; check the calibration"):
         bent.gyro.identify()
 
 
@@ -220,7 +226,7 @@ def test_silence(labjack: Callable[..., Any]) -> None:
 
 @pytest.mark.parametrize(
     ("options", "text"),
-    [({"inputs": [0, 1]}, "2 inputs for 1 axes"), ({"thermometer_input": 0}, "an input carries two signals")],
+    [({"inputs": [0, 1]}, "2 inputs for 1 axes"), ({"thermometer_input": 0}, "one input is given for two signals")],
 )
 def test_wrong_wiring_is_refused(labjack: Callable[..., Any], options: dict[str, Any], text: str) -> None:
     with pytest.raises(ValidationError, match=text):

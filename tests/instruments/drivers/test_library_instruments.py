@@ -65,7 +65,7 @@ def test_pymeasures_own_class_controls_the_chamber(thermotron: Callable[..., Any
 def test_its_program_is_refused_and_its_safe_state_may_be_off(thermotron: Callable[..., Any]) -> None:
     s = thermotron(safe_state="off")
     s.state.program = True
-    with pytest.raises(RequestRejected, match="a profile runs"):
+    with pytest.raises(RequestRejected, match="a profile is running"):
         s.driver.set_temperature_c(40.0)
     s.state.program = False
     s.driver.set_temperature_c(40.0)
@@ -186,7 +186,7 @@ def test_instruments_of_msl_equipment(monkeypatch: pytest.MonkeyPatch) -> None:
     driver.close()
     properties = {"manufacturer": "OMEGA", "model": "iTHX-W3", "serial": "4440", "timeout": 2}
     assert asked == [("TCP::192.168.1.100::2000", properties), "disconnected"]
-    with pytest.raises(WrongInstrument, match="names serial number '4441'"):
+    with pytest.raises(WrongInstrument, match="gives serial number '4441'"):
         reference(**settings | {"serial": "4441"}).identify()
 
 

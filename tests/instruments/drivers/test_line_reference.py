@@ -77,7 +77,10 @@ def test_replies_that_manuals_print(reference: Callable[..., Any], reply: str) -
 def test_another_unit_is_refused(reference: Callable[..., Any]) -> None:
     driver = reference(model="fluke-1521")
     driver.simulated.unit = "F"
-    with pytest.raises(MalformedReply, match=r"^reference: answers in 'F' instead of 'C'; set its unit at its panel$"):
+    with pytest.raises(
+        MalformedReply,
+        match=r"^reference: answers in 'F' instead of 'C'; set the unit of measurement at the panel of the instrument$",
+    ):
         driver.read()
 
 
@@ -85,7 +88,7 @@ def test_a_certificate_belongs_to_one_serial_number(reference: Callable[..., Any
     driver = reference(model="fluke-1529", serial="B77", certificate="NMI 4711, 2026-03-02")
     assert driver.identify() == "FLUKE,fluke-1529,B77,1.00; certificate NMI 4711, 2026-03-02"
     driver.simulated.identity = "FLUKE,1529,A08125,1.10"
-    with pytest.raises(WrongInstrument, match="the bench file names serial number 'B77'; correct the port"):
+    with pytest.raises(WrongInstrument, match="the bench file gives serial number 'B77'; correct the port"):
         driver.identify()
 
 

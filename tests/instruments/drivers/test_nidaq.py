@@ -91,7 +91,7 @@ def test_failures_of_nidaqmx(daq: Callable[..., Any], monkeypatch: pytest.Monkey
     gyro = daq()
     gyro.module.rate_hz = 1950.0
     with pytest.raises(
-        WrongInstrument, match="scans 1950 times per second, bench file 2000; set sample_rate_hz = 1950"
+        WrongInstrument, match="scans 1950 times per second, but the bench file states 2000; set sample_rate_hz = 1950"
     ):
         gyro.start()
     gyro.module.rate_hz = None

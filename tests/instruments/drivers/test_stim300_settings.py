@@ -35,22 +35,35 @@ def mean_dps(s: Any) -> float:
 @pytest.mark.parametrize(
     ("device", "says"),
     [
-        ({"output_unit": "incremental"}, "gyro output unit INCREMENTAL ANGLE in deg, needed ANGULAR RATE or AVERAGE"),
-        ({"output_unit": "integrated"}, "gyro output unit INTEGRATED ANGLE in deg, needed ANGULAR RATE or AVERAGE"),
-        ({"sample_rate_hz": 250}, "sample rate 250 Hz, bench file 125 Hz"),
-        ({"datagram": 0xA7}, "datagram 0xA7, bench file 0x94"),
-        ({"datagram": 0x90}, "datagram 0x90, bench file 0x94"),
+        (
+            {"output_unit": "incremental"},
+            "the gyro output unit is INCREMENTAL ANGLE in deg instead of ANGULAR RATE or AVERAGE",
+        ),
+        (
+            {"output_unit": "integrated"},
+            "the gyro output unit is INTEGRATED ANGLE in deg instead of ANGULAR RATE or AVERAGE",
+        ),
+        ({"sample_rate_hz": 250}, "the sample rate is 250 Hz instead of 125 Hz"),
+        ({"datagram": 0xA7}, "the datagram is 0xA7 instead of 0x94"),
+        ({"datagram": 0x90}, "the datagram is 0x90 instead of 0x94"),
         ({"crlf": True}, "CR LF on, bench file off"),
-        ({"sample_rate_hz": 500, "crlf": True}, "sample rate 500 Hz, bench file 125 Hz; CR LF on, bench file off; set"),
+        (
+            {"sample_rate_hz": 500, "crlf": True},
+            "the sample rate is 500 Hz instead of 125 Hz; CR LF on, bench file off; set",
+        ),
     ],
 )
 def test_a_unit_that_is_set_otherwise_is_refused(stand: Make, device: dict[str, Any], says: str) -> None:
     s = unit(stand, device)
     with pytest.raises(WrongInstrument) as refused:
         s.gyro.identify()
-    assert str(refused.value).startswith("mems: the unit on sim://stim300/mems is set otherwise than needed: ")
+    assert str(refused.value).startswith(
+        "mems: the unit on sim://stim300/mems is not configured as the bench file requires:  "
+    )
     assert says in str(refused.value)
-    assert str(refused.value).endswith("set the unit in its service mode (commands u, m, d) or correct the bench file")
+    assert str(refused.value).endswith(
+        "configure the unit in its service mode (commands u, m, d), or correct the bench file"
+    )
 
 
 def test_average_rates_are_rates(stand: Make) -> None:
@@ -86,7 +99,8 @@ def test_the_serial_number_of_the_bench_file_is_held_against_the_units(stand: Ma
     assert unit(stand, serial=written).gyro.identify().serial == written
     other = unit(stand, {"serial": "N25582405002003"}, serial=written)
     with pytest.raises(
-        WrongInstrument, match=f"has serial number N25582405002003, bench file or campaign says {written}; connect the"
+        WrongInstrument,
+        match=f"has serial number N25582405002003, but the bench file or the campaign names {written}; connect the",
     ):
         other.gyro.identify()
 

@@ -99,7 +99,7 @@ def test_a_counter_that_stands_is_told(stand: Make, monkeypatch: pytest.MonkeyPa
     message = simulated.message
     monkeypatch.setattr(simulated, "message", lambda f, numbers: message(f, numbers | {"sequence": 7}))
     with pytest.raises(
-        MalformedReply, match=r"mems: the counter on sim://.* stands at 7 in \d+ readings in a row; check"
+        MalformedReply, match=r"mems: the sample counter on sim://.* stands at 7 in \d+ successive readings; check"
     ):
         s.gyro.read(2.0)
 
@@ -121,7 +121,7 @@ def test_bytes_of_another_baud_rate_are_told(stand: Make, monkeypatch: pytest.Mo
     s.gyro.read(1.0)
     altered(s, monkeypatch, lambda data: bytes(each & 0x9B for each in data))
     with pytest.raises(
-        NoReply, match=r"no intact KVH 1750 reading on sim://\S+ for 2.\d s: \d+ bytes came .* baud rate 921600"
+        NoReply, match=r"no intact KVH 1750 reading on sim://\S+ for 2.\d s: \d+ bytes arrived .* baud rate 921600"
     ):
         read_on(s, 4.0)
 

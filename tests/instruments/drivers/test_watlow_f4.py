@@ -32,9 +32,9 @@ def test_it_says_what_it_is(f4: Any) -> None:
 @pytest.mark.parametrize(
     ("attribute", "value", "text"),
     [
-        ("model", 9600, "model register holds 9600, an F4's holds 5270"),
+        ("model", 9600, "model register reads 9600 instead of 5270"),
         ("scale", 0, "works in Fahrenheit"),
-        ("units", 1, "measures no temperature"),
+        ("units", 1, "does not measure a temperature"),
     ],
 )
 def test_another_controller_or_fahrenheit_is_refused(f4: Any, attribute: str, value: int, text: str) -> None:
@@ -51,7 +51,9 @@ def test_the_narrower_limits_count(make_rig: Callable[..., Any]) -> None:
 
 @pytest.mark.parametrize("temperature_c", [-40.1, 120.1, 1e6, float("nan"), float("inf")])
 def test_a_set_point_beyond_the_limits_is_not_sent(f4: Any, temperature_c: float) -> None:
-    with pytest.raises(LimitError, match=r"chamber: set point .* outside -40 to 120 deg C .*nothing was written"):
+    with pytest.raises(
+        LimitError, match=r"chamber: set point .* outside the limits, -40 to 120 deg C .*nothing was written"
+    ):
         f4.driver.set_temperature_c(temperature_c)
     assert f4.simulated.writes == []
 
@@ -101,7 +103,7 @@ def test_what_somebody_changed_at_the_panel_is_set_again(f4: Any) -> None:
 
 def test_a_set_point_that_reads_back_otherwise_is_an_error(f4: Any) -> None:
     f4.simulated.on_run_page = False
-    with pytest.raises(RequestRejected, match=r"40 deg C was written but .*25 deg C read back; .*run page"):
+    with pytest.raises(RequestRejected, match=r"40 deg C was written, but .*reports 25 deg C; .*run page"):
         f4.driver.set_temperature_c(40.0)
 
 
@@ -135,7 +137,7 @@ def test_a_profile_of_somebody_is_not_ended(f4: Any, mode: int) -> None:
     f4.simulated.mode = mode
     f4.simulated.setpoint = 400
     for act in (lambda: f4.driver.set_temperature_c(40.0), f4.driver.make_safe):
-        with pytest.raises(RequestRejected, match="a profile runs or is held"):
+        with pytest.raises(RequestRejected, match="a profile is running or held"):
             act()
     assert f4.simulated.mode == mode
     assert TERMINATE_FRAME not in sent(f4)
@@ -169,7 +171,7 @@ def test_alarms_come_from_the_inputs_that_are_wired(make_rig: Callable[..., Any]
 def test_an_input_that_profiles_wait_for_is_no_alarm(make_rig: Callable[..., Any]) -> None:
     rig = make_rig("f4", alarm_inputs=(2,))
     rig.simulated.input_functions[1] = 10
-    with pytest.raises(WrongInstrument, match="digital input 2 is a profile's wait-for input"):
+    with pytest.raises(WrongInstrument, match="digital input 2 as the wait-for input of a profile"):
         rig.driver.identify()
 
 

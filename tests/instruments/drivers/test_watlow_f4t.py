@@ -25,7 +25,7 @@ def test_it_says_what_it_is(f4t: Any) -> None:
 
 def test_another_part_number_is_another_instrument(f4t: Any) -> None:
     f4t.simulated.part_number[:3] = [ord(letter) for letter in "PM6"]
-    with pytest.raises(WrongInstrument, match="part number 'PM61A1A1A1A1A1A' is not an F4T's"):
+    with pytest.raises(WrongInstrument, match="part number 'PM61A1A1A1A1A1A' is not that of an F4T"):
         f4t.driver.identify()
 
 
@@ -69,7 +69,7 @@ def test_a_set_point_that_reads_back_otherwise_is_an_error(f4t: Any, monkeypatch
     f4t.simulated._cells[2782] = f4t.simulated._cells[2782].__class__(
         f4t.simulated._cells[2782].get, lambda _words, _t_s: True, words=2
     )
-    with pytest.raises(RequestRejected, match="40 deg C was written but 25 deg C read back"):
+    with pytest.raises(RequestRejected, match="40 deg C was written, but the controller reports 25 deg C"):
         f4t.driver.set_temperature_c(40.0)
 
 
@@ -112,7 +112,7 @@ def test_control_that_is_switched_off_is_left_to_the_person(f4t: Any, mode: int,
 def test_a_profile_of_somebody_is_not_ended(f4t: Any, state: int) -> None:
     f4t.simulated.profile_state = state
     for act in (lambda: f4t.driver.set_temperature_c(40.0), f4t.driver.make_safe):
-        with pytest.raises(RequestRejected, match="a profile runs or is held"):
+        with pytest.raises(RequestRejected, match="a profile is running or held"):
             act()
     assert f4t.simulated.profile_state == state
 

@@ -71,9 +71,9 @@ def test_each_mistake_is_made_once(mistake: str, came_deg: float, up: str) -> No
 @pytest.mark.parametrize(
     ("settings", "said"),
     [
-        ({"speed": 1}, "hand.speed is not known; there are u_deg, rate_dps, reaction_s, mistakes"),
-        ({"rate_dps": 0}, "hand.rate_dps = 0 is no positive number"),
-        ({"u_deg": "small"}, "hand.u_deg = 'small' is no positive number"),
+        ({"speed": 1}, "hand.speed is not known; choose one of u_deg, rate_dps, reaction_s, mistakes"),
+        ({"rate_dps": 0}, "hand.rate_dps = 0; give a number above 0"),
+        ({"u_deg": "small"}, "hand.u_deg = 'small'; give a number above 0"),
         ({"mistakes": ["drop"]}, "give a list of short, axis, direction"),
     ],
 )

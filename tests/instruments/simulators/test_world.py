@@ -145,5 +145,5 @@ def test_every_effect_can_be_hidden_and_its_size_counts(stand: Make, effect: str
 
 
 def test_what_cannot_be_hidden_is_named(stand: Make) -> None:
-    with pytest.raises(ValueError, match=r"'gremlins' cannot be hidden \(there are .*bias"):
+    with pytest.raises(ValueError, match=r"'gremlins' cannot be hidden; choose one of .*bias"):
         stand("triaxial-sim", simulation={"hidden": {"gremlins": 1.0}})

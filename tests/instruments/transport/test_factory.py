@@ -27,7 +27,8 @@ from instruments.transport.factory import Ports
 def test_a_simulated_address_needs_a_simulation(opener: Any) -> None:
     with pytest.raises(
         LinkError,
-        match=r"table: sim://.* is a simulated instrument, but this bench has no simulation; correct the address",
+        match=r"table: sim://.* is the address of a simulated instrument, but this bench is not "
+        r"simulated; correct the address",
     ):
         opener(Ports(VirtualClock()))
 
@@ -48,11 +49,14 @@ def test_a_time_out_of_the_bench_clock_is_wall_time_on_hardware_and_itself_in_si
 @pytest.mark.parametrize(
     ("number", "says"),
     [
-        (errno.EACCES, r"check that this user may use it: run `sudo usermod -aG dialout \$USER`, then log in again$"),
-        (errno.EBUSY, r"check which other process has it open: run `fuser -v /dev/ttyUSB0`, and end that one$"),
-        (errno.EAGAIN, r"check which other process has it open: run `fuser -v /dev/ttyUSB0`, and end that one$"),
+        (
+            errno.EACCES,
+            r"check that this user has access to the port: run `sudo usermod -aG dialout \$USER`, then log in again$",
+        ),
+        (errno.EBUSY, r"check which other process has it open: run `fuser -v /dev/ttyUSB0`, and end that process$"),
+        (errno.EAGAIN, r"check which other process has it open: run `fuser -v /dev/ttyUSB0`, and end that process$"),
         (errno.ENOENT, r"check the cable and the port's name; "),
-        (errno.EIO, r"check the cable, the port's name and who else uses it$"),
+        (errno.EIO, r"check the cable, the name of the port, and which other process uses the port$"),
     ],
 )
 def test_a_port_that_cannot_be_opened_is_named_with_the_command_that_corrects_it(

@@ -143,7 +143,7 @@ def test_an_exception_reply_is_a_refusal_and_not_tried_again(bench: Bench, code:
 @pytest.mark.parametrize(
     ("code", "name"),
     [
-        (8, "memory parity error; switch it off and on"),
+        (8, "the instrument has a memory parity error; switch it off and on"),
         (10, "gateway path unavailable; check the gateway's serial port"),
         (11, "gateway target device failed to respond; check address, power and cable behind the gateway"),
     ],
@@ -158,7 +158,7 @@ def test_a_busy_instrument_is_asked_again(bench: Bench) -> None:
     bench.faults.arm("modbus_exception", value=6, count=2)
     assert bench.registers.get(AIR) == -221
     bench.faults.arm("modbus_exception", value=6)
-    with pytest.raises(RefusedRegister, match="it is busy"):
+    with pytest.raises(RefusedRegister, match="the instrument is busy"):
         bench.registers.get(AIR)
 
 
@@ -237,10 +237,16 @@ def test_a_reply_that_does_not_fit_is_no_reply(make_bench: Callable[..., Bench],
     ("answer", "text"),
     [
         ("{t} 0000 0005 02 03 02 FF23", r"unit 2 answered instead of unit 1; set address in the bench file"),
-        ("0063 0000 0005 01 03 02 FF23", r"the reply to request 99 came, not to request 3; find the second master"),
-        ("{t} 0001 0005 01 03 02 FF23", r"protocol number 1 came, Modbus TCP has 0; check host and tcp_port"),
-        (b"HTTP/1.0 400 Bad Request\r\n\r\n".hex(), r"an HTTP server answered, no Modbus instrument; check host"),
-        ("{t} 0000 0005 01 03", r"8 bytes came that are no reply; check line settings and cable"),
+        (
+            "0063 0000 0005 01 03 02 FF23",
+            r"the reply to request 99 arrived instead of that to request 3; find the second Modbus master",
+        ),
+        (
+            "{t} 0001 0005 01 03 02 FF23",
+            r"the reply has protocol number 1 instead of 0 \(Modbus TCP\); check host and tcp_port",
+        ),
+        (b"HTTP/1.0 400 Bad Request\r\n\r\n".hex(), r"an HTTP server answered, not a Modbus instrument; check host"),
+        ("{t} 0000 0005 01 03", r"8 bytes arrived that are not a Modbus reply; check line settings and cable"),
     ],
 )
 def test_what_came_instead_of_a_reply_is_said_in_one_line(
@@ -307,7 +313,7 @@ def test_the_other_write_function_is_the_fall_back(bench: Bench, preferred: Any,
 
 
 def test_a_refused_value_does_not_fall_back(bench: Bench) -> None:
-    with pytest.raises(RefusedRegister, match="exception 3, it does not accept the value") as caught:
+    with pytest.raises(RefusedRegister, match="exception 3, the instrument does not accept the value") as caught:
         bench.registers.put(SETPOINT, 666)
     assert caught.value.code == 3
     assert bench.writes == [666]
@@ -329,14 +335,16 @@ def test_a_register_to_read_is_not_written(bench: Bench) -> None:
 
 
 def test_a_value_that_cannot_be_is_named_with_its_range(bench: Bench) -> None:
-    with pytest.raises(MalformedReply, match=r"air \(register 100\) reads -221 counts, possible are 0 to 10"):
+    with pytest.raises(
+        MalformedReply, match=r"air \(register 100\) reads -221 counts, outside the possible range of 0 to 10"
+    ):
         bench.registers.get(Register(100, "air", "int16", "counts", low=0, high=10))
 
 
 @pytest.mark.parametrize("absent", [0, -32000])
 def test_an_absent_register_may_also_hold_a_code(bench: Bench, absent: int) -> None:
     missing = Register(999, "missing", "int16")
-    with pytest.raises(RefusedRegister, match="exception 2, it has no such register"):
+    with pytest.raises(RefusedRegister, match="exception 2, the instrument has no such register"):
         bench.registers.get(missing)
     bench.device.absent = absent
     assert bench.registers.get(missing) == absent
@@ -366,7 +374,7 @@ def test_foreign_text_stays_on_one_line() -> None:
 
 
 def test_a_real_host_that_refuses_is_named() -> None:
-    with pytest.raises(LinkError, match=r"chamber: no Modbus TCP at 127\.0\.0\.1:1; check address"):
+    with pytest.raises(LinkError, match=r"chamber: no Modbus TCP instrument answers at 127\.0\.0\.1:1; check address"):
         Ports(VirtualClock()).modbus_tcp("127.0.0.1", 1, device="chamber", timeout_s=1.0)
 
 

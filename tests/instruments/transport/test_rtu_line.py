@@ -117,7 +117,10 @@ def test_a_line_without_a_fault_waits_for_nothing() -> None:
 def test_a_line_that_is_never_silent_is_said_in_bounded_time() -> None:
     line = Line()
     line.transmit = lambda _t_s: b"\x55\xaa"  # type: ignore[method-assign]
-    with pytest.raises(MalformedReply, match=r"chamber: the line was never silent .* find the second master"):
+    with pytest.raises(
+        MalformedReply,
+        match=r"chamber: labctl sent .*, but the line was never silent for .* find a second Modbus master",
+    ):
         line.registers.get(AIR)
     assert line.clock.now_s() < 70
     line.registers.close()
@@ -159,7 +162,9 @@ def test_stray_bytes_before_a_reply_are_told_and_survived(stray: bytes) -> None:
     line.registers.put(SETPOINT, 300)
     assert line.held == 300
     assert line.clock.now_s() < 0.5
-    assert line.registers.remarks == ("stray bytes come before replies; check termination and bias of the RS-485 line",)
+    assert line.registers.remarks == (
+        "stray bytes arrive before replies; check termination and bias of the RS-485 line",
+    )
     line.registers.close()
 
 
@@ -197,6 +202,8 @@ def test_a_reply_of_another_unit_says_so() -> None:
 
 def test_garbage_is_counted_in_the_message() -> None:
     line: Any = Line(shape=lambda _request, _reply: b"garbage")
-    with pytest.raises(MalformedReply, match="7 bytes came that are no reply; check line settings and cable"):
+    with pytest.raises(
+        MalformedReply, match="7 bytes arrived that are not a Modbus reply; check line settings and cable"
+    ):
         line.registers.get(AIR)
     line.registers.close()

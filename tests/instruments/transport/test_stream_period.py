@@ -104,7 +104,7 @@ def test_a_rate_beyond_the_tolerance_is_named(rate_hz: float) -> None:
     assert lost == 0
     with pytest.raises(
         WrongInstrument,
-        match=rf"fog: sends {rate_hz:.3g}\S* readings/s on /dev/ttyUSB0, and the bench file says 100, limit \+-4 %; "
+        match=rf"fog: sends {rate_hz:.3g}\S* readings/s on /dev/ttyUSB0, but the bench file says 100, limit \+-4 %; "
         r"set sample_rate_hz = ",
     ):
         refuse_other_rate("fog", "/dev/ttyUSB0", stream.line)

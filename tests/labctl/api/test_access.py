@@ -105,7 +105,10 @@ def test_every_path_asks_for_its_role_and_no_more(guarded: Guarded, method: str,
         assert (answer.status_code != 403) == allowed, role
         if not allowed:
             assert answer.json()["type"] == "urn:labctl:problem:not-allowed"
-            assert f"{role.value} is {role.value}; use a key of the role" in answer.json()["detail"]
+            assert (
+                f"key {role.value} has the role {role.value}, but this request needs the role"
+                in answer.json()["detail"]
+            )
 
 
 @pytest.mark.parametrize("path", ["/", "/units/FOG-0001", "/static/js/main.js"])
@@ -139,9 +142,9 @@ def test_a_key_is_shown_once_and_kept_as_a_digest(guarded: Guarded, tmp_path: Pa
         made = create_key(store, KeyRequest(name="robot", role=Role.VIEWER), CLOCK.utc())
         other = create_key(store, KeyRequest(name="other", role=Role.VIEWER), CLOCK.utc())
         assert made.key != other.key
-        with pytest.raises(Conflict, match="exists already"):
+        with pytest.raises(Conflict, match="a name is used only once"):
             create_key(store, KeyRequest(name="robot", role=Role.APPROVER), CLOCK.utc())
-        with pytest.raises(NotFound, match="no key 'nobody'"):
+        with pytest.raises(NotFound, match="there is no key 'nobody'"):
             revoke_key(store, "nobody", "x", CLOCK.utc())
         revoke_key(store, "robot", "x", CLOCK.utc())
         with pytest.raises(Conflict, match="already revoked"):
@@ -175,7 +178,7 @@ def test_any_other_address_needs_a_key_first(tmp_path: Path) -> None:
         create_key(store, KeyRequest(name="only", role=Role.VIEWER), CLOCK.utc())
         require_an_api_key(store, "--host 0.0.0.0")
         revoke_key(store, "only", "x", CLOCK.utc())
-        with pytest.raises(BadInput, match="no key"):
+        with pytest.raises(BadInput, match="no API key"):
             require_an_api_key(store, "--host 0.0.0.0")
 
 
@@ -210,7 +213,7 @@ def test_this_machine_needs_no_key(loopback: Ask, host: str) -> None:
 def test_a_name_that_was_bent_to_this_machine_is_refused(loopback: Ask, host: str) -> None:
     answer = loopback(host=host)
     assert answer.status_code == 403
-    assert "is not accepted; use an address of this list" in answer.json()["detail"]
+    assert "is not accepted; use one of these addresses" in answer.json()["detail"]
 
 
 @pytest.mark.parametrize(

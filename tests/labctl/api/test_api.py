@@ -245,7 +245,7 @@ def test_a_service_that_starts_again_says_what_was_left(tmp_path: Path) -> None:
     with TestClient(create_app(LabService(store, SystemClock()))) as client:
         answer = client.get("/api/campaigns").json()
         assert (answer[0]["state"], answer[0]["abandoned"]) == ("planned", True)
-        assert "no process runs it any more" in answer[0]["reason"]
+        assert "no process runs the campaign any more" in answer[0]["reason"]
     store = Store(Database(location, write=True))
     runner = BenchRunner(store, load_bench("single-axis-sim"), VirtualClock)
     with TestClient(create_app(LabService(store, SystemClock(), runner))) as client:

@@ -163,7 +163,7 @@ def test_a_recording_at_constant_rates_is_refused_in_one_sentence(client: TestCl
     assert refused.status_code == 400
     assert refused.json()["detail"] == (
         f"recording {number} has one rate in each data set (motion = 'rates'); "
-        "ask for its comparison with a version instead"
+        "request its comparison with a version instead"
     )
     (row,) = client.get("/api/recordings").json()
     assert row["motion"] == "rates"

@@ -78,9 +78,9 @@ def asymmetry(client: TestClient, recording: int) -> float:
 @pytest.mark.parametrize(
     ("body", "says"),
     [
-        ({"recipe": "short", "hide": ["gremlins"]}, "effect 'gremlins' cannot be hidden (there are"),
+        ({"recipe": "short", "hide": ["gremlins"]}, "effect 'gremlins' cannot be hidden; choose one of"),
         ({"recipe": "short", "hide": ["scale_factor_asymmetry=much"]}, "is not a finite number"),
-        ({"recipe": "/etc/passwd"}, "send its text, or one of"),
+        ({"recipe": "/etc/passwd"}, "send the text of a recipe, or one of"),
     ],
 )
 def test_what_cannot_be_simulated_says_why(client: TestClient, body: dict[str, Any], says: str) -> None:

@@ -203,7 +203,7 @@ def test_pictures_are_figures_with_how_to_read_them(
     pictures = client.get("/api/units/ONE/calibrations/1/pictures").json()
     found = {picture["id"]: picture for picture in pictures}
     assert {"map", "ladder"} <= set(found)
-    assert found["map"]["how_to_read"].startswith("Each cell is")
+    assert found["map"]["how_to_read"].startswith("Each cell shows")
     assert {"data", "layout"} <= set(found["map"]["figure"])
     assert found["map"]["figure"]["data"][0]["type"] == "heatmap"
 

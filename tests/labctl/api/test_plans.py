@@ -57,9 +57,9 @@ def test_a_plan_can_be_drawn_before_anything_moves(client: TestClient) -> None:
 @pytest.mark.parametrize(
     ("body", "slug", "says"),
     [
-        ({"recipe": "/etc/passwd"}, "recipe", "send its text, or one of"),
+        ({"recipe": "/etc/passwd"}, "recipe", "send the text of a recipe, or one of"),
         ({"recipe": "table1-x-table2"}, "plan-refused", "beyond the"),
-        ({"recipe": ENDLESS}, "plan-refused", "where a campaign has at most 100000"),
+        ({"recipe": ENDLESS}, "plan-refused", "but a campaign may have at most 100000"),
         ({"recipe": LONG, "visibility": True}, "bad-input", "visibility: the plan takes 104 days"),
     ],
 )

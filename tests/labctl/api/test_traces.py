@@ -90,7 +90,7 @@ def test_a_window_of_few_data_sets_is_drawn_from_the_readings(fast: TestClient, 
     [
         ({"channel": "gyro_y"}, "recording 1 has no channel 'gyro_y' (there are gyro_z, table_rate_dps, temperature_c"),
         ({"from_s": "nan"}, "from_s = nan s: give a number"),
-        ({"from_s": 5, "until_s": 5}, "give a window whose start lies before its end"),
+        ({"from_s": 5, "until_s": 5}, "give a start that is before the end"),
     ],
 )
 def test_what_is_no_trace_is_refused_by_name(fast: TestClient, query: dict[str, Any], says: str) -> None:

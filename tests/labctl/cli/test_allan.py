@@ -44,6 +44,6 @@ def test_of_any_column_of_a_table(lab: Lab) -> None:
     assert "there is no column 'gyro_y'" in lab.run("allan", str(table), "--column", "gyro_y", status=2).stderr
     assert "holds text" in lab.run("allan", str(table), "--column", "note", status=2).stderr
     table.write_text("time,gyro_z\n0,1\n")
-    assert "column 't_s' is missing" in lab.run("allan", str(table), status=2).stderr
+    assert "column 't_s' (time, s) is missing" in lab.run("allan", str(table), status=2).stderr
     table.write_text("t_s,gyro_z\n" + "\n".join(f"{k},{k % 3}" for k in range(20)))
     assert "has 20 readings; an Allan deviation needs 300" in lab.run("allan", str(table), status=2).stderr

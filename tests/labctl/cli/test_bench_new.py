@@ -77,7 +77,7 @@ def test_it_finds_what_is_on_each_port_and_writes_a_file_that_passes_the_check(
     assert {line["heard"] for line in sent if line["device"] == "fog"} == {"RRR"}  # once it is known who is there
     checked = lab.json("bench", "check", str(path))
     assert checked["ok"], checked
-    assert lab.run(*command, "--yes", status=2).stderr.startswith(f"labctl: {path} exists and stays as it is")
+    assert lab.run(*command, "--yes", status=2).stderr.startswith(f"labctl: {path} exists already and was not changed")
 
 
 def test_what_is_missing_is_named_and_nothing_is_written(
@@ -92,7 +92,7 @@ def test_what_is_missing_is_named_and_nothing_is_written(
     said = lab.run("bench", "new", str(path), "--port", str(bench.table and bench.table.port), "--yes", status=2).stderr
     assert "no gyro was recognised, and a bench needs one" in said
     said = lab.run("bench", "new", str(path), "--port", port, "--set", "nose.serial=1", "--yes", status=2).stderr
-    assert "--set nose.serial: there is no such section; there are kvh-dsp3000" in said
+    assert "--set nose.serial: the bench file has no such section; choose one of kvh-dsp3000" in said
 
 
 def test_a_chamber_on_a_serial_line_and_another_kind_of_lines_are_recognised() -> None:
@@ -123,7 +123,7 @@ def test_a_port_on_which_something_unknown_comes_gets_no_byte() -> None:
 
     found = find_on_port(os.ttyname(theirs), Talking())
     assert found.driver == ""
-    assert "bytes came that no driver recognises, so nothing was sent" in found.why_not
+    assert "bytes arrived that no driver recognises, so labctl sent nothing" in found.why_not
     with pytest.raises(BlockingIOError):
         os.read(ours, 1)
     os.close(ours)
@@ -162,7 +162,7 @@ def test_ports_are_listed_with_the_name_for_a_bench_file(lab: Lab, monkeypatch: 
     (port,) = lab.json("bench", "ports")
     assert port == {
         "device": "/dev/null", "path": "/dev/serial/by-id/usb-A9", "adapter": "A9", "product": "FT232R",
-        "trouble": "process 8 (minicom) has it open: end it",
+        "trouble": "process 8 (minicom) has the port open: end that process",
     }  # fmt: skip
     assert (
         "/dev/serial/by-id/usb-A9  now /dev/null; USB adapter A9 (FT232R); process 8"

@@ -82,7 +82,7 @@ def test_several_problems_are_one_line_each(lab: Lab, tmp_path: Path) -> None:
     log = tmp_path / "odd.csv"
     log.write_text(csv_text(at_rest(), NAMES), encoding="utf-8")
     lines = lab.run("import", str(log), status=2).stderr.strip().splitlines()
-    assert "4 problems, nothing of it was kept:" in lines[0]
+    assert "4 problems; nothing was imported:" in lines[0]
     assert [line[:4] for line in lines[1:]] == ["  - "] * 4
     assert "--write-map MAP.toml" in lines[-1]
 
@@ -113,7 +113,7 @@ def test_a_map_for_a_folder_in_the_interchange_format_is_refused(lab: Lab, log: 
     file = tmp_path / "map.toml"
     file.write_text("", encoding="utf-8")
     refused = lab.run("import", str(EXAMPLES / "osu-fog"), "--map", str(file), status=2)
-    assert "leave the map out" in refused.stderr
+    assert "leave --map out" in refused.stderr
 
 
 def test_a_log_of_poses_is_kept_without_warnings_about_rates(lab: Lab, tmp_path: Path) -> None:

@@ -66,7 +66,7 @@ def test_the_code_gives_the_stated_numbers_bit_by_bit(any_calibration: Calibrati
     apart = (
         found[:inside, 1:] * fixed.full_scale_dps / 2**31 - Compensator(any_calibration).compensate(raw, warm).rate_dps
     )
-    assert np.abs(apart).max() <= stated(text, "Differs from the calibration in what it carries")
+    assert np.abs(apart).max() <= stated(text, "Rates corrected by this file differ from those of the calibration")
 
 
 def test_the_tables_are_nearer_with_more_temperatures(mems: Calibration) -> None:

@@ -68,7 +68,7 @@ def test_the_controllers_formula_is_within_the_stated_bounds(
     warm = np.linspace(*calibration.temperature_c, 301)
     still = at_true_rate(calibration, 0.0, warm)
     left = np.rad2deg(law(np.deg2rad(still), warm))
-    at_rest = stated(text, "Differs from the calibration in what it carries")
+    at_rest = stated(text, "Rates corrected by this file differ from those of the calibration")
     assert written.differs_dps is not None
     assert 0.9 * written.differs_dps <= np.abs(left).max() <= at_rest
     raw, hot = whole_range(calibration)
@@ -127,7 +127,7 @@ def test_names_and_limits_of_the_parameters(mems: Calibration) -> None:
         ("px4", {"instance": "4"}, "option instance = '4': give a whole number from 0 to 3"),
         ("px4", {"device_id": "0"}, "option device_id = '0': give a whole number from 1 to 2147483647"),
         ("px4", {"imu": "1"}, "option 'imu' is not known; options of this format: device_id, instance, tolerance_dps"),
-        ("ardupilot", {"tolerance_dps": "few"}, "option tolerance_dps = 'few' is no number"),
+        ("ardupilot", {"tolerance_dps": "few"}, "option tolerance_dps = 'few' is not a number"),
         (
             "ardupilot",
             {"tolerance_dps": "0.5"},
@@ -156,5 +156,5 @@ def test_what_a_controller_cannot_carry_is_refused(name: str, fog: Calibration, 
 
 def test_temperatures_beyond_a_controllers_limits_are_refused(mems: Calibration) -> None:
     document = {**mems.document, "validity": {"temperature_c": [90.0, 120.0], "rate_dps": [-1.0, 1.0]}}
-    with pytest.raises(BadInput, match="from 90 to 120 deg C; TMIN and TMAX of ArduPilot go from -70 to 80"):
+    with pytest.raises(BadInput, match="from 90 to 120 deg C; TMIN and TMAX of ArduPilot go only from -70 to 80"):
         write(Calibration(document), {})

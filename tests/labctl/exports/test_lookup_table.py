@@ -36,7 +36,7 @@ def test_the_interpolation_error_is_within_the_stated_one(any_calibration: Calib
     raw, warm = whole_range(any_calibration, temperatures=37)
     found = looked_up(text, any_calibration.axes, raw, warm)
     apart = np.abs(found - Compensator(any_calibration).compensate(raw, warm).rate_dps).max()
-    bound = stated(text, "Differs from the calibration in what it carries")
+    bound = stated(text, "Rates corrected by this file differ from those of the calibration")
     assert 0.2 * bound < apart <= bound
 
 

@@ -68,7 +68,7 @@ def test_its_tables_correct_within_the_stated_error(any_calibration: Calibration
     raw, warm = whole_range(any_calibration, temperatures=37)
     found = corrected(ET.fromstring(text), any_calibration.axes, raw, warm)
     apart = np.abs(found - Compensator(any_calibration).compensate(raw, warm).rate_dps).max()
-    bound = stated(text, "Differs from the calibration in what it carries")
+    bound = stated(text, "Rates corrected by this file differ from those of the calibration")
     assert 0.2 * bound < apart <= bound
 
 
@@ -88,6 +88,6 @@ def test_the_entry_has_the_elements_of_the_schema_in_order(fog: Calibration) -> 
 def test_facts_that_a_calibration_does_not_know_are_asked_for(fog: Calibration) -> None:
     with pytest.raises(BadInput, match=", ".join(NEEDED)):
         write(fog, {})
-    with pytest.raises(BadInput, match="option started = 'yesterday' is no date"):
+    with pytest.raises(BadInput, match="option started = 'yesterday' is not a date"):
         write(fog, {**OPTIONS, "started": "yesterday"})
     assert set(NEEDED) <= set(FORMAT.options)

@@ -84,7 +84,7 @@ def test_allan_figures_become_densities() -> None:
         (
             "kalibr",
             {"noise_dps_rthz": "0.1", "rate_hz": "9"},
-            "asks for one above 0; record the unit at rest for longer",
+            "needs a value above 0; record the unit at rest for longer",
         ),
         ("kalibr", {"noise_dps_rthz": "0.1,0.2"}, "give a number above 0, or 3 of them with commas, one for each of x"),
         ("ros2-imu", {"noise_dps_rthz": "-1"}, "option noise_dps_rthz = '-1': give a number above 0"),

@@ -70,7 +70,7 @@ def test_an_effect_of_another_package_comes_last(monkeypatch: pytest.MonkeyPatch
     [
         (Short, r"ValueError.*shape \(2,\) for 6 data sets"),
         (Failing, "KeyError.*angle"),
-        (Silent, "TypeError.*does not say its sentence"),
+        (Silent, "TypeError.*does not define sentence"),
         (Misnamed, "ValueError.*'Cable Torsion': small letters"),
         (Term, "TypeError.*is no subclass of"),
         (7, "TypeError"),

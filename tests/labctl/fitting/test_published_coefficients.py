@@ -135,7 +135,7 @@ def test_polynomials_in_temperature_are_the_simple_models(tmp_path: Path) -> Non
 def test_an_unknown_column_is_refused_with_what_to_write_instead(tmp_path: Path) -> None:
     columns = ["temperature_c", "scale_factor", "offset", "misalignment_x"]
     folder = table(tmp_path / "t", 'axes = ["z"]\n', columns, [[20, 1, 0, 0.0188], [40, 1, 0, 0.0188]])
-    with pytest.raises(BadRecording, match=r"'misalignment_x' is not known .* would be lost; .* given as k_xy"):
+    with pytest.raises(BadRecording, match=r"'misalignment_x' is not known .* remove or rename it. .* given as k_xy"):
         read_recording(folder)
 
 

@@ -89,7 +89,7 @@ def test_without_either_temperature_one_line_says_so() -> None:
     bare = replace(recording, columns={n: v for n, v in recording.columns.items() if n != "temperature_c"})
     model, _ = preset_for(None, ["bias"]).build(fit_data_of(recording))
     for act in (lambda: fit(bare, None, ["bias"]), lambda: criticise(bare, model)):
-        with pytest.raises(NotEnoughData, match="REST: column 'temperature_c' is missing, and so is 'chamber_c'"):
+        with pytest.raises(NotEnoughData, match="REST: columns 'temperature_c' and 'chamber_c' are both missing"):
             act()
     found = static_record(bare)  # an Allan deviation needs no temperature
     assert found is not None

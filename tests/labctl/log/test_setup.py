@@ -66,7 +66,7 @@ def test_the_level_is_the_environments(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(LOG_LEVEL_VARIABLE, "")
     assert level_asked() is None
     monkeypatch.setenv(LOG_LEVEL_VARIABLE, "loud")
-    with pytest.raises(BadInput, match="LABCTL_LOG_LEVEL=loud: name one of debug, info"):
+    with pytest.raises(BadInput, match="LABCTL_LOG_LEVEL=loud is not a log level; set it to one of debug, info"):
         level_asked()
 
 

@@ -52,7 +52,9 @@ def test_what_is_raised_is_raised_here_with_all_it_says(tmp_path: Path) -> None:
 
 def test_an_answer_that_cannot_travel_is_told_in_words(tmp_path: Path) -> None:
     refused = pytest.raises(
-        LabctlError, match=r"an answer cannot be sent between processes; report this with the version of labctl: .*lock"
+        LabctlError,
+        match=r"an answer cannot be sent between processes; report this text and the version of "
+        r"labctl to its maintainers: .*lock",
     )
     with serving(tmp_path / "calls", lambda *_: Answer(threading.Lock())) as caller, refused:
         caller.call("any")

@@ -120,7 +120,7 @@ def test_bad_rows_are_named(folder: Path, change: Callable[[list[str]], list[str
         (HEAD.replace('axes = ["z"]', 'axes = ["z", "z"]'), "an axis is repeated"),
         (HEAD + '[output.z]\nunit = "furlong"\n', r"output.z"),
         (HEAD + '[output.z]\nunit = "V"\n', r"needs a scale"),
-        (HEAD + '[output.z]\nunit = "V"\nscale = 0.0\n', r"scale must be a finite number other than 0"),
+        (HEAD + '[output.z]\nunit = "V"\nscale = 0.0\n', r"must be finite numbers, and scale must not be 0"),
         ("not toml at all [", r"not TOML"),
         (HEAD.replace("samples", "points"), r"needs a file points.parquet or points.csv"),
     ],

@@ -88,7 +88,7 @@ def test_a_table_of_coefficients_has_no_verdict_and_a_reason(lab: Lab) -> None:
     lab.run("fit", TABLE, "--model", "weiss1995")
     act = lab.json("certify", TABLE, "1", *BY, "--reason", "published")
     assert (act["verdict"], act["verdict_at"], act["override"]) == (None, None, False)
-    assert act["verdict_reason"] == "recording 2 is a table of coefficients: no measurements to judge by"
+    assert act["verdict_reason"] == "recording 2 is a table of coefficients and has no measurements to compare with"
     assert "verdict: none: recording 2 is a table" in lab.run("certifications", TABLE).stdout
 
 
@@ -97,7 +97,7 @@ def test_data_that_are_certainly_wrong_speak_against_their_version(lab: Lab, tmp
     lab.run("import", str(tmp_path / "wrong"))
     lab.run("fit", SIMULATED, "--model", "ojeda2000", "--accept-warnings")
     said = lab.run("certify", SIMULATED, "1", *BY, "--reason", "fits", status=2).stderr
-    assert "recording 2: axis z: the output falls when the table turns faster" in said
+    assert "recording 2: axis z: the output decreases when the table turns faster" in said
     assert "and fit again" in said
     act = lab.json("certify", SIMULATED, "1", *BY, *OVERRIDE_OPTIONS)
     assert "data" in {each["what"] for each in act["objections"]}

@@ -268,7 +268,7 @@ def test_the_command_lists_units_and_certifies_without_a_date(client: TestClient
     (unit,) = lab.json("units", "--due-within", "30d")
     assert (unit["serial"], unit["certified_version"], unit["overdue"]) == (FOG, 1, True)
     assert "overdue" in lab.run("units").stdout
-    assert "give a whole number with h, d or w" in lab.run("units", "--due-within", "soon", status=2).stderr
+    assert "give a whole number and h, d or w" in lab.run("units", "--due-within", "soon", status=2).stderr
     act = lab.json("certify", FOG, "1", "--by", "A", "--due-days", "0", "--override", "--reason", OVERRIDE["reason"])
     assert (act["due"], act["due_from"]) == (None, "user")
     assert "no unit is due" in lab.run("units", "--due-within", "30d").stdout

@@ -68,9 +68,9 @@ def test_what_cannot_be_followed_is_named(tmp_path: Path, turned: dict[str, np.n
 
     with pytest.raises(BadRecording, match=r"in\.csv: column 't_s' is missing"):
         follow({"gyro_z": turned["gyro_z"]})
-    with pytest.raises(BadInput, match=r"axis not named; name one .* \(x, z\)"):
+    with pytest.raises(BadInput, match=r"axis not named; name an axis .*\(x, z\)"):
         follow({**turned, "gyro_x": turned["gyro_z"]})
-    with pytest.raises(BadInput, match=r"axis y; name one .* \(z\)"):
+    with pytest.raises(BadInput, match=r"axis y; name an axis .*\(z\)"):
         follow(turned, axis="y")
     with pytest.raises(NotEnoughData, match="no valid reading"):
         follow({**turned, "valid": np.zeros(1100)})
@@ -98,7 +98,7 @@ def test_a_table_is_corrected_by_a_calibration_first(
     assert "axis z, uncorrected: 1100 readings, 0 left out" in shown
     assert "static bias" in shown
     missing = lab.run("orientation", "NO-UNIT", "--out", str(tmp_path / "a.csv"), status=2).stderr
-    assert "no such file; --calibration and --out are for a table" in missing
+    assert "there is no such file; leave out --calibration and --out" in missing
 
 
 @pytest.fixture

@@ -91,8 +91,11 @@ def test_a_version_is_verified_by_its_own_and_by_another_units_session(lab: Lab)
 @pytest.mark.parametrize(
     ("command", "said"),
     [
-        (("criticise", HAND, "--version", "1", "--recording", "1"), "in a recording of poses no rate is known"),
-        (("improve", HAND, "--version", "1", "--recording", "1", "--add", "bias_drift"), "of poses no rate is known"),
+        (("criticise", HAND, "--version", "1", "--recording", "1"), "before and after each turn, but no rate"),
+        (
+            ("improve", HAND, "--version", "1", "--recording", "1", "--add", "bias_drift"),
+            "before and after each turn, but no rate",
+        ),
         (("fit", HAND, "--recording", "1", "--model", "yang2018"), "with --model poses and without added effects"),
     ],
 )

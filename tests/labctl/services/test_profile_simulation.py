@@ -119,7 +119,7 @@ def test_the_memory_of_a_bandwidth_is_that_of_a_first_order_filter() -> None:
 
 
 def test_a_course_beyond_the_table_is_refused() -> None:
-    with pytest.raises(BadInput, match=r"a sine_sweep goes to .* deg/s, the table of bench"):
+    with pytest.raises(BadInput, match=r"a sine_sweep reaches .* deg/s, but the limit of the table of bench"):
         simulated(amplitude_dps=5000.0)
 
 
@@ -127,5 +127,5 @@ def test_no_campaign_runs_a_course(tmp_path: Path) -> None:
     path = tmp_path / "sweep.toml"
     path.write_text(RECIPE.format(amplitude=40))
     lab = open_store(str(tmp_path / "lab.sqlite"), write=True)
-    with lab as store, pytest.raises(BadInput, match="can be simulated only"):
+    with lab as store, pytest.raises(BadInput, match="can only be simulated"):
         prepare(store, str(path), load_bench("single-axis-sim"), VirtualClock(), clip=False)

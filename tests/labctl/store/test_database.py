@@ -96,7 +96,10 @@ def test_a_newer_database_is_refused_and_left_alone(location: str) -> None:
         raw.execute("UPDATE alembic_version SET version_num = '9999'")
     raw.close()
     before = Path(location).read_bytes()
-    with pytest.raises(StoreError, match="newer than this labctl"), open_store(location, write=True):
+    with (
+        pytest.raises(StoreError, match="this version of labctl knows only up to number"),
+        open_store(location, write=True),
+    ):
         pass
     assert Path(location).read_bytes() == before
 
@@ -223,7 +226,7 @@ def test_acts_of_before_verdicts_were_kept_have_none(store: Store, location: str
 
 
 def test_naive_instants_are_refused(store: Store) -> None:
-    with pytest.raises(sa.exc.StatementError, match="give an instant with a time zone"):
+    with pytest.raises(sa.exc.StatementError, match="has no time zone"):
         add_next(store, datetime(2026, 1, 1))  # noqa: DTZ001  that is the point
 
 

@@ -223,7 +223,7 @@ def test_a_writer_that_hangs_is_told_and_then_ended_by_the_server(url: str, monk
 
     def hang() -> None:
         with hanging.audit._database.writing():
-            with pytest.raises(StoreError, match=r"no write access within .*another process has it"):
+            with pytest.raises(StoreError, match=r"no write access within .*another process holds the lock"):
                 note(hasty, 1)
             note(patient, 2)
 

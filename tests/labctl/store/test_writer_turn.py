@@ -17,7 +17,10 @@ def test_a_held_writer_is_named_and_not_waited_for_again(tmp_path: Path, monkeyp
     monkeypatch.setattr(writer_turn, "WRITER_DEADLINE_S", 0.2)
     monkeypatch.setattr(writer_turn, "OVERDUE_DEADLINE_S", 0.05)
     with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
-        said = r"within 0\.2 s; the one writing connection is held by .*hold in thread 'the-holder', for .* s already"
+        said = (
+            r"within 0\.2 s; the only connection that writes is in use by .*hold in thread "
+            r"'the-holder', for .* s already"
+        )
         with held_writer(store) as began:
             began()
             with pytest.raises(StoreError, match=said) as caught:

@@ -32,7 +32,7 @@ def test_an_answer_to_an_old_question_is_refused() -> None:
         person.confirm("1", by="Ada")
     person.ask(FIRST)
     person.ask(SECOND)
-    with pytest.raises(StalePrompt, match="'1' is no longer asked; '2' is open now"):
+    with pytest.raises(StalePrompt, match="'1' was already answered or withdrawn;  '2' is open now"):
         person.confirm("1", by="Ada")
     person.confirm("2", by="Ada")
     with pytest.raises(StalePrompt):
@@ -64,7 +64,7 @@ def test_a_hand_does_at_once_what_is_asked(rig: Any) -> None:
 def test_only_a_turn_is_asked_again() -> None:
     person = HumanOperator()
     person.ask(FIRST)
-    with pytest.raises(StalePrompt, match="asks for no turn by hand: confirm it, or decline it"):
+    with pytest.raises(StalePrompt, match="does not ask for a turn by hand, and only a turn can be repeated"):
         person.repeat("1", by="Ada", reason="")
     assert person.pending == FIRST
     person.ask(Prompt("3", "turn", "turn", "x", 360.0))

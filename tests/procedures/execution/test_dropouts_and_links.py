@@ -20,7 +20,7 @@ def test_a_unit_whose_readings_fail_drops_out_and_the_others_go_on(two_units: An
     rig.when_step("acquire", lambda: rig.gyros["fog"].fail("read", NoReply("fog", "gone")))
     outcome = rig.run()
     assert outcome.state == CampaignState.DONE
-    assert "fog dropped out (fog: gone)" in outcome.reason
+    assert "fog was excluded (fog: gone)" in outcome.reason
     assert rig.journal.dropped == [("fog", "fog: gone")]
     both, one = ("imu", "fog"), ("imu",)
     assert gyros_of(rig) == [(1, both), (1, both), (1, one), (2, one), (3, one), (4, one)]
@@ -128,7 +128,7 @@ def test_a_mounting_that_nobody_does_is_left_out_where_the_recipe_says_so(rig: A
 
     outcome = rig.run(recipe, observer=answer)
     assert outcome.state == CampaignState.DONE
-    assert "left out as the units were not turned" in outcome.reason
+    assert "left out because the units were not turned" in outcome.reason
     assert [header.step.position for header in rig.journal.headers] == ["z", "z"]
     steps = rig.engine.plan.steps
     outcomes = [result.outcome for result in rig.journal.results()]

@@ -153,7 +153,7 @@ def test_a_chamber_that_reads_back_another_safe_set_point_is_not_safe(rig: Any) 
 def test_a_table_that_does_not_come_to_rest_is_not_safe(rig: Any) -> None:
     rig.when_step("safe_state", lambda: setattr(rig.table, "is_moving", lambda: True))
     outcome = rig.run()
-    assert "it still moves 30 s after it was stopped" in outcome.reason
+    assert "the table still moves 30 s after it was stopped" in outcome.reason
 
 
 def test_a_second_ctrl_c_during_the_safe_state_does_not_skip_it(rig: Any) -> None:
@@ -216,7 +216,7 @@ def test_a_chamber_that_does_not_arrive_fails_with_where_it_was(rig: Any) -> Non
 def test_a_set_point_that_is_not_taken_is_a_failure(rig: Any) -> None:
     rig.chamber.misread_c = 0.3
     outcome = rig.run()
-    assert "set point 25.3 deg C was read back, not 25" in outcome.reason
+    assert "set point 25.3 deg C was read back instead of 25 deg C" in outcome.reason
 
 
 def test_a_short_silence_is_noted_and_forgiven(rig: Any) -> None:
@@ -266,7 +266,7 @@ def test_nobody_answers(rig: Any) -> None:
     rig.operator = HumanOperator()
     outcome = rig.run(rig.recipe(on_failure={"operator_timeout_s": 900}))
     assert outcome.state == CampaignState.FAILED
-    assert "no answer within 900 s: turn the units" in outcome.reason
+    assert "no answer within 900 s to the request: turn the units" in outcome.reason
     assert rig.operator.pending is None
 
 

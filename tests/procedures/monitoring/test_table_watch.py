@@ -72,7 +72,7 @@ def test_a_table_that_stops_in_a_data_set_ends_it_at_once(rig: Rig) -> None:
     outcome = rig.run(rig.recipe(**LONG, rates_dps=[20.0]))
     assert outcome.state == CampaignState.FAILED
     assert "table: stands still" in outcome.reason
-    assert "s into a run at 20.0002 deg/s" in outcome.reason
+    assert "s after the beginning of a run at 20.0002 deg/s" in outcome.reason
     ((_, state, reason),) = rig.journal.closed
     assert (state, reason) == ("partial", outcome.reason)
     rig.assert_safe()
@@ -83,7 +83,7 @@ def test_a_table_that_moves_in_a_data_set_at_rest_ends_it_at_once(rig: Rig) -> N
     outcome = rig.run(rig.recipe(**LONG, rates_dps=[0.0]))
     assert outcome.state == CampaignState.FAILED
     assert "table: moves" in outcome.reason
-    assert "s into a rest" in outcome.reason
+    assert "s after the beginning of a rest" in outcome.reason
     rig.assert_safe()
 
 

@@ -59,14 +59,14 @@ def judged(
         ({"x": -359.0}, 360, "-x", ""),  # counter-clockwise with -x up is negative about x
         ({"y": -725.0}, -720, "y", ""),
         ({"x": 330.0}, 360, "x", ""),  # a nominal scale factor may be off by a tenth
-        ({"x": 300.0}, 360, "x", "only 300 deg came out of 360 about x"),
-        ({"x": 420.0}, 360, "x", "420 deg came out of 360 about x"),
-        ({"z": 360.0}, 720, "z", "only 360 deg came out of 720 about z"),
-        ({"y": 360.0}, 360, "x", "360 deg came out about y, not about x"),
-        ({"x": -360.0}, 360, "x", "360 deg came out in the other direction, clockwise"),
-        ({"x": 360.0}, 360, "-x", "360 deg came out in the other direction, clockwise"),
-        ({"x": 360.0}, -360, "x", "360 deg came out in the other direction, counter-clockwise"),
-        ({}, 360, "x", "no turn about x came out, only 0 deg of 360"),
+        ({"x": 300.0}, 360, "x", "the unit turned by only 300 deg about axis x instead of 360 deg"),
+        ({"x": 420.0}, 360, "x", "the unit turned by 420 deg about axis x instead of 360 deg"),
+        ({"z": 360.0}, 720, "z", "the unit turned by only 360 deg about axis z instead of 720 deg"),
+        ({"y": 360.0}, 360, "x", "the unit turned by 360 deg about axis y, not about axis x"),
+        ({"x": -360.0}, 360, "x", "the unit turned by 360 deg in the wrong direction, clockwise"),
+        ({"x": 360.0}, 360, "-x", "the unit turned by 360 deg in the wrong direction, clockwise"),
+        ({"x": 360.0}, -360, "x", "the unit turned by 360 deg in the wrong direction, counter-clockwise"),
+        ({}, 360, "x", "the unit turned by only 0 deg about axis x instead of 360 deg"),
     ],
 )
 def test_what_came_out_is_said(turned: dict[str, float], asked: float, position: str, said: str) -> None:
@@ -77,7 +77,7 @@ def test_what_came_out_is_said(turned: dict[str, float], asked: float, position:
 
 
 def test_a_turn_that_is_too_fast_for_the_unit_is_refused() -> None:
-    assert "the unit measures only up to 400; turn the unit more slowly" in judged({"x": 2600.0}, 2600).refused
+    assert "the unit measures only up to 400 deg/s; turn the unit more slowly" in judged({"x": 2600.0}, 2600).refused
 
 
 def test_lost_readings_are_counted_of_all_that_should_have_come() -> None:
@@ -122,7 +122,7 @@ def test_an_axis_that_the_unit_does_not_measure_is_not_judged_but_another_one_is
         return check_turn(step, RULES, UnitTurn("imu", rest, of(swing(angle_deg)), rest, 400.0))
 
     assert about_x(3.0) == TurnResult("", None)
-    assert about_x(360.0).refused == "360 deg came out about z, not about x"
+    assert about_x(360.0).refused == "the unit turned by 360 deg about axis z, not about axis x"
 
 
 def test_a_voltage_counts_by_the_nominal_scale_factor_of_the_data_sheet() -> None:

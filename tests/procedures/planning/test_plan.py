@@ -207,7 +207,9 @@ def test_nothing_left_and_a_handling_temperature_out_of_reach_are_refused_even_w
     limits: BenchLimits,
 ) -> None:
     cold = replace(limits, chamber=replace(limits.chamber, max_c=5))
-    with pytest.raises(PlanRefused, match=r"temperatures_c: nothing is left; mounting\.handling_c 25: outside"):
+    with pytest.raises(
+        PlanRefused, match=r"temperatures_c: no value is left within the limits; mounting\.handling_c 25: outside"
+    ):
         make_plan(recipe(), cold, clip=True)
 
 
@@ -222,7 +224,7 @@ def test_a_rate_that_the_step_clock_cannot_give_is_refused(limits: BenchLimits) 
         make_plan(recipe(rates_dps=[0.0, 0.01, 0.1, 10.0]), coarse)
     assert len(caught.value.offenders) == 2
     assert "slower than 0.05 deg/s" in caught.value.offenders[0]
-    assert "rates_dps 0.1: the nearest that the table runs is 1 deg/s" in caught.value.offenders[1]
+    assert "rates_dps 0.1: the nearest rate that the table can run is 1 deg/s" in caught.value.offenders[1]
 
 
 def test_random_order_is_reproducible_and_hangs_on_the_seed(limits: BenchLimits) -> None:
@@ -352,8 +354,8 @@ def test_what_needs_a_table_or_a_chamber_says_which_is_missing(limits: BenchLimi
     with pytest.raises(PlanRefused) as refused:
         make_plan(recipe(), replace(limits, table=None, chamber=None))
     assert refused.value.offenders == (
-        "rates_dps: a rate table is needed, and the bench has none",
-        "temperatures_c: a chamber is needed, and the bench has none",
+        "rates_dps: a rate table is needed, but the bench has none",
+        "temperatures_c: a chamber is needed, but the bench has none",
     )
     assert "choose a recipe with [turns], such as by-hand, which needs neither" in str(refused.value)
     with pytest.raises(PlanRefused, match="a chamber is needed"):

@@ -141,8 +141,14 @@ def test_a_recipe_of_turns_has_neither_rates_nor_temperatures() -> None:
         (by_hand(top="repeats = 2"), "'repeats': value error, this key is for a table and a chamber"),
         (by_hand(top="soak = { hold_s = 1 }"), "'soak': value error, this key is for a table and a chamber"),
         (by_hand("turns_deg = []"), "'turns.turns_deg': tuple should have at least 1 item"),
-        (by_hand("turns_deg = [0]"), "'turns.turns_deg.0': value error, a turn has more than 0 and at most 36000 deg"),
-        (by_hand("turns_deg = [360]\nask.turn = 'go $far'"), "$far is unknown; known are $axis, $degrees"),
+        (
+            by_hand("turns_deg = [0]"),
+            "'turns.turns_deg.0': value error, the size of a turn must be above 0 deg and at most 36000 deg",
+        ),
+        (
+            by_hand("turns_deg = [360]\nask.turn = 'go $far'"),
+            "$far is unknown; the known placeholders are $axis, $degrees",
+        ),
         (by_hand("turns_deg = [360]\nask.turn = '5 $'"), "a $ stands alone"),
         (GOOD.replace("[20]", "[]"), "'temperatures_c': tuple should have at least 1 item"),
     ],

@@ -19,22 +19,37 @@ Order = Annotated[
     typer.Option(
         "--order",
         metavar="ORDER.toml",
-        help="Facts of the order: customer, item, method, conformity. With it the certificate is issued.",
+        help="File with the facts of the order: customer, item, method, conformity; with this option the "
+        "certificate is issued.",
     ),
 ]
 By = Annotated[
-    str | None, typer.Option("--by", metavar="NAME", help="Person who issues it; default: who is logged in.")
+    str | None,
+    typer.Option(
+        "--by",
+        metavar="NAME",
+        help="Name of the person who issues the certificate; default: the user who is logged in.",
+    ),
 ]
 Amend = Annotated[
     str | None,
-    typer.Option("--amend", metavar="REASON", help="Replace the certificate that was issued; the reason is in it."),
+    typer.Option(
+        "--amend",
+        metavar="REASON",
+        help="Replace the certificate that was issued, for this reason; the new certificate states the reason.",
+    ),
 ]
 
 
 def certificate(
     serial: Serial,
     out: Annotated[
-        Path, typer.Option("--out", metavar="FILE", help="Path of a file to write; its suffix is .pdf, .xml or .json.")
+        Path,
+        typer.Option(
+            "--out",
+            metavar="FILE",
+            help="Path of the file to write; its suffix (.pdf, .xml or .json) determines the format.",
+        ),
     ],
     version: Annotated[
         int | None, typer.Option("--version", metavar="N", help="Calibration version; default: the certified version.")

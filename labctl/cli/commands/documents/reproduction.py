@@ -17,10 +17,14 @@ if TYPE_CHECKING:
 
 
 def reproduce(
-    paper: Annotated[str, typer.Argument(metavar="PAPER", help="ojeda2000, yang2018 or weiss1995.")],
+    paper: Annotated[
+        str, typer.Argument(metavar="PAPER", help="Paper to reproduce: ojeda2000, yang2018 or weiss1995.")
+    ],
     out: Annotated[
         Path,
-        typer.Option("--out", metavar="DIR", help="Folder to write PAPER.html and PAPER.json to; made where needed."),
+        typer.Option(
+            "--out", metavar="DIR", help="Folder in which to write PAPER.html and PAPER.json; it is created if needed."
+        ),
     ],
     serial: Annotated[
         str | None,
@@ -31,7 +35,7 @@ def reproduce(
     recording: RecordingId = None,
     axis: Annotated[
         str | None,
-        typer.Option("--axis", help="Axis of the unit for ojeda2000 and weiss1995; default: its first."),
+        typer.Option("--axis", help="Axis of the unit, for ojeda2000 and weiss1995; default: the unit's first axis."),
     ] = None,
     as_json: Json = False,
     database: Database = None,
@@ -46,7 +50,9 @@ def reproduce(
             with open_readonly(database) as store:
                 answer = reproduce_unit(store, paper, serial, recording, axis, out)
         elif recording is not None or axis is not None:
-            raise BadInput("--recording and --axis are for a unit's recording; name its serial number too")
+            raise BadInput(
+                "--recording and --axis choose from the data of a unit; give the serial number of the unit too"
+            )
         else:
             answer = reproduce_own(paper, out)
     if as_json:

@@ -19,16 +19,24 @@ def uncertainty(
     ] = None,
     rate_dps: Annotated[
         float | None,
-        typer.Option("--rate-dps", metavar="DPS", help="Rate about each axis in turn; default: half of the fastest."),
+        typer.Option(
+            "--rate-dps",
+            metavar="DPS",
+            help="Rate, deg/s, about one axis after the other; default: half of the largest calibrated rate.",
+        ),
     ] = None,
     temperature_c: Annotated[
         float | None,
-        typer.Option("--temperature-c", metavar="C", help="Temperature; default: the middle of the calibrated range."),
+        typer.Option(
+            "--temperature-c", metavar="C", help="Temperature, deg C; default: the middle of the calibrated range."
+        ),
     ] = None,
     figure: Annotated[
         Path | None,
         typer.Option(
-            "--figure", metavar="FILE.html", help="File to write: the contributions over rate and temperature."
+            "--figure",
+            metavar="FILE.html",
+            help="Path of an HTML file to write: the contributions over rate and temperature.",
         ),
     ] = None,
     as_json: Json = False,

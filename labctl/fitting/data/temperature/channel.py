@@ -32,8 +32,7 @@ def with_temperature(recording: Recording) -> Recording:
         return recording
     if warm is None:
         raise NotEnoughData(
-            f"{recording.info.serial}: column 'temperature_c' is missing, and so is 'chamber_c', which can replace "
-            "it; add one of the two"
+            f"{recording.info.serial}: columns 'temperature_c' and 'chamber_c' are both missing; add one of the two"
         )
     if environment is not None:
         theirs = {name: values for name, values in environment.items() if name != "temperature_c"}

@@ -55,8 +55,8 @@ def rising(recording: Recording, nodes: Array, axis: str, least: int) -> NDArray
     if len(nodes) < least or np.any(np.diff(nodes[order]) <= 0):
         raise NotEnoughData(
             f"{recording.info.serial}, axis {axis}: a table needs at least {least} different temperature"
-            f"{'' if least == 1 else 's'}, each once; it has {len(nodes)} rows at {len(np.unique(nodes))} "
-            "temperatures, correct column temperature_c"
+            f"{'' if least == 1 else 's'}, each in one row; it has {len(nodes)} rows at {len(np.unique(nodes))} "
+            "temperatures; correct column temperature_c"
         )
     return order
 
@@ -94,6 +94,7 @@ def common(recording: Recording, name: str, rows: list[int]) -> float:
     if np.any(values != values[0]):
         listed = ", ".join(f"{value:g}" for value in values)
         raise NotEnoughData(
-            f"{recording.info.serial}: column {name!r} differs between the axes ({listed}); give all axes the same"
+            f"{recording.info.serial}: column {name!r} differs between the axes ({listed}); give the same "
+            "values for all axes"
         )
     return float(values[0])

@@ -130,8 +130,9 @@ def _require_quiet(serial: str, noise: Array) -> None:
     accel, gyro = float(noise[:3].max()), float(noise[3:].max())
     if accel > NOISIEST_G or gyro > NOISIEST_DPS:
         raise NotEnoughData(
-            f"{serial}: nothing rests in the recording: its quietest half seconds scatter by {accel:.2g} g and "
-            f"{gyro:.2g} deg/s (at rest at most {NOISIEST_G:g} g and {NOISIEST_DPS:g} deg/s); lay the unit down "
+            f"{serial}: the unit is never at rest in this recording: its quietest half seconds scatter by "
+            f"{accel:.2g} g and {gyro:.2g} deg/s (limit for rest: {NOISIEST_G:g} g and {NOISIEST_DPS:g} deg/s); "
+            "lay the unit down "
             "between turns for 2 s or more, in many poses"
         )
 

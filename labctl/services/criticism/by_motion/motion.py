@@ -44,8 +44,8 @@ def _compared(store: Store, row: RecordingRow, version: CalibrationRecord | None
     motion = motion_of(row)
     if motion == "rates" or row.kind == "coefficients":
         raise BadInput(
-            f"recording {row.id} has one rate in each data set (motion = {motion!r}); ask for its comparison with a "
-            "version instead"
+            f"recording {row.id} has one rate in each data set (motion = {motion!r}); request its comparison "
+            "with a version instead"
         )
     compute(UNNAMED)
     calibration = None if version is None else read_calibration(version.document)

@@ -33,8 +33,8 @@ def correction_of(calibration: Calibration, recording: Recording) -> Correct:
     """Return how a version corrects the readings of a recording in poses. Raises BadInput as `errors_in_poses`."""
     if set(calibration.axes) != set(AXES):
         raise BadInput(
-            f"{calibration.serial} version {calibration.version} corrects axes {', '.join(calibration.axes)}; a turn "
-            "by hand is about x, y and z; name a recording of another motion"
+            f"{calibration.serial} version {calibration.version} corrects only the axes "
+            f"{', '.join(calibration.axes)}, but a turn by hand needs x, y and z; name a recording of another motion"
         )
     compensator = Compensator(calibration)
     readings = readings_of(recording)
@@ -55,8 +55,8 @@ def _temperature(calibration: Calibration, readings: PoseReadings) -> Array:
         return readings.temperature_c
     if np.isfinite(calibration.temperature_c[1]):
         raise BadInput(
-            f"{calibration.serial} version {calibration.version} depends on the temperature; the recording has no "
-            "column temperature_c; add it"
+            f"{calibration.serial} version {calibration.version} depends on the temperature, but the recording "
+            "has no column temperature_c; add the column"
         )
     return np.full(len(readings), ANY_C)
 

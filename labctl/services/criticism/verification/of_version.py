@@ -79,8 +79,8 @@ def applied_errors(
     missing = [axis for axis in calibration.axes if axis not in data.outputs]
     if missing:
         raise BadInput(
-            f"{calibration.serial} version {calibration.version} corrects axes {', '.join(calibration.axes)}; the "
-            f"recording has no column gyro_{missing[0]}, name another recording"
+            f"{calibration.serial} version {calibration.version} corrects axes {', '.join(calibration.axes)}, "
+            f"but the recording has no column gyro_{missing[0]}; name another recording"
         )
     compensator = Compensator(calibration)
     raw = np.column_stack([data.outputs[axis] for axis in calibration.axes])

@@ -26,11 +26,18 @@ class OrderedItem(Request):
 class OrderedMethod(Request):
     """What is to be said of the method beside the recipe."""
 
-    name: str = Field(default="", pattern=LINE, description="Of an imported recording; a campaign has its recipe.")
+    name: str = Field(
+        default="",
+        pattern=LINE,
+        description="Name of the method; only for an imported recording, since a campaign names its recipe.",
+    )
     deviations: str = Field(
         default="", max_length=TEXT, description="Additions to, deviations or exclusions from the method; empty: none."
     )
-    performed_from: date | None = Field(default=None, description="Of an imported recording; a campaign has its own.")
+    performed_from: date | None = Field(
+        default=None,
+        description="First day of the measurements; only for an imported recording, since a campaign knows its dates.",
+    )
     performed_until: date | None = None
 
 
@@ -50,30 +57,39 @@ class CertificateOrder(Request):
     customer: Customer = Customer()
     item: OrderedItem = OrderedItem()
     method: OrderedMethod = OrderedMethod()
-    conformity: OrderedConformity | None = Field(default=None, description="null: no statement is made.")
-    adjustment: str = Field(default="", max_length=TEXT, description="What was adjusted or repaired beside the "
-                            "coefficients; empty: nothing.")  # fmt: skip
+    conformity: OrderedConformity | None = Field(
+        default=None,
+        description="Statement of conformity to a specification; null: the certificate makes no statement.",
+    )
+    adjustment: str = Field(default="", max_length=TEXT, description="Adjustments or repairs other than the new "
+    "coefficients; empty: none.")  # fmt: skip
     external: str = Field(
-        default="", max_length=TEXT, description="Results of external providers, and whose; empty: there are none."
+        default="",
+        max_length=TEXT,
+        description="Results that came from external providers, and the names of these; empty: none.",
     )
     state_due: bool = Field(
-        default=False, description="State the date of the next calibration: only where the customer agreed to it."
+        default=False,
+        description="Whether the certificate states the date of the next calibration; only if "
+        "the customer agreed to it.",
     )
     laboratory: Laboratory | None = Field(
-        default=None, description="Where the bench file of the campaign has no [laboratory]."
+        default=None, description="The laboratory; needed if the bench file of the campaign has no [laboratory]."
     )
 
 
 class CertificateRequest(Request):
     """Issue the certificate of a version, or an amended one."""
 
-    by: str = Field(min_length=1, max_length=200, pattern=LINE, description="Person who issues it.")
+    by: str = Field(
+        min_length=1, max_length=200, pattern=LINE, description="Name of the person who issues the certificate."
+    )
     order: CertificateOrder = CertificateOrder()
     amend: str | None = Field(
         default=None,
         min_length=1,
         max_length=TEXT,
-        description="Why the certificate of this version is replaced by a new one; null: it is not.",
+        description="Reason for replacing the version's present certificate by this one; null: do not replace it.",
     )
 
 
@@ -85,7 +101,12 @@ class CertificateResponse(ResponseModel):
     number: str
     issued_at: datetime
     by: str
-    hash: str = Field(description="SHA-256 of its JSON.")
-    replaces: str | None = Field(description="Number of the certificate that it replaces; null: none.")
-    reason: str = Field(description="Why it replaces another one; empty: it does not.")
-    replaced_by: str | None = Field(default=None, description="Number of the one that replaces it; null: it is valid.")
+    hash: str = Field(description="SHA-256 of the certificate in its JSON form.")
+    replaces: str | None = Field(
+        description="Number of the earlier certificate that this certificate replaces; null: none."
+    )
+    reason: str = Field(description="Why this certificate replaces an earlier one; empty: it replaces none.")
+    replaced_by: str | None = Field(
+        default=None,
+        description="Number of the later certificate that replaces this certificate; null: this certificate is valid.",
+    )

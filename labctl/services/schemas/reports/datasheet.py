@@ -14,14 +14,16 @@ class MeasuredUnder(ResponseModel):
 
     recording: int
     version: int | None = Field(
-        default=None, description="Version that the figure is a coefficient of; null: it is from the recording itself."
+        default=None,
+        description="Calibration version of which the figure is a coefficient; null: the figure "
+        "was computed from the recording.",
     )
     temperature_c: tuple[float, float] | None = Field(
         description="Lowest and highest temperature, deg C; null: unknown."
     )
     rate_dps: tuple[float, float] | None = Field(description="Lowest and highest rate, deg/s; null: unknown.")
-    runs: int | None = Field(description="Powered sessions; null: unknown.")
-    datasets: int | None = Field(description="Data sets that the figure is from; null: unknown.")
+    runs: int | None = Field(description="Number of power-on sessions; null: unknown.")
+    datasets: int | None = Field(description="Number of data sets from which the figure was computed; null: unknown.")
 
 
 class Characteristic(ResponseModel):
@@ -29,19 +31,25 @@ class Characteristic(ResponseModel):
 
     id: str
     title: str
-    axis: str = Field(description="Output axis, or pair of axes; empty: of the whole unit.")
-    along: str = Field(default="", description="Of the g-sensitivity: the axis of the specific force; else empty.")
+    axis: str = Field(description="Output axis, or pair of axes; empty: the figure is of the whole unit.")
+    along: str = Field(
+        default="", description="Only for the g-sensitivity: the axis along which the specific force acts; else empty."
+    )
     value: float | None = Field(description="Measured value; null: not measured, see `why`.")
     u: float | None = Field(description="Standard uncertainty of `value`; null: unknown.")
-    at_most: float | None = Field(default=None, description="Bound of a figure that cannot be distinguished from zero.")
+    at_most: float | None = Field(
+        default=None, description="Upper limit of a figure that cannot be distinguished from zero, in `unit`."
+    )
     unit: str
     conditions: MeasuredUnder | None
     specified: float | None = Field(description="Value of the maker's data sheet, in `unit`; null: not stated.")
     specified_as: Literal["at most", "at least"] = Field(
-        description="The magnitude may be at most, or the value must be at least, the specified one."
+        description="How `specified` limits the figure: its magnitude is at most, or its value is at least, the "
+        "specified value."
     )
     passed: bool | None = Field(
-        description="Simple acceptance (ILAC-G8): the measured value is inside the specified one; null: no decision."
+        description="Whether the measured value keeps the specified value, by simple acceptance (ILAC-G8); "
+        "null: no decision."
     )
     near_limit: bool = Field(
         default=False,
@@ -56,10 +64,12 @@ class DatasheetResponse(ResponseModel):
     serial: str
     model: str
     technology: str | None
-    recordings: list[int] = Field(description="Recordings that figures are from, rising.")
+    recordings: list[int] = Field(
+        description="Numbers of the recordings from which the figures were computed, in ascending order."
+    )
     characteristics: list[Characteristic]
     passed: bool | None = Field(
-        description="Whether all that is specified and measured passes; null: nothing specified is measured."
+        description="Whether every figure that is both specified and measured passes; null: there is no such figure."
     )
     not_measured: list[str] = Field(description="Ids of characteristics without a value on any axis.")
     decision_rule: str

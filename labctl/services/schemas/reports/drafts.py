@@ -15,14 +15,16 @@ from labctl.services.schemas.criticism import AxisVerification
 class DraftsRequest(Request):
     """Which drafts of a campaign to make now."""
 
-    again: bool = Field(default=False, description="Also try those again that failed before.")
+    again: bool = Field(default=False, description="Also try again the drafts that failed before.")
 
 
 class ComparedModel(ResponseModel):
     """A model fitted to the recording of a draft; only the draft's own is kept as a version."""
 
     model: str
-    error: CertifiedErrors | None = Field(description="Its errors, deg/s; null: it could not be fitted, see `why`.")
+    error: CertifiedErrors | None = Field(
+        description="Errors of the model, deg/s; null: the model could not be fitted, see `why`."
+    )
     why: str = ""
 
 
@@ -31,7 +33,9 @@ class RemainingLine(ResponseModel):
 
     bias_dps: float
     u_bias_dps: float
-    scale_factor: float | None = Field(description="Error over rate (1 = 100 %); null: the recording has one rate.")
+    scale_factor: float | None = Field(
+        description="Scale factor error: error divided by rate (1 = 100 %); null: the recording has only one rate."
+    )
     u_scale_factor: float | None
 
 
@@ -43,7 +47,7 @@ class AppliedDraft(ResponseModel):
     max_dps: float
     bias_dps: float
     axes: dict[str, AxisVerification]
-    expected_dps: float | None = Field(description="Error that the version promises, deg/s; null: unknown.")
+    expected_dps: float | None = Field(description="Error that is expected of the version, deg/s; null: unknown.")
     ok: bool = Field(description="Whether `rms_dps` is at most twice `expected_dps`.")
     lines: dict[str, RemainingLine] = Field(
         default_factory=dict, description="For each axis: bias and scale factor error that the version leaves."
@@ -72,7 +76,9 @@ class DriftFromVersion(ResponseModel):
         description="For each axis: largest difference of the corrected rates at any data set of the recording, deg/s."
     )
     rms_dps: dict[str, float] = Field(description="For each axis: root mean square of that difference, deg/s.")
-    coefficients: list[CoefficientChange] = Field(description="Empty: the models differ, see `why`.")
+    coefficients: list[CoefficientChange] = Field(
+        description="Change of each coefficient; empty: the two models differ, see `why`."
+    )
     why: str = ""
 
 
@@ -80,10 +86,14 @@ class LimitResult(ResponseModel):
     """A figure of the draft against a limit of the recipe: it passes if it is at most the limit (simple acceptance)."""
 
     limit: Literal["heldout_rms_dps", "max_error_dps", "drift_dps"]
-    axis: str | None = Field(description="Axis; null: over all axes.")
-    value_dps: float | None = Field(description="The figure, deg/s; null: it is not known, see `why`.")
+    axis: str | None = Field(description="Axis of the figure; null: all axes together.")
+    value_dps: float | None = Field(
+        description="Figure that is compared with the limit, deg/s; null: not known, see `why`."
+    )
     at_most_dps: float
-    passed: bool | None = Field(description="Null: the figure is not known, so that nothing is decided.")
+    passed: bool | None = Field(
+        description="Whether the limit is kept; null: not decided, because the figure is not known."
+    )
     why: str = ""
 
 
@@ -93,19 +103,30 @@ class DraftReport(ResponseModel):
     model: str
     error: CertifiedErrors
     compared: list[ComparedModel] = Field(description="The draft's model first, then those of the recipe.")
-    smallest_heldout: str | None = Field(description="Model with the smallest held-out error; null: none has one.")
+    smallest_heldout: str | None = Field(
+        description="Model with the smallest held-out error; null: no model has a held-out error."
+    )
     verdict: str | None = Field(description="Verdict of the criticism on the recording; null: see `verdict_reason`.")
     verdict_text: str
     verdict_reason: str = Field(description="Why there is no verdict; else empty.")
     objections: list[Objection] = Field(description="Objections to a certification of the draft.")
-    as_found: AppliedDraft | None = Field(description="The version in force; null: see `as_found_why`.")
+    as_found: AppliedDraft | None = Field(
+        description="Errors of the recording corrected by the version in force; null: see `as_found_why`."
+    )
     as_found_why: str = ""
-    as_left: AppliedDraft | None = Field(description="The draft; null: it cannot be applied, see `as_left_why`.")
+    as_left: AppliedDraft | None = Field(
+        description="Errors of the recording corrected by the draft; null: the "
+        "draft cannot be applied, see `as_left_why`."
+    )
     as_left_why: str = ""
-    drift: DriftFromVersion | None = Field(description="Null: no version was in force, or it was not asked for.")
+    drift: DriftFromVersion | None = Field(
+        description="Difference between the draft and the version in force; "
+        "null: no version was in force, or the recipe does not request it."
+    )
     limits: list[LimitResult]
     within_limits: bool | None = Field(
-        description="Whether all limits are kept; null: the recipe has none, or a figure is not known."
+        description="Whether all limits of the recipe are kept; null: the recipe has no limits, or a figure is "
+        "not known."
     )
     text: str = Field(description="The report in one paragraph.")
 
@@ -117,13 +138,13 @@ class DraftResponse(ResponseModel):
     campaign: int
     recording: int
     state: Literal["due", "fitted", "made", "failed"] = Field(
-        description="due: it is made when the campaign is done; fitted: the version is kept, the report is not yet; "
-        "made; failed: see `reason`."
+        description="due: the draft will be made when the campaign is done; fitted: the version is stored, its "
+        "report is not; made: both are stored; failed: see `reason`."
     )
-    version: int | None = Field(description="The version of the unit that the draft is.")
+    version: int | None = Field(description="Version number of the draft; null: no version was made.")
     certified: bool = Field(default=False, description="Whether this version is in force now.")
-    at: datetime | None = Field(description="When it was made or failed.")
-    reason: str = Field(description="Why it failed, and what to do; else empty.")
+    at: datetime | None = Field(description="Time at which the draft was made, or failed.")
+    reason: str = Field(description="Why the draft failed, and what to do; else empty.")
     report: DraftReport | None = None
 
 
@@ -131,4 +152,6 @@ class DraftsResponse(ResponseModel):
     """The drafts of a campaign."""
 
     campaign: int
-    drafts: list[DraftResponse] = Field(description="By recording; empty: the recipe has no [fit].")
+    drafts: list[DraftResponse] = Field(
+        description="The drafts (proposed calibrations), one per recording; empty: the recipe has no [fit]."
+    )

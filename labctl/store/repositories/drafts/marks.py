@@ -28,4 +28,6 @@ def mark_fitted(connection: sa.Connection, recording: int, version: int) -> None
     d = tables.drafts
     mine = sa.update(d).where(d.c.recording_id == recording, d.c.state.in_(("due", "failed")))
     if connection.execute(mine.values(state="fitted", version=version, reason="")).rowcount != 1:
-        raise Conflict(f"the draft of recording {recording} was made by another process meanwhile; use that version")
+        raise Conflict(
+            f"another process has made the draft of recording {recording} in the meantime; use the version that it made"
+        )

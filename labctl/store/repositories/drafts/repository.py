@@ -63,7 +63,7 @@ class Drafts:
             return connection.scalar(query) is not None
 
     def dropped(self, recording: int) -> str | None:
-        """Return why a unit took no further part in the campaign of a recording; None where it did."""
+        """Return why a unit was excluded from the campaign of a recording; None where it was not."""
         r = tables.recordings.c
         with self._database.reading() as connection:
             return connection.scalar(sa.select(r.dropped).where(r.id == recording))

@@ -26,20 +26,25 @@ def changed(name: str, /, *place: str | int, **values: Any) -> dict[str, Any]:
 
 
 WRONG = [
-    (changed("serial-csv", line=None), "give either [line] or [frame]"),
-    (changed("serial-csv", "line", "fields", 0, unit="deg"), "field gyro_x: unit 'deg' is not known (there are"),
-    (changed("serial-csv", "line", "fields", 3, unit="g"), "unit 'g' does not fit (there are deg C, K, deg F)"),
+    (changed("serial-csv", line=None), "has one of the sections [line] and [frame]; give exactly one"),
+    (changed("serial-csv", "line", "fields", 0, unit="deg"), "field gyro_x: unit 'deg' is not known; choose one of"),
+    (changed("serial-csv", "line", "fields", 3, unit="g"), ("unit 'g' does not belong to this "
+    "quantity; choose one of deg C, K, deg F")),
     (changed("serial-csv", "line", "fields", 0, unit=None), "field gyro_x has no unit; add one like unit = 'rad/s'"),
     (changed("serial-csv", "line", "fields", 1, name="gyro_x"), "two fields have the name 'gyro_x'"),
-    (changed("serial-csv", "line", "fields", 1, name="gyro_w"), "the rates are the fields gyro_x, gyro_y, gyro_z"),
-    (changed("kvh-1750", counter={"field": "count", "wrap": 128}), "counter: no field is named 'count' (there"),
-    (changed("kvh-1750", "frame", sync="FE 8"), "'FE 8' is no row of hexadecimal bytes; write it like 'FE 81 FF 55'"),
+    (changed("serial-csv", "line", "fields", 1, name="gyro_w"), "no field is named gyro_x, gyro_y or gyro_z"),
+    (changed("kvh-1750", counter={"field": "count", "wrap": 128}), "counter: no field is named 'count'; choose one"),
+    (changed("kvh-1750", "frame", sync="FE 8"), ("'FE 8' is not a series of hexadecimal bytes; write "
+    "it like 'FE 81 FF 55'")),
     (changed("kvh-1750", "frame", sync=""), "sync is empty; give the bytes with which every frame begins"),
-    (changed("kvh-1750", "frame", length=30), "field accel_z_g ends at byte 28, and the data of a frame at byte 26"),
-    (changed("kvh-1750", "frame", "checksum", algorithm="crc32/mpeg2"), "no checksum 'crc32/mpeg2' is known"),
-    (changed("kvh-1750", "frame", "checksum", algorithm="md5"), "no checksum 'md5' is known (there are xor8, sum8"),
+    (changed("kvh-1750", "frame", length=30), ("field accel_z_g ends at byte 28, but the data of a "
+    "frame end at byte 26")),
+    (changed("kvh-1750", "frame", "checksum", algorithm="crc32/mpeg2"), "checksum 'crc32/mpeg2' is not known"),
+    (changed("kvh-1750", "frame", "checksum", algorithm="md5"), ("checksum 'md5' is not known; "
+    "choose one of xor8, sum8")),
     (changed("kvh-1750", "frame", "fields", 0, type="f16"), "Input should be 'u8', 'i8'"),
-    (changed("kvh-1750", "frame", "fields", 0, item=7), "field gyro_x: leave `item` out, or add [frame.items]"),
+    (changed("kvh-1750", "frame", "fields", 0, item=7), ("field gyro_x has the key `item`, but the "
+    "format has no section [frame.items]; leave the key out")),
     (changed("kvh-1750", "frame", "fields", 0, scale_factor=2), "Extra inputs are not permitted"),
     (changed("kvh-1750", format="labctl-stream/2"), "Input should be 'labctl-stream/1'"),
 ]  # fmt: skip
@@ -88,10 +93,11 @@ def test_a_format_is_shipped_or_a_file_beside_the_bench_file_or_in_it(tmp_path: 
 @pytest.mark.parametrize(
     ("format_", "more", "text"),
     [
-        ('"vectornav-vnim"', "", "gyros.0.format: Value error, no stream format 'vectornav-vnim' ships with labctl"),
-        ('"gone.toml"', "", "gyros.0.format: Value error, no file 'gone.toml' is beside the bench file"),
+        ('"vectornav-vnim"', "", "gyros.0.format: Value error, no stream format 'vectornav-vnim' comes with labctl"),
+        ('"gone.toml"', "", "gyros.0.format: Value error, the folder of the bench file has no file 'gone.toml'"),
         ('"torn.toml"', "", "torn.toml: Expected '=' after a key"),
-        ('"kvh-dsp1760"', 'axes = ["x"]', "axes ['x']: the format has ['z']; correct axes or format"),
+        ('"kvh-dsp1760"', 'axes = ["x"]', ("axes = ['x'], but the stream format has the axes ['z']; "
+        "correct axes or format")),
         ('"kvh-1750"', "options = { sign = 1 }", "gyros.0.options.sign: Extra inputs are not permitted"),
         ('"kvh-1750"', "sign = 1", "gyros.0.sign: driver stream-format has no such setting"),
         ("7", "", "gyros.0.format: Input should be a valid dictionary"),

@@ -84,7 +84,7 @@ def test_axes_that_are_not_at_right_angles_are_seen_whatever_the_rotation() -> N
 
 
 def test_a_mirrored_matrix_is_refused() -> None:
-    with pytest.raises(ValueError, match="mirrors"):
+    with pytest.raises(ValueError, match="reflection"):
         polar(np.diag([1.0, 1.0, -1.0]))
 
 

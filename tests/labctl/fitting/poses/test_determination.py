@@ -31,7 +31,8 @@ def test_too_few_usable_turns_say_why_the_others_are_not() -> None:
     m = 12
     moves = Moves(
         np.arange(m), np.zeros((m, 2)), np.zeros((m, 2, 3)), np.zeros((m, 1)), np.zeros((m, 2)), np.zeros(m),
-        np.zeros(3), tuple("gyro_x is saturated at 250 deg/s: turn slower" if k < 7 else "" for k in range(m)),
+        np.zeros(3), tuple("gyro_x is saturated at 250 deg/s: turn the unit more "
+        "slowly" if k < 7 else "" for k in range(m)),
     )  # fmt: skip
     with pytest.raises(NotEnoughData, match=r"U: 5 turns .* at least 9 \(7 cannot: gyro_x is saturated at 250 deg/s"):
         require_moves("U", moves)

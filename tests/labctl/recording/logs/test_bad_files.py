@@ -73,9 +73,9 @@ def truncated_ulog(path: Path) -> Path:
 FILES: dict[str, tuple[Callable[[Path], Path], str]] = {
     "empty": (lambda p: raw(p / "a.csv", b""), "the file is empty"),
     "only empty lines": (lambda p: text(p / "a.csv", "\n\n\n"), "only empty lines"),
-    "only a header": (lambda p: text(p / "a.csv", HEADER + "\n"), "no line of numbers"),
+    "only a header": (lambda p: text(p / "a.csv", HEADER + "\n"), "no row of numbers"),
     "one row": (lambda p: text(p / "a.csv", "\n".join(LINES[:2]) + "\n"), "1 row of readings"),
-    "binary": (lambda p: raw(p / "a.bin", bytes(range(256)) * 40), "a binary file"),
+    "binary": (lambda p: raw(p / "a.bin", bytes(range(256)) * 40), "the file is binary"),
     "random bytes": (lambda p: raw(p / "a.dat", np.random.default_rng(1).bytes(9999)), "no text has|binary"),
     "NUL bytes within": (lambda p: text(p / "a.csv", GOOD + "\0" * 500), "NUL|0x00"),
     "NUL bytes far within": (lambda p: text(p / "a.csv", csv_text(at_rest(4000)) + "\0\0\0"), "NUL byte"),
@@ -86,9 +86,9 @@ FILES: dict[str, tuple[Callable[[Path], Path], str]] = {
     "picture": (lambda p: raw(p / "a.csv", b"\x89PNG\r\n\x1a\n" + b"0" * 99), "a picture"),
     "JSON": (lambda p: text(p / "a.json", '{"gyro": [1, 2, 3]}'), "this is JSON"),
     "web page": (lambda p: text(p / "a.csv", "<!DOCTYPE html><p>Not found</p>"), "XML or HTML"),
-    "prose": (lambda p: text(p / "a.txt", "The gyro was warm.\nIt drifted.\n"), "no line of numbers"),
+    "prose": (lambda p: text(p / "a.txt", "The gyro was warm.\nIt drifted.\n"), "no row of numbers"),
     "2 GB": (lambda p: sparse(p / "a.csv"), "2147 MB; at most 1000 MB"),
-    "wrong separator": (lambda p: text(p / "a.csv", GOOD), r"no line of numbers|holds text|is not in the file"),
+    "wrong separator": (lambda p: text(p / "a.csv", GOOD), r"no row of numbers|holds text|is not in the file"),
     "mixed separators": (
         lambda p: text(p / "a.csv", "\n".join(LINES[:200] + [each.replace(",", ";") for each in LINES[200:220]])),
         "columns where the others have",
@@ -99,7 +99,7 @@ FILES: dict[str, tuple[Callable[[Path], Path], str]] = {
     ),
     "duplicate columns": (
         lambda p: text(p / "a.csv", GOOD.replace("gyro_y", "gyro_x", 1)),
-        r"'gyro_x \(deg/s\)' stands more than once",
+        r"'gyro_x \(deg/s\)' occurs more than once",
     ),
     "time backwards": (
         lambda p: text(p / "a.csv", with_cell(9, 0, "0.001")),
@@ -161,7 +161,7 @@ FILES: dict[str, tuple[Callable[[Path], Path], str]] = {
     ),
     "Parquet of lists": (lambda p: parquet(p / "a.parquet", gyro_x=[[1.0], [2.0]]), "column 'gyro_x' holds list"),
     "cut-off ULog": (lambda p: truncated_ulog(p / "a.ulg"), "none of sensor_gyro, .* is in this log"),
-    "cut-off bag": (lambda p: raw(p / "a.bag", b"#ROSBAG V2.0\n" + b"\x45\x00\x00\x00"), "not a whole bag"),
+    "cut-off bag": (lambda p: raw(p / "a.bag", b"#ROSBAG V2.0\n" + b"\x45\x00\x00\x00"), "not a complete ROS bag"),
     "a folder": (lambda p: p, r"recording\.toml"),
     "not there": (lambda p: p / "none.csv", "not found"),
 }

@@ -73,7 +73,7 @@ def test_without_times_rows_belong_together_one_by_one(tmp_path: Path) -> None:
     assert joined(one, [other], None).columns["other: q"].values[3] == 30.0
     short = table(tmp_path / "short.csv", line(19, 1.0), "p,q")
     with pytest.raises(
-        BadFile, match=r"19 rows beside 20 of one\.csv, and one\.csv has no column known to be its time"
+        BadFile, match=r"the file has 19 rows and one\.csv has 20, but no column of one\.csv is known to be the time"
     ):
         joined(one, [short], None)
 
@@ -83,13 +83,16 @@ def test_without_times_rows_belong_together_one_by_one(tmp_path: Path) -> None:
     [
         (
             line(50, 0.01, start=3.0),
-            r"no reading near time 0 of a\.csv \(row 1; 50 rows so\): its times go from 3 to 3\.49",
+            (
+                r"there is no reading within 5 steps of time 0 of a\.csv \(row 1; 50 rows without a "
+                r"reading\): its own times go from 3 to 3\.49"
+            ),
         ),
-        (line(50, 10.0), r"no reading near time .* at most 5 steps may lie between"),
-        (line(50, 0.01)[::-1], "are not all increasing numbers"),
+        (line(50, 10.0), r"there is no reading within 5 steps of time .*: its own times"),
+        (line(50, 0.01)[::-1], "do not increase from row to row"),
         (
             np.delete(line(50, 0.01), slice(20, 40), axis=0),
-            r"no reading near time 0\.25 of a\.csv \(row 26; 10 rows so\)",
+            r"within 5 steps of time 0\.25 of a\.csv \(row 26; 10 rows without a reading\)",
         ),
     ],
 )

@@ -52,7 +52,7 @@ def test_a_turn_that_came_out_short_is_told_in_one_sentence(turned: Recording, a
     finding = only(inspect_recording(to_points(wrong) if as_points else wrong))
     assert (finding.what, finding.severity) == ("turn", "certain")
     assert finding.text.startswith("data set 9, axis y: only 36")
-    assert "deg came out of 432 (expected 432 +- 43 deg); turn again, or correct turn_deg" in finding.text
+    assert "deg instead of 432 deg (expected 432 +- 43 deg); repeat the turn, or correct turn_deg" in finding.text
 
 
 def test_a_turn_in_the_other_sense_is_told_as_such(turned: Recording) -> None:

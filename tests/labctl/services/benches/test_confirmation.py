@@ -155,7 +155,7 @@ def test_nothing_moves_before_a_person_has_looked(store: Store, real: RealBench)
 def test_a_new_doubt_is_tried_anew(store: Store, real: RealBench) -> None:
     retry = retry_of(store, real)
     retry.attempt()
-    store.benches.mark(BENCH.name, "campaign 7 ended while nothing could be written", AT)
+    store.benches.mark(BENCH.name, "campaign 7 ended while the database could not be written", AT)
     assert bench(store).is_unconfirmed
     retry.attempt()
     row = bench(store)

@@ -79,25 +79,25 @@ def test_exchanged_units_are_refused_in_one_line(store: Store) -> None:
     with pytest.raises(Conflict) as told:
         begin(store, stims(a=OWN["b"], b=OWN["a"]))
     assert str(told.value) == (
-        f"a: the unit says serial number {OWN['b']}, which b had: the two are exchanged; in campaign 2 unit UNIT-A "
-        "said "
-        f"{OWN['a']}. Connect the right unit, give this one a `serial` of its own, or, if it is right, set own_serial "
-        "= "
-        f"'{OWN['b']}' in the bench file"
+        f"a: the unit reports serial number {OWN['b']}, which b had: the two are exchanged, but in "
+        f"campaign 2 unit UNIT-A reported {OWN['a']}. Connect the right unit; or, for another unit, "
+        f"give it a different `serial`; or, if this is the right unit, set own_serial = '{OWN['b']}' in the bench file"
     )
 
 
 def test_a_unit_is_known_on_every_bench_and_a_bench_file_may_name_another(store: Store) -> None:
     begin(store, stims())
     other = stims(a="N25580000000009").model_copy(update={"name": "other"})
-    with pytest.raises(Conflict, match=r"a: the unit says serial number N25580000000009; in campaign 1"):
+    with pytest.raises(Conflict, match=r"a: the unit reports serial number N25580000000009, but in campaign 1"):
         begin(store, other)
     begin(store, with_gyro(other, "a", own_serial="N25580000000009"))
     begin(store, other)  # it is the known one by now
 
 
 def test_a_bench_file_that_names_another_unit_than_answers_is_refused(store: Store) -> None:
-    with pytest.raises(WrongInstrument, match=f"has serial number {OWN['a']}, bench file or campaign says N1; connect"):
+    with pytest.raises(
+        WrongInstrument, match=f"has serial number {OWN['a']}, but the bench file or the campaign names N1; connect"
+    ):
         begin(store, with_gyro(stims(), "a", own_serial="N1"))
 
 
@@ -130,7 +130,7 @@ def test_a_port_on_another_adapter_than_the_file_names_is_not_opened(store: Stor
     bench = load_bench("single-axis-sim")
     bench = bench.model_copy(update={"table": bench.table.model_copy(update={"adapter": "A7"})})
     with pytest.raises(
-        WrongInstrument, match=r"table: port \S+ is on USB adapter without a serial number, bench file or"
+        WrongInstrument, match=r"table: port \S+ is on USB adapter without a serial number, but the bench file or"
     ):
         begin(store, bench)
     plugged[bench.table.port or ""] = "A7:1.2"  # the third port of it
@@ -141,7 +141,9 @@ def test_a_resumed_campaign_takes_only_the_units_that_it_began_with(store: Store
     begin(store, stims())
     exchanged = stims(a=OWN["b"], b=OWN["a"])
     resumed = prepare_resume(store, 1, exchanged, lambda _: VirtualClock(), ResumeRequest(by="Ann"))
-    with pytest.raises(WrongInstrument, match=f"has serial number {OWN['b']}, bench file or campaign says {OWN['a']}"):
+    with pytest.raises(
+        WrongInstrument, match=f"has serial number {OWN['b']}, but the bench file or the campaign names {OWN['a']}"
+    ):
         resumed.bench.gyros["a"].identify()
     resumed.bench.close()
 

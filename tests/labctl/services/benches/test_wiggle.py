@@ -89,7 +89,7 @@ def test_units_on_their_own_ports_are_right() -> None:
     assert [unit.text for unit in answer.units] == ["it is on /dev/a", "it is on /dev/b", "it is on /dev/c"]
     assert hand.heard[0] == "leave every unit at rest for 3 s"
     assert hand.heard[1:3] == [
-        "turn unit a (S-a) by hand, back and forth; leave the others at rest", "a was asked for; a moved",
+        "turn unit a (S-a) by hand, back and forth; leave the others at rest", "unit a was to be turned; a moved",
     ]  # fmt: skip
 
 
@@ -110,8 +110,8 @@ def test_exchanged_ports_are_named_with_what_to_set() -> None:
 @pytest.mark.parametrize(
     ("moves", "says"),
     [
-        ([], "nothing moved within 60 s: turn it further than a quarter turn, and check its port /dev/a"),
-        (["a", "b"], "a and b moved: turn it alone, and start again"),
+        ([], "no unit moved within 60 s: turn the unit by more than a quarter turn, and check its port /dev/a"),
+        (["a", "b"], "a and b moved: turn only the named unit, and start again"),
     ],
 )
 def test_nothing_and_several_are_told(moves: list[str], says: str) -> None:
@@ -121,7 +121,7 @@ def test_nothing_and_several_are_told(moves: list[str], says: str) -> None:
 
 
 def test_a_unit_that_moves_while_it_is_to_rest_and_a_silent_one_are_refused() -> None:
-    with pytest.raises(BadInput, match=r"a: it moved while it was to be at rest \(.* deg/s\); start again"):
+    with pytest.raises(BadInput, match=r"a: the unit moved \(.* deg/s\); start again"):
         run({"a": ["a"]}, noise_dps=8.0)
 
 

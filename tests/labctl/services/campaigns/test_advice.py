@@ -53,15 +53,21 @@ def test_every_guard_is_told_in_its_own_words(kind: str, change: dict[str, Any])
     [
         (SoakFailed("the soak at 60 deg C did not settle within 7200 s: it drifts"), "did not settle"),
         (SoakFailed("chamber: 31.2 deg C after 7200 s, not within 0.5 deg C of 60 deg C; limit 7200 s"), "set point"),
-        (Unanswered("no answer within 600 s: turn the units"), "not answered in time"),
+        (Unanswered("no answer within 600 s to the request: turn the units"), "not answered in time"),
         (BadData("fog", "not one of about 500 readings came; check cable, power and baud rate"), "readings"),
         (NoReply("table", "/dev/ttyUSB0 gave no answer in 2.0 s; check power, cable and baud rate"), "did not answer"),
         (NoReply("imu", "no intact Xsens MTi reading on /dev/ttyUSB0 for 2.1 s: nothing came"), "did not answer"),
-        (NoReply("imu", "cannot read air, text came (SSH-2.0), no Modbus; check host"), "did not answer"),
+        (
+            NoReply("imu", "cannot read air, text arrived (SSH-2.0) instead of a Modbus reply; check host"),
+            "did not answer",
+        ),
         (NoReply("imu", "the counter on /dev/ttyUSB0 stands at 7 in 50 readings in a row"), "readings"),
         ("Ann declined: turn the units: no wrench", "cannot be done"),
         ("resumed 5 times without finishing a step; inspect the bench", "never finished a step"),
-        ("taken up 5 times without finishing a step; look at the bench", "never finished a step"),  # of an older labctl
+        (
+            "taken up 5 times without finishing a step; look at the bench",
+            "never finished a step",
+        ),  # of an older version of labctl
         ("not resumed: bench b was not confirmed safe: table to rest", "not confirmed safe"),
         ("ended by an error of the program", "fault in labctl itself"),
         ("ZeroDivisionError: division by zero", "fault in labctl itself"),

@@ -84,8 +84,11 @@ def test_what_was_refused_is_in_the_events_and_not_in_the_recording(tmp_path: Pa
         states = [each.state for each in store.recordings.data_sets(recording)]
         assert states == ["partial"] * 6 + ["complete"] * 6
         refused = [event.message for event in store.campaigns.events(made.id) if event.kind == "turn.refused"]
-        assert refused[0] == "turn by 360 deg, z up: only 301 deg came out of 360 about z: turn again"
-        assert "deg came out about x, not about z: turn again" in refused[1]
+        assert (
+            refused[0]
+            == "turn by 360 deg, z up: the unit turned by only 301 deg about axis z instead of 360 deg: turn again"
+        )
+        assert "deg about axis x, not about axis z: turn again" in refused[1]
         view = campaign_plan(store, made.id)
         assert (view.datasets, view.timeline.turn_deg[2:4]) == (6, [360.0, -360.0])
         # what is exported comes in again as it was
@@ -146,7 +149,7 @@ def test_a_turn_is_asked_shown_repeated_and_done_over_http(client: TestClient) -
     assert (placed["kind"], placed["position"]) == ("mount", "z")
     refused = confirm(placed, again=True)
     assert (refused.status_code, refused.json()["type"]) == (409, "urn:labctl:problem:stale-prompt")
-    assert "only a turn is asked again" in refused.json()["detail"]
+    assert "only a turn can be repeated" in refused.json()["detail"]
     confirm(placed).raise_for_status()
     confirm(until(client, lambda now: now["prompt"] and now["prompt"]["kind"] == "power_on")["prompt"])
     turned = until(client, lambda now: now["turn"] and now["turn"]["came_deg"].get("mems", 0) > 350)
@@ -186,9 +189,9 @@ def test_which_recipe_needs_what_is_said_in_one_line(tmp_path: Path) -> None:
     assert "36 data sets in 20 steps" in planned.output
     refused = runner.invoke(app, ["campaign", "start", "short", "--bench", "by-hand-sim", *database])
     assert refused.exit_code == 2
-    assert "rates_dps: a rate table is needed, and the bench has none" in refused.stderr
+    assert "rates_dps: a rate table is needed, but the bench has none" in refused.stderr
     checked = runner.invoke(app, ["bench", "check", "by-hand-sim"])
     assert (checked.exit_code, "table" in checked.output, "mems" in checked.output) == (0, False, True)
     simulated = runner.invoke(app, ["simulate", "by-hand", "--out", str(tmp_path / "out")])
     assert simulated.exit_code == 2
-    assert "turns by hand are not simulated from the plan alone" in simulated.stderr
+    assert "turns by hand cannot be simulated without a campaign" in simulated.stderr

@@ -141,4 +141,4 @@ def test_an_abort_is_written_down_after_it_is_done(store: Store, monkeypatch: py
     monkeypatch.setattr(store.audit, "record", unwritable)
     answer = context.control.abort(context, asked)
     assert done[-1] == "aborted: smoke (Ada)"
-    assert answer.unrecorded == "it was aborted, but that is not in the audit trail: the disk is full"
+    assert answer.unrecorded == "the campaign was aborted, but that is not in the audit trail: the disk is full"

@@ -99,7 +99,7 @@ def test_with_the_encoder_the_scale_factor_is_right(tmp_path: Path) -> None:
     ((level, message, value),) = found.events  # once, not for every data set
     assert level == "warning"
     assert value == pytest.approx(200, abs=30)
-    assert "the encoder is the reference, so this is in no calibration" in message
+    assert "the encoder is the reference, so this difference does not affect a calibration" in message
     assert "table_rate_ratio" not in found.text  # nothing is wrong with the data
     # said in the recording, in the calibration document and for the pages
     assert found.samples.info.rate_reference == "measured"
@@ -130,10 +130,10 @@ def test_without_it_the_error_is_in_the_scale_factor_and_is_named_table_rate_rat
     assert warning.what == "table_rate_ratio"
     assert warning.value == pytest.approx(200, abs=15)
     # criticism says what the angles show, and why the readings of the gyro alone show nothing
-    assert found.text.startswith("Check the data: column table_rate_dps: table_rate_ratio: by its logged angle")
-    assert "table_rate_ratio and scale_factor are the same column in these data" in found.text
+    assert found.text.startswith("Check the data: column table_rate_dps: table_rate_ratio: the logged table angle")
+    assert "looks exactly like an error of the scale factor" in found.text
     assert "no reading of the gyro can distinguish them" in found.text
-    assert "so the scale factor contains it" in found.events[0][1]
+    assert "so this difference becomes part of the scale factor" in found.events[0][1]
 
 
 def test_an_error_in_one_direction_is_found_by_direction(tmp_path: Path) -> None:

@@ -47,6 +47,6 @@ def test_a_campaign_loses_nothing_and_its_times_are_those_of_the_device(tmp_path
 def test_a_gyro_that_sends_at_another_rate_is_named_with_its_rate(tmp_path: Path) -> None:
     answer = run_here(str(tmp_path / "lab.sqlite"), StartRequest(recipe="short", bench=bench_of(tmp_path, 1e5)))
     assert answer.state == "failed"
-    assert "fog: sends 110 readings/s on sim://kvh-dsp3000/fog, and the bench file says 100, limit +-4 %" in (
+    assert "fog: sends 110 readings/s on sim://kvh-dsp3000/fog, but the bench file says 100, limit +-4 %" in (
         answer.reason
     )

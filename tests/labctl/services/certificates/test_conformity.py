@@ -39,5 +39,5 @@ def test_the_acceptance_limit_is_that_of_the_rule(rule: str, error_dps: float, p
 
 def test_a_guard_band_as_wide_as_the_limit_is_refused() -> None:
     ordered = OrderedConformity(specification="S", limit_dps=0.25, rule="guard-band")
-    with pytest.raises(NoAcceptance, match=r"U = 0.25 deg/s, reaches the limit, 0.25 deg/s"):
+    with pytest.raises(NoAcceptance, match=r"U = 0.25 deg/s, is not smaller than the limit, 0.25 deg/s"):
         conformity(ordered, state(0.0), (point(0.25),))

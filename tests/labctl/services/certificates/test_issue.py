@@ -127,7 +127,9 @@ def test_issuing_again_answers_what_was_issued(store: Store) -> None:
     assert issue(store, SERIAL, 1, request(), AT + timedelta(days=9)) == first
     assert {name: certificate_file(store, SERIAL, 1, name).content for name in FORMATS} == kept
     assert rows_of(store) == 1
-    with pytest.raises(CertificateRefused, match="another item; to replace it: --amend"):
+    with pytest.raises(
+        CertificateRefused, match="another item; to replace that certificate, give the reason with --amend"
+    ):
         issue(store, SERIAL, 1, request(item={**ORDER["item"], "condition": "Scratched."}), AT)
 
 
@@ -189,7 +191,7 @@ def test_the_issue_is_in_the_audit_trail(store: Store) -> None:
 
 def test_as_found_is_by_the_version_in_force_before(store: Store) -> None:
     first = json.loads(_document(store, 1))
-    assert first["as_found"]["basis"] == "the output by its nominal scale, without correction"
+    assert first["as_found"]["basis"] == "the output converted with its nominal scale factor, without correction"
     version = add_version(store)
     second = json.loads(_document(store, version))
     assert second["as_found"]["basis"] == "the calibration in force before, version 1"

@@ -139,7 +139,7 @@ def test_the_queue_is_bounded_and_in_order(workers: InWorkers, tmp_path: Path) -
     begun: list[str] = []
     second = workers.submit(work.who_asks, "second", progress=stages.append)
     third = workers.submit(work.who_asks, "third", progress=begun.append)
-    with pytest.raises(TooBusy, match="1 computations run and 2 wait") as busy:
+    with pytest.raises(TooBusy, match="1 computations are running and 2 are waiting") as busy:
         workers.submit(work.who_asks, "fourth")
     assert busy.value.retry_after_s >= 1
     assert stages == ["waiting for earlier computations: 1"]

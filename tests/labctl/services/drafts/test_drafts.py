@@ -186,7 +186,7 @@ def test_what_was_interrupted_between_fit_and_report_is_reported_on_the_same_ver
 @pytest.mark.usefixtures("unjudged")
 def test_a_draft_that_another_process_made_meanwhile_is_not_kept_again(store: Store) -> None:
     made(store)
-    with pytest.raises(Conflict, match="by another process meanwhile"):
+    with pytest.raises(Conflict, match="another process has made the draft"):
         fit_unit(store, UNIT, FitRequest(effects=["bias"]), NOW, is_draft=True)
     assert store.calibrations.versions(UNIT) == [1]
 
@@ -311,7 +311,7 @@ def test_hidden_effects_of_a_later_start_are_checked_when_it_is_entered(store: S
     ("change", "said"),
     [
         (('effects = ["bias", "scale_factor"]', ""), "name a model"),
-        (("[fit.limits]", "against = false\n[fit.limits]"), "drift_dps needs the version in force"),
+        (("[fit.limits]", "against = false\n[fit.limits]"), "drift_dps compares with the version in force"),
         (("drift_dps = 0.1", "drift_dps = -1"), "greater than 0"),
         (("compare", "compere"), "did you mean 'compare'"),
     ],

@@ -52,7 +52,9 @@ def test_the_surest_importer_reads(monkeypatch: pytest.MonkeyPatch, file: Path) 
 def test_two_that_are_equally_sure_are_a_question(monkeypatch: pytest.MonkeyPatch, file: Path) -> None:
     register(monkeypatch, IMPORTERS, "one", importer(True))
     register(monkeypatch, IMPORTERS, "other", importer(1.0))
-    with pytest.raises(BadInput, match="one and other recognise the file equally well; name one with --format"):
+    with pytest.raises(
+        BadInput, match="the importers one and other recognise the file equally well; choose one with --format"
+    ):
         surest(file)
 
 
@@ -84,10 +86,10 @@ def test_what_no_importer_knows_is_left_to_labctls_own(tmp_path: Path, name: str
         (failing, "some.log: entry point 'bad' .* cannot read it: KeyError: 'row'; repair or uninstall acme-plugins"),
         (lambda *_: None, "cannot read it: TypeError: None is not a labctl.recording.recording.Recording"),
         (lambda *_: made(gyro_z=[1.0]), "columns of different or no length .*dataset: 2, .*gyro_z: 1"),
-        (lambda *_: made(gyro_z=[1.0, float("nan")]), "some.log: column 'gyro_z', row 2: nan where a number is needed"),
+        (lambda *_: made(gyro_z=[1.0, float("nan")]), "some.log: column 'gyro_z', row 2: nan is not a number"),
         (
             lambda *_: made(temperature_c=[25.0, -300.0]),
-            "some.log: column 'temperature_c', row 2: -300 is not possible",
+            "some.log: column 'temperature_c', row 2: -300 is outside the possible range",
         ),
         (lambda *_: made(dataset=np.array([1, 1])), "some.log: column 'dataset', row 2: number 1 is repeated"),
     ],

@@ -61,8 +61,8 @@ def test_a_turn_that_came_out_short_is_no_calibration(lab: Lab, tmp_path: Path) 
     taken = lab.json("import", session(2, tmp_path / "wrong", wrong=9))
     assert [warning["what"] for warning in taken["warnings"]] == ["turn"]
     refused = lab.run("fit", "HAND", "--model", "turns", status=2)
-    assert "deg came out of 432" in refused.stderr
-    assert "turn again, or correct turn_deg" in refused.stderr
+    assert "deg instead of 432 deg" in refused.stderr
+    assert "repeat the turn, or correct turn_deg" in refused.stderr
 
 
 def test_a_law_of_the_rate_is_not_added_to_turns(lab: Lab, tmp_path: Path) -> None:

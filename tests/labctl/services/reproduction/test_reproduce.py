@@ -186,7 +186,7 @@ def test_a_units_own_recording_is_held_against_the_paper(lab: Lab) -> None:
     [
         (["ojeda2001"], "paper 'ojeda2001' is not known; choose one of ojeda2000, yang2018, weiss1995"),
         (["ojeda2000", "NOBODY"], "NOBODY"),
-        (["yang2018", "OSU-FOG-2024", "--axis", "z"], "takes all axes of the recording together"),
+        (["yang2018", "OSU-FOG-2024", "--axis", "z"], "uses all axes of the recording together"),
         (["ojeda2000", "OSU-FOG-2024", "--axis", "x"], "the recording has axes z"),
         (["ojeda2000", "--axis", "z"], "are for a unit's recording"),
     ],

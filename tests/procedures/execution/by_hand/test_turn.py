@@ -90,12 +90,12 @@ def test_no_reading_is_missing_between_the_rests_and_the_turn() -> None:
 @pytest.mark.parametrize(
     ("mistake", "said"),
     [
-        ("short", "only 300 deg came out of 360 about x"),
-        ("axis", "deg came out about y, not about x"),
-        ("direction", "deg came out in the other direction, clockwise"),
+        ("short", "the unit turned by only 300 deg about axis x instead of 360 deg"),
+        ("axis", "deg about axis y, not about axis x"),
+        ("direction", "deg in the wrong direction, clockwise"),
         ("nudge", "the unit moved during the rest after the turn"),
-        ("fast", "the unit measures only up to 400; turn the unit more slowly"),
-        ("nothing", "no turn about x came out, only 0 deg of 360"),
+        ("fast", "the unit measures only up to 400 deg/s; turn the unit more slowly"),
+        ("nothing", "the unit turned by only 0 deg about axis x instead of 360 deg"),
     ],
 )
 def test_a_clumsy_hand_is_told_what_came_out_and_asked_again(mistake: str, said: str) -> None:
@@ -119,7 +119,7 @@ def test_a_hand_that_never_does_it_ends_the_campaign_and_says_why() -> None:
     outcome = there.run()
     assert outcome.state == "failed"
     assert outcome.reason.startswith(
-        "the turn by 360 deg, x up, was refused 3 times, the last time because: only 300 deg came out"
+        "the turn by 360 deg, x up, was refused 3 times, the last time because: the unit turned by only 300 deg"
     )
 
 
@@ -204,7 +204,9 @@ def test_a_person_who_is_gone_ends_the_campaign_at_the_time_limit() -> None:
     there = HandBench(operator=Person(lambda _, __: None))
     outcome = there.run()
     assert outcome.state == "failed"
-    assert outcome.reason.startswith("no answer within 20 s: turn the units by 360 deg counter-clockwise")
+    assert outcome.reason.startswith(
+        "no answer within 20 s to the request: turn the units by 360 deg counter-clockwise"
+    )
     assert there.operator.pending is None
 
 

@@ -38,7 +38,7 @@ export const stopButton = (campaign) =>
       "Safe stop",
       async () => {
         const answers = await askOperator(
-          "Stop now and leave the bench safe?",
+          "End the campaign now and set the bench to its safe state?",
           [
             { ...operatorNameField(), required: false },
             {
@@ -49,7 +49,7 @@ export const stopButton = (campaign) =>
             },
           ],
           {
-            text: "The table comes to rest, the chamber goes to its safe set point, the campaign ends. The data measured so far are stored, and the campaign can be resumed.",
+            text: "The table stops, the chamber goes to its safe set point, and the campaign ends. The data measured so far are stored, and the campaign can be resumed.",
             confirm: "Stop now",
             kind: "danger",
           },
@@ -73,7 +73,7 @@ export const stopButton = (campaign) =>
 export const pauseButton = (campaign) =>
   button("Pause", async () => {
     const answers = await askOperator(
-      "Pause after the present data set?",
+      "Pause the campaign after the present data set?",
       [operatorNameField(), { name: "reason", label: "Why" }],
       { confirm: "Pause" },
     );
@@ -97,7 +97,7 @@ export async function askBenchClear(bench, { later = false } = {}) {
     [operatorNameField(), ...questions.map(([name, label]) => ({ name, label, type: "checkbox" }))],
     {
       text: later
-        ? "The table turns and the chamber heats and cools when the campaign begins, without asking again. Tick what you confirm for that time."
+        ? "When the campaign begins, the table turns and the chamber heats and cools, and labctl does not ask again. Tick what you confirm for that time."
         : "The table turns and the chamber heats and cools as soon as you start. Inspect the bench, then tick what you have checked.",
       confirm: later ? "I confirm these points for that time" : "Start now",
     },
@@ -161,11 +161,15 @@ export const resumeButton = (campaign, { whole = false, kind = "primary" } = {})
 export const answerButtons = (campaign, prompt) => [
   ...(prompt.kind === "turn" ? turnButtons(campaign, prompt) : [doneButton(campaign, prompt)]),
   button("Cannot be done", async () => {
-    const answers = await askOperator("It cannot be done?", [operatorNameField(), { name: "reason", label: "Why" }], {
-      text: "This ends the campaign: the table stops, and the chamber returns to its safe temperature.",
-      confirm: "It cannot be done",
-      kind: "danger",
-    });
+    const answers = await askOperator(
+      "Answer that this action cannot be done?",
+      [operatorNameField(), { name: "reason", label: "Why" }],
+      {
+        text: "This ends the campaign: the table stops, and the chamber returns to its safe temperature.",
+        confirm: "It cannot be done: end the campaign: end the campaign",
+        kind: "danger",
+      },
+    );
     if (!answers) return;
     const body = { prompt: prompt.id, by: answers.by, reason: answers.reason, confirmed: false };
     await post("/api/campaigns/{campaign}/confirm", { path: { campaign }, body });

@@ -31,7 +31,7 @@ export function checkCard(bench, free, again) {
       : h(
           "p",
           { class: "muted" },
-          "Not checked since the service was started. A check asks every port and instrument; nothing moves.",
+          "The bench was not checked since the service was started. A check queries every port and instrument; nothing moves.",
         ),
   );
 }

@@ -37,7 +37,7 @@ export function eventList(most, level = "info", campaign = {}) {
         : null,
       from.length
         ? from.map((event) => eventItem(event, campaign))
-        : h("li", { class: "empty" }, all.length ? "Nothing of this kind has happened." : "No event has arrived yet."),
+        : h("li", { class: "empty" }, all.length ? "No event of this kind has occurred." : "No event has arrived yet."),
       shown.length > most ? h("li", { class: "muted small" }, `and ${shown.length - most} before`) : null,
     );
   }

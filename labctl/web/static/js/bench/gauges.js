@@ -97,7 +97,7 @@ export function gauges(timeline) {
       ([column, value]) => `${channelName(column)} ${plainNumber(value, 6)} ${channelUnit(column)}`,
     );
     references.hidden = !read.length;
-    setChildren(references, `By reference instruments: ${read.join(", ")}`);
+    setChildren(references, `Readings of the reference instruments: ${read.join(", ")}`);
   };
   return Object.assign(element, { set });
 }

@@ -53,7 +53,7 @@ export function historyPlot(history) {
   };
   const element = figure(
     "Temperatures and rate since this page was opened",
-    "Each point is a progress message of the campaign; the first came when this tab was opened.",
+    "Each point is a progress message of the campaign; the plot begins when this tab was opened.",
     draw,
     {
       height: "21rem",

@@ -27,7 +27,7 @@ export function noBenchCard() {
     h(
       "p",
       { class: "muted" },
-      "The first command runs a simulated tri-axial bench, whose speed --speed sets; the second drives the instruments that the bench file names.",
+      "The first command runs a simulated tri-axial bench; --speed sets its speed. The second command drives the real instruments that the bench file names.",
     ),
     h("div", { class: "row" }, linkButton("To the recordings", "/recordings")),
   );

@@ -46,7 +46,7 @@ export function liveOutput(campaign) {
   const figures = h(
     "div",
     { class: "live-values", "aria-live": "off" },
-    h("p", { class: "muted" }, "The units are switched off, or have sent no reading yet."),
+    h("p", { class: "muted" }, "No readings yet: the units are switched off, or have not sent a reading."),
   );
   const place = h("div", {});
   const units = () => [...new Set([...courses.values()].map((course) => course.gyro))];

@@ -155,8 +155,8 @@ export function mountingDrawing(position) {
 
 /** @param {Prompt} prompt */
 function heading({ kind, position, turn_deg: angle }) {
-  if (kind === "mount") return `Turn the unit: ${position} up`;
-  if (kind === "turn") return `Keep ${position} up, and turn the unit by ${angle} deg about ${position}`;
+  if (kind === "mount") return `Mount the unit with axis ${position} pointing up`;
+  if (kind === "turn") return `Keep axis ${position} pointing up, and turn the unit by ${angle} deg about this axis`;
   return "The campaign has a question";
 }
 
@@ -179,7 +179,7 @@ export function operatorPrompt(campaign, prompt, hasTable) {
       { class: "stack" },
       h("h2", {}, heading(prompt)),
       h("p", {}, `${prompt.text[0].toUpperCase()}${prompt.text.slice(1)}.`),
-      h("p", { class: "muted" }, `${hasTable ? "The table is at rest and waits for you." : ""}${limit}`.trim()),
+      h("p", { class: "muted" }, `${hasTable ? "The table is at rest until you have answered." : ""}${limit}`.trim()),
       h("div", { class: "row" }, answerButtons(campaign, prompt)),
     ),
   );

@@ -108,9 +108,9 @@ export function runningCampaign(status, plan, { signal, over }) {
                 h(
                   "strong",
                   {},
-                  `Nothing new since ${new Date(since).toLocaleTimeString("en-GB")}${now.simulated_time ? " (real time)" : ""}. `,
+                  `No update since ${new Date(since).toLocaleTimeString("en-GB")}${now.simulated_time ? " (real time)" : ""}. `,
                 ),
-                `What is shown may be out of date: ${why}. The page retries every few seconds.`,
+                `The values on this page may be out of date: ${why}. The page retries every few seconds.`,
               )
             : null,
         );

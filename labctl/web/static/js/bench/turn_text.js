@@ -10,7 +10,7 @@ export function turnText({ phase, position, asked_deg: asked, attempt, came_deg:
   const angles = Object.values(came);
   const share = angles.length ? Math.min(Math.max(angles[0] / asked, 0), 1) : 0;
   const which = attempt > 1 ? ` (attempt ${attempt})` : "";
-  if (phase === "rest") return { text: `Keep the unit still, ${position} up${which}.`, share };
+  if (phase === "rest") return { text: `Keep the unit still, axis ${position} pointing up${which}.`, share };
   const sense = asked > 0 ? "counter-clockwise" : "clockwise";
   const far = angles.length ? `${angles.map((deg) => Math.round(deg)).join(", ")} deg of ${asked} deg` : `${asked} deg`;
   return { text: `${far} about ${position}, ${sense}${which}.`, share };

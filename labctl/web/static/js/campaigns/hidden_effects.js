@@ -40,9 +40,9 @@ export function hiddenEffectForm(effects, asked, chosen) {
     });
     const hint =
       can?.visible && can.smallest_size
-        ? `This plan detects it from ${number(can.smallest_size, 2)} ${unit || `(${sizeText(can.smallest_size, "1")})`} on.`
+        ? `This plan detects the effect if its size is at least ${number(can.smallest_size, 2)} ${unit || `(${sizeText(can.smallest_size, "1")})`} on.`
         : can
-          ? "This plan cannot detect it."
+          ? "This plan cannot detect the effect."
           : null;
     return setChildren(
       beside,

@@ -114,7 +114,7 @@ export function startForm(bench, order) {
       : there.campaign
         ? notice(
             "warn",
-            `Campaign ${there.campaign} runs on ${there.name} now and has to end first. A start that is scheduled waits for the end of that campaign.`,
+            `Campaign ${there.campaign} is running on ${there.name} and must end first. A scheduled start waits for the end of that campaign.`,
           )
         : null,
     h(
@@ -140,7 +140,7 @@ export function startForm(bench, order) {
         labelledField(
           "May be late by, h",
           late,
-          "A start that is later than this is skipped. Empty: no limit, a late start is made once.",
+          "If the campaign cannot begin within this time, the start is skipped. Empty: no limit; a missed start is made up once.",
         ),
         zones,
       ),
@@ -160,7 +160,7 @@ export function startForm(bench, order) {
         labelledField(
           "May be late by, h",
           late,
-          "A start that is later than this is skipped. Empty: no limit, a late start is made once.",
+          "If the campaign cannot begin within this time, the start is skipped. Empty: no limit; a missed start is made up once.",
         ),
         zones,
       ),

@@ -24,7 +24,7 @@ export function visibilityReport(rows) {
     h(
       "p",
       {},
-      h("strong", {}, `It can detect ${seen.length} of ${rows.length} effects`),
+      h("strong", {}, `This plan can detect ${seen.length} of ${rows.length} effects`),
       unseen.length ? ` and cannot detect ${unseen.length}; ` : "; ",
       fitted.length ? `${fitted.length} are part of the usual model and are fitted.` : null,
     ),

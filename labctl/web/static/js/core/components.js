@@ -193,7 +193,7 @@ export function errorPage(error, again) {
       ? error.title
       : error instanceof Unreachable
         ? "No answer"
-        : "Something went wrong on this page";
+        : "This page has failed; reload it";
   if (!(error instanceof Problem || error instanceof Unreachable)) console.error(error);
   return h(
     "div",

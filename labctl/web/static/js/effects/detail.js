@@ -53,7 +53,7 @@ export function effectDetail(effect, all) {
       { class: "columns", style: "--column-min: 24rem" },
       card(
         "Signature",
-        signatureFigure(effect) ?? h("p", { class: "muted" }, "There is no picture of it."),
+        signatureFigure(effect) ?? h("p", { class: "muted" }, "There is no picture of this effect."),
         effect.draws.length
           ? h(
               "p",
@@ -103,7 +103,7 @@ export function effectDetail(effect, all) {
             : h(
                 "p",
                 { class: "muted" },
-                "No other effect of the catalogue has the same signature on every schedule. On a given schedule others may be similar; the criticism lists them.",
+                "No other effect of the catalogue has the same signature on every schedule. With a given schedule of rates and temperatures other effects may look similar; the criticism lists them.",
               ),
         ),
         card(
@@ -130,9 +130,9 @@ export function effectDetail(effect, all) {
       effect.leaves ? "good" : "",
       h("strong", {}, effect.leaves ? "Exported. " : "Not exported. "),
       effect.leaves
-        ? "It is part of a calibration, and the Compensator subtracts it."
+        ? "The effect is part of a calibration: the class Compensator subtracts it."
         : ["sensor", "package"].includes(effect.origin)
-          ? "It is a property of the unit, but the channels that its correction needs are known on the bench only."
+          ? "The effect is a property of the unit, but its correction needs channels that are measured only on the bench."
           : about,
     ),
   );
@@ -140,9 +140,9 @@ export function effectDetail(effect, all) {
 
 /** @type {Record<string, string>} */
 const AXES_TEXTS = {
-  own: "It shows on the axis that turns.",
-  cross: "It shows on the axes that do not turn.",
-  all: "It shows on every axis.",
+  own: "The effect appears on the axis that turns.",
+  cross: "The effect appears on the axes that do not turn.",
+  all: "The effect appears on every axis.",
 };
 /** @param {Effect} effect */
 const axesParagraph = (effect) => h("p", { class: "muted" }, AXES_TEXTS[effect.rows] ?? "");
@@ -150,7 +150,11 @@ const axesParagraph = (effect) => h("p", { class: "muted" }, AXES_TEXTS[effect.r
 /** @param {Effect} effect */
 function sizeCard(effect) {
   const rows = Object.entries(effect.plausible);
-  if (!rows.length) return card("How large it is", h("p", { class: "muted" }, "No plausible sizes are listed for it."));
+  if (!rows.length)
+    return card(
+      "How large it is",
+      h("p", { class: "muted" }, "The catalogue lists no plausible sizes for this effect."),
+    );
   /** @param {number} value */
   const sizeCell = (value) => h("span", { class: "nowrap" }, sizeText(value, effect.unit ?? ""));
   return card(
@@ -168,7 +172,7 @@ function sizeCard(effect) {
       "p",
       { class: "muted small" },
       effect.unit === "1"
-        ? "Shares of the rate, or of the full effect. ppm: millionths."
+        ? "Values are ratios to the rate, or to the full effect. ppm: millionths."
         : "Plausible sizes of its first coefficient.",
     ),
   );

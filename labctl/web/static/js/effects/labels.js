@@ -6,9 +6,12 @@ export const ORIGINS = {
   package: ["Package", "Orientation of the sensing axes in the unit's case."],
   fixture: [
     "Fixture",
-    "Orientation and position of the unit on the table. Fitted, so that these errors do not distort the gyro's coefficients; not part of a calibration.",
+    "Orientation and position of the unit on the table. labctl fits these errors so that they do not distort the gyro's coefficients; not part of a calibration.",
   ],
-  bench: ["Bench", "Errors of table and thermometer. Reported as errors of the bench; not part of a calibration."],
+  bench: [
+    "Bench",
+    "Errors of the table and the thermometer. labctl reports them as errors of the bench; they are not part of a calibration.",
+  ],
   environment: [
     "Environment",
     "The Earth's rate and field, and what changes from one power-on to the next. Not part of a calibration.",
@@ -19,10 +22,10 @@ export const ORIGINS = {
 export const VIEWS = {
   map: "the map over rate and temperature",
   time: "the course in time",
-  angle: "the waves in the table angle",
-  frequency: "the waves in time",
+  angle: "the periodic errors over the table angle",
+  frequency: "the periodic errors over time",
   time_in_set: "the mean course of a data set",
-  legs: "from below against from above",
+  legs: "heating compared with cooling",
   previous_rate: "against the rate before",
   repeats: "points measured again",
   worst: "the worst data sets",

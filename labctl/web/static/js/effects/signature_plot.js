@@ -152,7 +152,7 @@ export function signatureFigure(effect) {
   });
   return figure(
     `Signature of ${effect.id}`,
-    "Schematic: the shape of the error alone. Sizes and scales are not those of any unit; the page Explore shows measured pictures.",
+    "Schematic: only the shape of the error is meaningful, not its size or scale. The page Explore shows measured pictures.",
     draw,
     { height: "19rem" },
   );

@@ -19,7 +19,7 @@ export async function postFit(fit, confirm) {
   } catch (error) {
     if (!(error instanceof Problem) || !error.type?.endsWith(":data-refused")) throw error;
     const answers = await dialog("The fit is refused", [], {
-      text: "With these data the calibration would be wrong. A version that is made nevertheless keeps these warnings.",
+      text: "A calibration from these data would be wrong. If you make a version nevertheless, these warnings are stored with it.",
       body: against(error),
       confirm,
       kind: "danger",

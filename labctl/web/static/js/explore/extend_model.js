@@ -100,7 +100,13 @@ export function extendModel(state, effects) {
   const stale = () =>
     setChildren(
       result,
-      isEmpty() ? h("p", { class: "muted small" }, "Choose what to change, or press Add at a suspect.") : null,
+      isEmpty()
+        ? h(
+            "p",
+            { class: "muted small" },
+            "Choose the effects to add or remove, or press Add beside a suspected effect.",
+          )
+        : null,
     );
   const show = () => {
     setChildren(
@@ -149,7 +155,11 @@ export function extendModel(state, effects) {
         "div",
         { class: "row" },
         button(`Make version ${Math.max(...state.versions) + 1}`, make, { kind: "primary" }),
-        h("span", { class: "muted small" }, "Existing versions are never changed; the present version is kept."),
+        h(
+          "span",
+          { class: "muted small" },
+          "Existing versions never change: this makes a new version and keeps the present one.",
+        ),
       ),
     ];
   }
@@ -161,7 +171,7 @@ export function extendModel(state, effects) {
       "Make version anyway",
     );
     if (!made) return;
-    toast("good", `Version ${made.version} of ${state.serial} is made.`);
+    toast("good", `Version ${made.version} of ${state.serial} was made.`);
     await navigate(
       `/explore?${changedQuery("", { unit: state.serial, version: made.version, ...inAddress(state), axis: state.axis })}#watch`,
     );

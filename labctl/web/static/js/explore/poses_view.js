@@ -35,7 +35,7 @@ export function posesView(serial, calibration, recording, signal) {
       h(
         "p",
         {},
-        "In a recording of poses no rate is known, only the direction of gravity before and after each turn. A version can be verified with such a recording, but no missing effect can be found.",
+        "A recording of poses contains the direction of gravity before and after each turn, but no rate. It can verify a version, but it cannot show which effect is missing.",
       ),
       factList([
         [

@@ -70,7 +70,7 @@ export function recordingChoice(serial, version, own, now) {
     h(
       "p",
       { class: "muted small" },
-      "Coefficients of the sensor then have one value for all recordings; differences from one power-on, day or mounting to the next are estimated in addition, as repeatability.",
+      "The fit then has one value of each sensor coefficient for all recordings. In addition it estimates the differences from one power-on, day or mounting to the next (repeatability).",
     ),
     h("div", { class: "row", role: "group", "aria-label": "Recordings" }, rows.map(choice)),
     acts,

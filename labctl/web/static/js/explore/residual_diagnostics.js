@@ -26,7 +26,7 @@ export function residualDiagnostics(state) {
     ? null
     : residualMap(
         "Residual over floor",
-        `Every measured cell: the mean residual of its data sets over the noise floor. ${cellsText(state.criticism)} Faded cells are within two noise floors of zero: a single one is not significant. Drag over cells to select them, press one to select it.`,
+        `Each measured cell shows the mean residual of its data sets divided by the noise floor. ${cellsText(state.criticism)} Faded cells are less than two noise floors from zero; a single faded cell is not significant. Drag over cells to select them, or click one cell.`,
         () => ({
           maps: mapsOf(state.criticism, state.axis),
           limit: colourLimit(mapsOf(state.criticism, state.axis)),
@@ -68,7 +68,7 @@ export function residualDiagnostics(state) {
     h(
       "p",
       { class: "muted small" },
-      `The model of version ${state.version} was refitted to ${recordingsText(state)}, so that the residual is what the model cannot describe. Compare shows the version without refitting.${piecesText(state)}`,
+      `The model of version ${state.version} was refitted to ${recordingsText(state)}, so the residual shows what this model cannot describe. The tab Compare shows the version without refitting.${piecesText(state)}`,
     ),
     picture,
     h("div", { class: "columns", style: "--column-min: 19rem" }, against),

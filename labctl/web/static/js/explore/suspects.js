@@ -77,7 +77,7 @@ export function suspectList(state, { onadd, explain }) {
   const drawnNow = h(
     "p",
     { class: "muted small", "aria-live": "polite" },
-    "Select a suspected effect to draw what it would explain of the residual.",
+    "Select a suspected effect to draw the part of the residual that it would explain.",
   );
   /** @param {Suspect} suspect */
   const draw = (suspect) =>
@@ -143,7 +143,7 @@ export function suspectList(state, { onadd, explain }) {
   state.onchange((what) => {
     fillList();
     if (what === "overlay" && !state.overlay)
-      setChildren(drawnNow, "Select a suspected effect to draw what it would explain of the residual.");
+      setChildren(drawnNow, "Select a suspected effect to draw the part of the residual that it would explain.");
   });
   return cardWithHeader(
     "Which effects are missing",
@@ -153,7 +153,7 @@ export function suspectList(state, { onadd, explain }) {
       : h(
           "p",
           { class: "muted" },
-          "No effect of the catalogue has enough evidence here: none explains more than its coefficients would fit by chance.",
+          "No effect of the catalogue has enough evidence in these data: each explains no more of the error than additional coefficients would explain by chance.",
         ),
     aliasNotice(criticism),
     experimentList(criticism),
@@ -224,8 +224,12 @@ function aliasNotice(criticism) {
   if (!group || criticism.verdict !== "ambiguous") return null;
   return notice(
     "warn",
-    h("p", {}, h("strong", {}, "This recording cannot distinguish them: "), group.map(idText).join(", "), "."),
-    h("p", {}, "Adding any one of them lowers the error; only another experiment shows which one is real."),
+    h("p", {}, h("strong", {}, "This recording cannot distinguish these effects: "), group.map(idText).join(", "), "."),
+    h(
+      "p",
+      {},
+      "Adding any one of these effects lowers the error; only another experiment shows which of them is real.",
+    ),
   );
 }
 
@@ -235,7 +239,7 @@ function experimentList(criticism) {
   return h(
     "div",
     { class: "stack" },
-    h("h3", {}, "The experiment that would decide"),
+    h("h3", {}, "Experiment that would show which effect is real"),
     criticism.experiments
       .slice(0, 3)
       .map((each) =>
@@ -246,7 +250,7 @@ function experimentList(criticism) {
           h(
             "p",
             { class: "muted small" },
-            `Separates ${each.separates.map(idText).join(", ")} with a probability of ${percent(each.power)}.`,
+            `It distinguishes ${each.separates.map(idText).join(", ")} with a probability of ${percent(each.power)}.`,
           ),
           each.toml
             ? h("a", { class: "button tiny", href: `/campaigns/new?toml=${encodeURIComponent(each.toml)}` }, "Plan it")

@@ -51,7 +51,7 @@ export function versionView(given) {
     h(
       "div",
       { class: "card" },
-      busyIndicator("Comparing the model with every reading; the first time takes some seconds."),
+      busyIndicator("labctl is comparing the model with every reading. The first comparison takes some seconds."),
       stage,
     ),
   );

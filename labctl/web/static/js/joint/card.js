@@ -72,7 +72,7 @@ function agreement(joint) {
         { title: "Degrees of freedom", number: true, cell: (row) => `${row.freedom}` },
         { title: "p-value", number: true, cell: (row) => chance(row.p_value) },
         { title: "p-value beside shifts", number: true, cell: (row) => chance(row.p_value_beside_shifts) },
-        { title: "A common difference is reported as", prose: true, cell: (row) => row.shift ?? "–" },
+        { title: "If all differ alike, reported as", prose: true, cell: (row) => row.shift ?? "–" },
       ],
       joint.agreement,
       { label: "Agreement" },
@@ -87,7 +87,7 @@ function heldOut(joint) {
     h(
       "p",
       { class: "muted small" },
-      "What a later day has to expect: the shift of its own power-on and day is part of it.",
+      "Error to expect on a later day; the shift from one power-on and day to the next is part of it.",
     ),
     table(
       [

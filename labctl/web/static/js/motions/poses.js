@@ -60,7 +60,7 @@ export function poseFigures(found) {
     layout: {
       showlegend: false,
       xaxis: { title: { text: "middle of the move, s" } },
-      yaxis: { title: { text: "gravity off by, deg" } },
+      yaxis: { title: { text: "error of the direction of gravity, deg" } },
     },
   });
   const of = found.version === null ? "the uncorrected outputs, bias included" : `version ${found.version}`;
@@ -68,14 +68,14 @@ export function poseFigures(found) {
     "div",
     { class: "stack" },
     found.left_out.length
-      ? notice("", `${found.rows} of ${found.of} moves are here. Not: ${found.left_out.join("; ")}.`)
+      ? notice("", `${found.rows} of ${found.of} moves are shown. Left out: ${found.left_out.join("; ")}.`)
       : h("p", { class: "muted small" }, `All ${found.of} moves between rests.`),
     h(
       "div",
       { class: "columns" },
       figure(
         "Angle of each move",
-        `By how much gravity's direction moved in the body from one rest to the next; the gyro's by ${of}. Dashed: both equal.`,
+        `Change of the direction of gravity in the unit from one rest to the next: measured by the accelerometer, and computed from ${of} of the gyro. Dashed: both are equal.`,
         angles,
         { height: "19rem" },
       ),
@@ -96,7 +96,11 @@ export function poseFigures(found) {
           number: true,
           cell: (k) => number(poses.gyro_deg[k] - poses.accelerometer_deg[k], 2),
         },
-        { title: "Gravity off by, deg", number: true, cell: (k) => number(poses.residual_deg[k], 2) },
+        {
+          title: "Error of the direction of gravity, deg",
+          number: true,
+          cell: (k) => number(poses.residual_deg[k], 2),
+        },
       ],
       poses.from_s.map((_, k) => k),
       { dense: true, label: "Moves" },

@@ -70,9 +70,9 @@ export function profileFigures(found, axis) {
       ? null
       : figure(
           "Residual over time",
-          `Axis ${axis}: corrected rate less the table's.${
+          `Axis ${axis}: corrected rate minus rate of the table.${
             followed
-              ? " Delay and bandwidth are not exported, since a delayed reading cannot be corrected by itself. The second line is the corrected rate less the table's rate filtered by delay and bandwidth."
+              ? " Delay and bandwidth are not exported, since a delayed reading cannot be corrected by itself. The second line is the corrected rate minus the rate of the table filtered by delay and bandwidth."
               : ""
           }${shown}`,
           left,

@@ -52,7 +52,9 @@ export function restFigures(found, axis) {
     ),
     found.version === null
       ? null
-      : figure("Residual at rest", `Axis ${axis}: bias less the version.${both}`, residual, { height: "17rem" }),
+      : figure("Residual at rest", `Axis ${axis}: measured bias minus bias by the version.${both}`, residual, {
+          height: "17rem",
+        }),
   );
 }
 

@@ -35,7 +35,7 @@ export function turnFigures(found) {
     layout: {
       scattermode: "group",
       xaxis: { type: "category", title: { text: "data set and axis that points up" } },
-      yaxis: { title: { text: `${corrected ? "corrected" : "output"} minus asked, deg` }, zeroline: true },
+      yaxis: { title: { text: `${corrected ? "corrected" : "output"} minus true angle, deg` }, zeroline: true },
       showlegend: true,
     },
   });
@@ -44,7 +44,7 @@ export function turnFigures(found) {
     { class: "stack" },
     figure(
       "Measured minus true angle of each turn",
-      `The integral of ${corrected ? "the corrected rate" : "the uncorrected output, bias included"} over each turn, less the angle that this output axis turned by; bars are U, k = 2, of angle, time stamps and noise.`,
+      `The integral of ${corrected ? "the corrected rate" : "the uncorrected output, bias included"} over each turn, minus the angle that this output axis turned by. Bars: expanded uncertainty U (k = 2) due to angle, time stamps and noise.`,
       draw,
       { height: "20rem" },
     ),

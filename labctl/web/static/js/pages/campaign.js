@@ -86,7 +86,7 @@ export async function page({ params, query, signal }) {
                 h(
                   "strong",
                   {},
-                  `Nothing new since ${new Date(since).toLocaleTimeString("en-GB")}${now.simulated_time ? " (real time)" : ""}. `,
+                  `No update since ${new Date(since).toLocaleTimeString("en-GB")}${now.simulated_time ? " (real time)" : ""}. `,
                 ),
                 `${why}. The page retries every few seconds.`,
               )
@@ -111,7 +111,7 @@ export async function page({ params, query, signal }) {
     reason,
     about,
     drafts,
-    cardWithHeader("Plan", h("span", { class: "muted small" }, "Press a data set to open its readings."), picture),
+    cardWithHeader("Plan", h("span", { class: "muted small" }, "Click a data set to open its readings."), picture),
     recordingsCard(now),
     Object.assign(
       cardWithHeader(
@@ -237,7 +237,7 @@ function saidOnBegin(now) {
   if (!said.length) return null;
   return h(
     "ul",
-    { class: "plain small muted", "aria-label": "What the instruments said of themselves" },
+    { class: "plain small muted", "aria-label": "Identification that the instruments reported" },
     said.map(([device, what]) =>
       h(
         "li",

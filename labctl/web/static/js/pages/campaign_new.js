@@ -135,14 +135,14 @@ export async function page({ query, signal }) {
         "div",
         { class: "page" },
         planned,
-        card("What it can detect", found),
+        card("Effects that the plan can detect", found),
         hider
           ? card(
               "Hide an effect",
               h(
                 "p",
                 { class: "muted" },
-                "The simulated unit then has this effect, and no page shows which: a case to practise with.",
+                "The simulated unit then has this effect, but no page names it: an exercise in finding effects.",
               ),
               hider,
             )

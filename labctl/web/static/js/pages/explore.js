@@ -26,7 +26,7 @@ export async function page({ query: asked, signal }) {
       { class: "page" },
       pageHeader("Explore"),
       emptyState(
-        h("p", {}, "There is nothing to explore yet: import or measure a recording first."),
+        h("p", {}, "There is no recording yet; import one, or run a campaign."),
         h("p", {}, h("a", { class: "button primary", href: "/start" }, "Begin")),
       ),
     );
@@ -52,7 +52,7 @@ export async function page({ query: asked, signal }) {
     ),
     recordingChoice(unit.serial, version, own, chosen),
   );
-  if (!unit.recordings.length) element.append(notice("", "This unit has no recording."));
+  if (!unit.recordings.length) element.append(notice("", "This unit has no recording; import one, or run a campaign."));
   else if (!calibration) element.append(firstFitCard(unit, chosen, motion));
   else if (motion === "poses") element.append(posesView(unit.serial, calibration, chosen.recording, signal));
   else element.append(versionView({ unit, calibration, versions, chosen, motion, query: asked, signal }));

@@ -59,7 +59,7 @@ export async function page({ params, query, signal }) {
     element.append(
       notice(
         "",
-        "This recording is a published table: scale factors and offsets over temperature. It has no data sets and no readings; it can be fitted.",
+        "This recording is a published table of scale factors and offsets over temperature. It can be fitted, but it has no data sets and no readings to show.",
       ),
     );
     return element;

@@ -24,7 +24,7 @@ export async function page({ signal }) {
   return h(
     "div",
     { class: "page" },
-    pageHeader("Begin", "Nothing has been measured yet. There are three ways to a first calibration, one click each."),
+    pageHeader("Begin", "Nothing has been measured yet. Three ways to a first calibration:"),
     h(
       "div",
       { class: "columns" },
@@ -114,7 +114,7 @@ function overview(units, due, campaigns, benches) {
                 running
                   ? `Campaign ${running.id} (${running.recipe}) is ${running.state}, ${Math.round(100 * running.progress)} % done.`
                   : benches[0].unconfirmed
-                    ? `${benches[0].name} was not confirmed safe: inspect it.`
+                    ? `${benches[0].name} was not confirmed safe; inspect the bench.`
                     : `${benches[0].name} is free.`,
               ),
             )

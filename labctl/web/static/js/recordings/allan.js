@@ -130,7 +130,7 @@ function allanFigure(found) {
     h("p", { class: "muted" }, where),
     figure(
       `Recording ${found.recording} Allan deviation`,
-      "Band: 95 % interval. Dotted: the fit from which N, B and K are computed.",
+      "Band: 95 % interval. Dotted: the fit that gives angle random walk N, bias instability B and rate random walk K.",
       draw,
       { height: "21rem", csv },
     ),

@@ -139,7 +139,7 @@ function refused(error) {
     "bad",
     h("p", { class: "lead" }, messageOf(error)),
     problems.slice(1).map((line) => h("p", {}, line)),
-    h("p", { class: "small" }, "Nothing of it was kept."),
+    h("p", { class: "small" }, "Nothing was imported."),
   );
 }
 
@@ -195,7 +195,9 @@ function settings(seen, map, look) {
     { class: "row" },
     labelledField("Serial number", serial),
     selectField("What moved it", MOTIONS, map.motion ?? "", (value) => look(withKey(map, "motion", value))),
-    map.columns?.t_s ? null : labelledField("Readings per second", rate, "No column of time is named."),
+    map.columns?.t_s
+      ? null
+      : labelledField("Readings per second", rate, "No column is mapped to the time; choose one."),
     selectField("Data sets", DIVISIONS, by, (value) =>
       look(withKey(map, "datasets", value === "column" ? { by: value, column: seen.columns[0].name } : { by: value })),
     ),
@@ -232,7 +234,7 @@ function columnTable(seen, map, look) {
       type: "number",
       step: "any",
       value: String(scale ?? ""),
-      "aria-label": `Words per unit of ${row.name}`,
+      "aria-label": `Converter counts (LSB) per unit of ${row.name}`,
       onchange: () => look(withUnit(map, target, "LSB", Number(input.value) || null)),
     });
     const choice = selectField(`Unit of ${row.name}`, known, unit, (value) => {

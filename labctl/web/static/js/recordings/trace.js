@@ -37,7 +37,7 @@ export function trace(state, signal) {
   const place = h("div", { style: "min-height: 24rem" }, busyIndicator("Reading"));
   const picture = figure(
     `Recording ${state.id} trace`,
-    "Band: from the smallest to the largest reading in each bin of time; line: the mean of the bin. Drag across to zoom in; press a data set to open its readings.",
+    "Band: from the smallest to the largest reading in each bin of time; line: the mean of the bin. Drag across the plot to zoom in; click a data set to open its readings.",
     draw,
     {
       height: "21rem",

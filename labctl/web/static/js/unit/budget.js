@@ -119,7 +119,7 @@ function one(name, lines, along, at) {
   });
   return figure(
     name,
-    `Standard uncertainties that the budget combines, at ${at}; dashed the expanded uncertainty U. What is not stated has no line.`,
+    `Standard uncertainties that the budget combines, at ${at}. Dashed: the expanded uncertainty U. Uncertainties that the bench does not state have no line.`,
     draw,
     { height: "26rem" },
   );

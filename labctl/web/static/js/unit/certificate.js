@@ -23,7 +23,7 @@ const FIELDS = [
   { name: "street", label: "Street and number" },
   { name: "post_code", label: "Post code" },
   { name: "city", label: "City" },
-  { name: "country", label: "Country", hint: "Two letters, as DE (ISO 3166-1)." },
+  { name: "country", label: "Country", hint: "Two letters, such as DE (ISO 3166-1)." },
   { name: "email", label: "E-mail", type: "email" },
   { name: "contact", label: "Contact person", required: false },
   { name: "order", label: "Number of the order", required: false },
@@ -32,7 +32,7 @@ const FIELDS = [
   { name: "received", label: "Received on", type: "date", required: false },
   { name: "deviations", label: "Deviations from the method", hint: "Empty: none.", required: false },
   { name: "specification", label: "Conformity to the specification", hint: "Empty: no statement.", required: false },
-  { name: "limit_dps", label: "Its limit of the error, deg/s", required: false },
+  { name: "limit_dps", label: "Limit of the error in the specification, deg/s", required: false },
   {
     name: "guard_band",
     label: "With a guard band as wide as the uncertainty",

@@ -62,7 +62,7 @@ export async function askCertification(serial, version) {
     {
       name: "due_days",
       label: "Due again in days",
-      hint: known.due_from ? `As the ${known.due_from} says.` : "Empty: no date.",
+      hint: known.due_from ? `Value from the ${known.due_from}.` : "Empty: no date.",
       type: "number",
       value: known.due_days === null ? "" : String(known.due_days),
       required: false,
@@ -70,7 +70,7 @@ export async function askCertification(serial, version) {
   ];
   if (needed) fields.push({ name: "override", label: "Certify this version despite the objections", type: "checkbox" });
   const answers = await dialog(`Put version ${version} in force`, fields, {
-    text: "From now on, every request for this unit's calibration gets this version. The certification is written to the audit trail.",
+    text: "After this, every request for the calibration of this unit gets this version. The certification is written to the audit trail.",
     body: assessed(known),
     confirm: "Certify",
     kind: needed ? "danger" : "primary",

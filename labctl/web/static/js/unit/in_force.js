@@ -21,7 +21,7 @@ export function inForce(unit, rows, force) {
         "p",
         {},
         h("strong", {}, "No calibration is in force. "),
-        "Programs that request this unit's calibration get none until a version is certified.",
+        "Programs that request the calibration of this unit get an error until a version is certified.",
       ),
     );
   }

@@ -80,7 +80,7 @@ function over({ grid, coverage_factor }) {
     h(
       "p",
       { class: "muted small" },
-      `How far a corrected rate may be off on a later day, after another power-on: expanded uncertainty in deg/s, k = ${coverage_factor}, about 95 %. The noise of a single reading comes on top.`,
+      `Expanded uncertainty of a corrected rate on a later day, after another power-on, in deg/s (k = ${coverage_factor}, about 95 %). The noise of a single reading is not included.`,
     ),
     table(
       [
@@ -196,7 +196,7 @@ function parts(first, place, path, signal) {
   return h(
     "div",
     { class: "stack" },
-    h("h3", {}, "What it is made of"),
+    h("h3", {}, "Contributions to the uncertainty"),
     h("div", { class: "row" }, labelledField("Rate, deg/s", rate), labelledField("Temperature, deg C", warm)),
     result,
   );

@@ -57,7 +57,7 @@ function leftOut({ left_out: effects }) {
         { title: "Effect", prose: true, cell: (row) => row.term || idText(row.effect) },
         { title: "Belongs to", cell: (row) => row.origin },
         {
-          title: "What it does, RMS, deg/s",
+          title: "Size of its error, deg/s RMS",
           number: true,
           cell: (row) => (row.rms_dps === null || row.rms_dps === undefined ? "not known" : number(row.rms_dps)),
         },
@@ -68,7 +68,7 @@ function leftOut({ left_out: effects }) {
     h(
       "p",
       { class: "muted small" },
-      "RMS over the data sets of the fit: the error that stays where they are not corrected.",
+      "RMS over the data sets of the fit: the error that remains if these effects are not corrected.",
     ),
   ];
 }
@@ -77,17 +77,17 @@ function leftOut({ left_out: effects }) {
 function remembered({ remembers, axes }) {
   if (!remembers?.length) return null;
   return [
-    h("h3", {}, "Remembered from sample to sample"),
+    h("h3", {}, "States kept from sample to sample"),
     h(
       "p",
       { class: "muted small" },
-      "In use this version needs its samples in order of time, with t_s and the temperature: each element below is a state that follows the temperature. The first sample finds it at its own temperature, so the correction is less exact until the unit has warmed up once.",
+      "This version must be given its samples in order of time, with t_s and the temperature, because each element below is a state that follows the temperature. The state begins at the temperature of the first sample, so the correction is less exact until the unit has warmed up once.",
     ),
     table(
       [
         {
           title: "Element",
-          cell: (row) => (row.kind === "lag" ? "lag behind the temperature" : "play, dragged along"),
+          cell: (row) => (row.kind === "lag" ? "lag behind the temperature" : "hysteresis (play)"),
         },
         {
           title: "Time constant or width",

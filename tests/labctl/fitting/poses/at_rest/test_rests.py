@@ -64,6 +64,8 @@ def test_motion_without_a_rest_is_refused_with_what_to_do() -> None:
         f"gyro_{a}": 40 * np.sin(2 * np.pi * (f + 0.05 * t_s) * t_s)
         for a, f in zip("xyz", (0.7, 0.9, 1.3), strict=True)
     }
-    with pytest.raises(NotEnoughData, match=r"nothing rests in the recording: .* lay the unit down") as refused:
+    with pytest.raises(
+        NotEnoughData, match=r"the unit is never at rest in this recording: .* lay the unit down"
+    ) as refused:
         find_rests(spoilt(recording, **shaken))
     assert "\n" not in str(refused.value)

@@ -78,7 +78,7 @@ function draw() {
   const root = document.documentElement;
   if (found === "no") delete root.dataset.stale;
   else root.dataset.stale = found === "paused" || found === "first" ? found : "yes";
-  if (stale) line.announcement.textContent = "Stale: what is shown may be out of date.";
+  if (stale) line.announcement.textContent = "The values on this page may be out of date.";
   if (found === "no" && before !== null && before !== "first") {
     line.announcement.textContent = "The service answers again.";
     window.dispatchEvent(new CustomEvent("labctl:fresh"));

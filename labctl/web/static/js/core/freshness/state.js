@@ -48,14 +48,14 @@ export function freshnessWords(found, { service_s, bench_s, trouble, clock }) {
   const service =
     service_s === null ? "The service has not answered." : `Last answer of the service ${ago(service_s)}.`;
   if (found === "yes") {
-    const of = clock === null ? "" : `; it dates from ${clock}`;
-    return { stale: true, text: `${service} What is shown may be out of date${of}.` };
+    const of = clock === null ? "" : `; they date from ${clock}`;
+    return { stale: true, text: `${service} The values on this page may be out of date${of}.` };
   }
   if (found === "trouble")
-    return { stale: true, text: `The service answers, but not with what this page shows: ${trouble}` };
+    return { stale: true, text: `The service answers, but it did not send the data for this page: ${trouble}` };
   const bench = bench_s === null ? "" : ago(bench_s);
   if (found === "bench") {
-    const what = "What is shown of the bench may be out of date.";
+    const what = "The values of the bench on this page may be out of date.";
     return { stale: true, text: `Last answer of the bench ${bench}; the service answers. ${what}` };
   }
   if (service_s === null || bench_s === null) return { stale: false, text: service };

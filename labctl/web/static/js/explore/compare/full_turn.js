@@ -54,7 +54,7 @@ export function fullTurn(comparison, state) {
   };
   return figure(
     "Error after a full turn",
-    `How far a heading is off after one turn about axis ${state.axis}, from ${comparison.least_turn_rate_dps} deg/s on: left with only the static bias at rest subtracted, right with the calibration applied and the remaining static bias subtracted, both on the same axes. Blue is cold, red is hot.`,
+    `Error of the heading after one full turn about axis ${state.axis}, for rates of ${comparison.least_turn_rate_dps} deg/s or more. Left: only the static bias at rest is subtracted. Right: the calibration is applied, and the remaining static bias is subtracted. Both plots have the same scale. Blue is cold, red is hot.`,
     draw,
     { height: twoScenes() },
   );

@@ -98,7 +98,7 @@ export function overRate(comparison, state) {
   };
   return figure(
     "Error over rate",
-    `Dots are measured, lines the model of axis ${state.axis} at each temperature level; blue is cold, red is hot. Where dots lie off their line, the model fails.${ofAll(lines)}`,
+    `Dots are measured errors; lines are the model of axis ${state.axis} at each temperature level. Blue is cold, red is hot. Where dots lie far from their line, the model is wrong.${ofAll(lines)}`,
     draw,
     { height: "24rem" },
   );
@@ -136,7 +136,7 @@ export function overTemperature(comparison, state) {
   };
   return figure(
     "Error over temperature",
-    `Dots are measured, lines the model of axis ${state.axis} at each rate: violet is negative, green is positive.${ofAll(lines)}`,
+    `Dots are measured errors; lines are the model of axis ${state.axis} at each rate. Violet: negative rates; green: positive rates.${ofAll(lines)}`,
     draw,
     { height: "24rem" },
   );
@@ -204,7 +204,7 @@ export function allPanels(comparison) {
     Math.ceil(panels.length / (isNarrow() ? 1 : positions.length)) * (isNarrow() ? PANEL_PX.narrow : PANEL_PX.wide);
   return figure(
     "Error of every output for every turning axis",
-    "Rows are outputs, columns the axis that is turned: scale factor on the diagonal, misalignment and cross effects beside it. Blue is cold, red is hot; each panel has its own scale of errors.",
+    "Rows: outputs; columns: the axis that is turned. Panels on the diagonal show scale factor errors, the others misalignment and cross effects. Blue is cold, red is hot; each panel has its own scale of errors.",
     draw,
     { height: `${height}px` },
   );

@@ -36,5 +36,5 @@ export function motionComparison(state, signal) {
 function leftOut(effects) {
   if (!effects?.length) return "";
   const names = effects.map(({ effect }) => effect.replaceAll("_", " ")).join(", ");
-  return ` Without ${names}, which ${effects.length > 1 ? "do" : "does"} not leave with the calibration.`;
+  return ` Without ${names}, which ${effects.length > 1 ? "do" : "does"} not belong to the exported calibration.`;
 }

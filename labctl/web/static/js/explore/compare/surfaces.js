@@ -62,7 +62,7 @@ export function surfaces(comparison, state) {
   };
   return figure(
     "Error surface",
-    `Axis ${state.axis} turned about itself: left the measured error as dots with the model as a surface, right the residual of the model, both on the same axes. Drag to turn.`,
+    `Axis ${state.axis} turned about itself. Left: the measured error (dots) and the model (surface). Right: the residual of the model. Both plots have the same scale; drag to rotate them.`,
     draw,
     { height: twoScenes() },
   );
