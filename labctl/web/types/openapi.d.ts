@@ -260,7 +260,7 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * The calibration to use
+         * The calibration in force
          * @description The calibration as a file; the ETag is its hash. 304 when the caller has it already.
          *
          *     The file changes only with its certification, which it contains. `X-Labctl-State` is in-force, superseded, revoked
@@ -1020,7 +1020,7 @@ export interface paths {
         /**
          * Preview a log
          * @description The proposed map of a log, or what it becomes by the map that is sent; its first rows, traces, and everything
-         *     that is wrong. Nothing of it is kept.
+         *     that is wrong. Nothing is stored.
          */
         post: operations["preview_api_recordings_logs_preview_post"];
         delete?: never;
@@ -1239,7 +1239,7 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * A recording by what moved the unit
+         * A recording in the form that suits its kind of motion
          * @description Bias by temperature at rest, the integral of each turn, the course of a profile, or gravity about each move.
          */
         get: operations["recording_motion_api_recordings__recording__motion_get"];
@@ -1259,7 +1259,7 @@ export interface paths {
             cookie?: never;
         };
         /**
-         * A version without refitting, on a recording by what moved the unit
+         * A version applied to a recording, in the form that suits its kind of motion
          * @description The same, with what the version leaves; nothing is refitted.
          */
         get: operations["version_motion_api_units__serial__calibrations__version__motion_get"];
@@ -1515,7 +1515,7 @@ export interface components {
             };
             /**
              * Expected Dps
-             * @description Error that the version promises, deg/s; null: unknown.
+             * @description Error that is expected of the version, deg/s; null: unknown.
              */
             expected_dps: number | null;
             /**
@@ -1588,12 +1588,12 @@ export interface components {
             least_reason_words: number;
             /**
              * Due Days
-             * @description Days that the certification is valid where none are given; null: no date.
+             * @description Days for which a certification is valid if the request gives no number; null: no due date.
              */
             due_days: number | null;
             /**
              * Due From
-             * @description Where the interval is from; null: none is given, and there is no date.
+             * @description Source of the number of days; null: no number is given, and there is no due date.
              */
             due_from: ("user" | "recipe" | "configuration") | null;
         };
@@ -1633,7 +1633,7 @@ export interface components {
             warning: string;
             /**
              * Better Start
-             * @description The next start for which fewer of these times are at night; null: none is better.
+             * @description Next time of start for which fewer of these times are at night; null: no start is better.
              */
             better_start: string | null;
         };
@@ -1762,7 +1762,7 @@ export interface components {
             same_run_dps: number | null;
             /**
              * Combined Dps
-             * @description `expanded_dps` over `coverage_factor`, deg/s; null if coefficients, model or repeatability are unknown.
+             * @description `expanded_dps` divided by `coverage_factor`, deg/s; null if coefficients, model or repeatability are unknown.
              */
             combined_dps: number | null;
             /**
@@ -1973,7 +1973,7 @@ export interface components {
             importer?: string;
             /**
              * Option
-             * @description Options of the importer, as KEY=VALUE.
+             * @description Option of the importer, as KEY=VALUE; may be repeated.
              */
             option?: string[] | null;
             /**
@@ -2005,7 +2005,7 @@ export interface components {
             importer?: string;
             /**
              * Option
-             * @description Options of the importer, as KEY=VALUE.
+             * @description Option of the importer, as KEY=VALUE; may be repeated.
              */
             option?: string[] | null;
             /**
@@ -2021,12 +2021,12 @@ export interface components {
         BudgetLineResponse: {
             /**
              * Source
-             * @description coefficients, model, repeatability, or the quantity of a reference standard.
+             * @description Source of the uncertainty: coefficients, model, repeatability, or the quantity of a reference standard.
              */
             source: string;
             /**
              * Name
-             * @description Of the standard, with the number of its certificate.
+             * @description Name of the reference standard, with the number of its certificate.
              */
             name: string;
             /**
@@ -2051,7 +2051,7 @@ export interface components {
             sensitivity: number | null;
             /**
              * Contribution
-             * @description Size of sensitivity times u, in the unit of the result.
+             * @description Magnitude of sensitivity times u, in the unit of the result.
              */
             contribution: number | null;
             /**
@@ -2061,7 +2061,7 @@ export interface components {
             degrees_of_freedom: number | null;
             /**
              * Uncorrected
-             * @description Known error that nothing corrects for, in the unit of the result.
+             * @description Known error that is not corrected, in the unit of the result.
              */
             uncorrected: number;
             /**
@@ -2094,12 +2094,12 @@ export interface components {
         BudgetResponse: {
             /**
              * Result
-             * @description corrected_rate, bias, scale_factor, or misalignment with an axis.
+             * @description Quantity of the budget: corrected_rate, bias, scale_factor, or misalignment with an axis.
              */
             result: string;
             /**
              * Unit
-             * @description Of the result and of every contribution; 1 is a share of the rate.
+             * @description Unit of the result and of every contribution; 1: a ratio to the rate.
              */
             unit: string;
             /**
@@ -2126,7 +2126,7 @@ export interface components {
             k: number | null;
             /**
              * Expanded
-             * @description k times combined, plus the size of known errors left uncorrected.
+             * @description Expanded uncertainty: k times `combined`, plus the magnitude of known errors that are not corrected.
              */
             expanded: number | null;
             /**
@@ -2178,7 +2178,7 @@ export interface components {
             recipe: string;
             /**
              * Text
-             * @description Text of the recipe that was run, TOML; empty: an older labctl ran the campaign and did not store the text.
+             * @description Text of the recipe that was run, TOML; empty: an older version of labctl ran the campaign and did not store the text.
              */
             text: string;
             /** Bench */
@@ -2217,7 +2217,7 @@ export interface components {
             hide?: string[];
             /**
              * Fit
-             * @description End in a draft if the recipe has [fit]; false: end in the recordings, whatever the recipe says.
+             * @description Make a draft calibration at the end if the recipe has [fit]; false: make none, even if the recipe has [fit].
              * @default true
              */
             fit?: boolean;
@@ -2305,7 +2305,7 @@ export interface components {
             gyro_c: number | null;
             /**
              * References
-             * @description Of a campaign that runs here, now: column -> value of a reference instrument.
+             * @description Present values of the reference instruments, by column; empty if this process does not run the campaign.
              */
             references: {
                 [key: string]: number;
@@ -2337,7 +2337,7 @@ export interface components {
             };
             /**
              * Dropped
-             * @description Units that take no further part: name -> why.
+             * @description Units excluded from the rest of the campaign: name -> reason.
              */
             dropped: {
                 [key: string]: string;
@@ -2361,7 +2361,7 @@ export interface components {
             };
             /**
              * Drafts
-             * @description The calibrations that it ends in, by recording; empty: the recipe has no [fit], or the campaign is not done; empty in lists.
+             * @description Draft calibrations made at the end of the campaign, one per recording; empty: the recipe has no [fit], the campaign is not done, or the response is a list.
              */
             drafts: components["schemas"]["DraftResponse"][];
             /**
@@ -2379,7 +2379,7 @@ export interface components {
             unrecorded: string;
             /**
              * Reported
-             * @description table, chamber or gyro name -> what it and its USB adapter said of themselves when the campaign began: serial, firmware, revision, output_unit, adapter; what says nothing is left out.
+             * @description table, chamber or gyro name -> what it and its USB adapter reported as their identification when the campaign began: serial, firmware, revision, output_unit, adapter; instruments that reported nothing are left out.
              */
             reported: {
                 [key: string]: {
@@ -2406,12 +2406,12 @@ export interface components {
             active: boolean;
             /**
              * Resumable
-             * @description Whether `resume` would be accepted here now; null in lists.
+             * @description Whether this service would accept `resume` now; null in lists.
              */
             resumable: boolean | null;
             /**
              * Resume Reason
-             * @description Why `resume` would be refused; if it would be accepted, objections to it, or empty.
+             * @description Why `resume` would be refused; if it would be accepted: objections to resuming, or empty.
              * @default
              */
             resume_reason: string;
@@ -2508,27 +2508,27 @@ export interface components {
              *     }
              */
             method?: components["schemas"]["OrderedMethod"];
-            /** @description null: no statement is made. */
+            /** @description Statement of conformity to a specification; null: the certificate makes no statement. */
             conformity?: components["schemas"]["OrderedConformity"] | null;
             /**
              * Adjustment
-             * @description What was adjusted or repaired beside the coefficients; empty: nothing.
+             * @description Adjustments or repairs other than the new coefficients; empty: none.
              * @default
              */
             adjustment?: string;
             /**
              * External
-             * @description Results of external providers, and whose; empty: there are none.
+             * @description Results that came from external providers, and the names of these; empty: none.
              * @default
              */
             external?: string;
             /**
              * State Due
-             * @description State the date of the next calibration: only where the customer agreed to it.
+             * @description Whether the certificate states the date of the next calibration; only if the customer agreed to it.
              * @default false
              */
             state_due?: boolean;
-            /** @description Where the bench file of the campaign has no [laboratory]. */
+            /** @description The laboratory; needed if the bench file of the campaign has no [laboratory]. */
             laboratory?: components["schemas"]["Laboratory"] | null;
         };
         /**
@@ -2538,7 +2538,7 @@ export interface components {
         CertificateRequest: {
             /**
              * By
-             * @description Person who issues it.
+             * @description Name of the person who issues the certificate.
              */
             by: string;
             /**
@@ -2572,7 +2572,7 @@ export interface components {
             order?: components["schemas"]["CertificateOrder"];
             /**
              * Amend
-             * @description Why the certificate of this version is replaced by a new one; null: it is not.
+             * @description Reason for replacing the version's present certificate by this one; null: do not replace it.
              */
             amend?: string | null;
         };
@@ -2596,22 +2596,22 @@ export interface components {
             by: string;
             /**
              * Hash
-             * @description SHA-256 of its JSON.
+             * @description SHA-256 of the certificate in its JSON form.
              */
             hash: string;
             /**
              * Replaces
-             * @description Number of the certificate that it replaces; null: none.
+             * @description Number of the earlier certificate that this certificate replaces; null: none.
              */
             replaces: string | null;
             /**
              * Reason
-             * @description Why it replaces another one; empty: it does not.
+             * @description Why this certificate replaces an earlier one; empty: it replaces none.
              */
             reason: string;
             /**
              * Replaced By
-             * @description Number of the one that replaces it; null: it is valid.
+             * @description Number of the later certificate that replaces this certificate; null: this certificate is valid.
              */
             replaced_by: string | null;
         };
@@ -2642,7 +2642,7 @@ export interface components {
             due: string | null;
             /**
              * Due From
-             * @description Where the interval is from; null: none is given, and there is no date.
+             * @description Source of the number of days; null: no number is given, and there is no due date.
              */
             due_from: ("user" | "recipe" | "configuration") | null;
             /**
@@ -2701,7 +2701,7 @@ export interface components {
             reason: string;
             /**
              * Due Days
-             * @description Of a certification: days until the unit is due for its next calibration; 0: no date; absent: those of the recipe (`recalibrate_after_days`), else of the service ($LABCTL_DUE_DAYS), else no date.
+             * @description Only for a certification: days until the next calibration is due; 0: no due date; absent: the number in the recipe (`recalibrate_after_days`), else in the service ($LABCTL_DUE_DAYS), else no due date.
              */
             due_days?: number | null;
             /**
@@ -2754,12 +2754,12 @@ export interface components {
             title: string;
             /**
              * Axis
-             * @description Output axis, or pair of axes; empty: of the whole unit.
+             * @description Output axis, or pair of axes; empty: the figure is of the whole unit.
              */
             axis: string;
             /**
              * Along
-             * @description Of the g-sensitivity: the axis of the specific force; else empty.
+             * @description Only for the g-sensitivity: the axis along which the specific force acts; else empty.
              * @default
              */
             along: string;
@@ -2775,7 +2775,7 @@ export interface components {
             u: number | null;
             /**
              * At Most
-             * @description Bound of a figure that cannot be distinguished from zero.
+             * @description Upper limit of a figure that cannot be distinguished from zero, in `unit`.
              */
             at_most: number | null;
             /** Unit */
@@ -2788,13 +2788,13 @@ export interface components {
             specified: number | null;
             /**
              * Specified As
-             * @description The magnitude may be at most, or the value must be at least, the specified one.
+             * @description How `specified` limits the figure: its magnitude is at most, or its value is at least, the specified value.
              * @enum {string}
              */
             specified_as: "at most" | "at least";
             /**
              * Passed
-             * @description Simple acceptance (ILAC-G8): the measured value is inside the specified one; null: no decision.
+             * @description Whether the measured value keeps the specified value, by simple acceptance (ILAC-G8); null: no decision.
              */
             passed: boolean | null;
             /**
@@ -2905,7 +2905,7 @@ export interface components {
         ComparedModel: {
             /** Model */
             model: string;
-            /** @description Its errors, deg/s; null: it could not be fitted, see `why`. */
+            /** @description Errors of the model, deg/s; null: the model could not be fitted, see `why`. */
             error: components["schemas"]["CertifiedErrors"] | null;
             /**
              * Why
@@ -2935,14 +2935,14 @@ export interface components {
             axis: string[];
             /**
              * Position
-             * @description The body axis that lay along the table axis.
+             * @description The body axis that pointed along the table axis.
              */
             position: string[];
             /** Table Rate Dps */
             table_rate_dps: number[];
             /**
              * Own Rate Dps
-             * @description True rate along the output axis.
+             * @description True rate along the output axis, deg/s.
              */
             own_rate_dps: number[];
             /** Temperature C */
@@ -2959,17 +2959,17 @@ export interface components {
             rate_level_dps: number[];
             /**
              * Measured Error Dps
-             * @description Output minus own rate.
+             * @description Error of the output: output minus true rate along the axis, deg/s.
              */
             measured_error_dps: number[];
             /**
              * Modelled Error Dps
-             * @description What the version subtracts: output minus corrected rate.
+             * @description Error that the version subtracts: output minus corrected rate, deg/s.
              */
             modelled_error_dps: number[];
             /**
              * Residual Dps
-             * @description Residual: corrected rate minus own rate.
+             * @description Residual: corrected rate minus true rate along the axis, deg/s.
              */
             residual_dps: number[];
             /**
@@ -3079,7 +3079,7 @@ export interface components {
             at: number[];
             /**
              * Contributions
-             * @description Source -> contribution; null: not stated.
+             * @description For each source: its contribution, deg/s; null: not stated.
              */
             contributions: {
                 [key: string]: (number | null)[];
@@ -3096,12 +3096,12 @@ export interface components {
         ContributionsOver: {
             /**
              * Temperature C
-             * @description Temperature of the lines over rate, deg C.
+             * @description Temperature at which `over_rate` was computed, deg C.
              */
             temperature_c: number;
             /**
              * Rate Dps
-             * @description Rate of the lines over temperature, deg/s.
+             * @description Rate at which `over_temperature` was computed, deg/s.
              */
             rate_dps: number;
             over_rate: components["schemas"]["ContributionLines"];
@@ -3193,7 +3193,7 @@ export interface components {
              * @description Channels that changed together with the first of `depends_on`, so that this schedule cannot distinguish them.
              */
             confounded_with: string[];
-            /** @description Share of the residual's excess over the noise floor that no named effect explains. */
+            /** @description Share (0 to 1) of the residual above the noise floor that no named effect explains. */
             remainder: components["schemas"]["Remainder"] | null;
             /**
              * Not Physical
@@ -3202,7 +3202,7 @@ export interface components {
             not_physical: string[];
             /**
              * Named Axes
-             * @description Effect -> the axes on which it was found.
+             * @description For each effect: the axes on which the effect was found.
              */
             named_axes: {
                 [key: string]: string[];
@@ -3254,7 +3254,7 @@ export interface components {
             name?: string;
             /**
              * Street
-             * @description Street and number, or box.
+             * @description Street and number, or post-office box.
              * @default
              */
             street?: string;
@@ -3270,7 +3270,7 @@ export interface components {
             city?: string;
             /**
              * Country
-             * @description ISO 3166-1 alpha-2, as DE.
+             * @description Code of the country (ISO 3166-1 alpha-2), such as DE.
              * @default
              */
             country?: string;
@@ -3292,7 +3292,7 @@ export interface components {
             contact?: string;
             /**
              * Order
-             * @description The customer's number of the order.
+             * @description Order number of the customer.
              * @default
              */
             order?: string;
@@ -3379,12 +3379,12 @@ export interface components {
         DataWarning: {
             /**
              * What
-             * @description Kind of error, as a word for programs: sign, unit, scale, axes, one_data_set, time_unit, worse ...
+             * @description Kind of error, as a fixed word for programs: sign, unit, scale, axes, one_data_set, time_unit, worse ...
              */
             what: string;
             /**
              * Severity
-             * @description certain: a fit is refused; likely: a fit is made and shows the warning.
+             * @description Certainty of the error: certain: labctl refuses to fit; likely: labctl fits and shows the warning.
              * @enum {string}
              */
             severity: "certain" | "likely";
@@ -3422,14 +3422,14 @@ export interface components {
             technology: string | null;
             /**
              * Recordings
-             * @description Recordings that figures are from, rising.
+             * @description Numbers of the recordings from which the figures were computed, in ascending order.
              */
             recordings: number[];
             /** Characteristics */
             characteristics: components["schemas"]["Characteristic"][];
             /**
              * Passed
-             * @description Whether all that is specified and measured passes; null: nothing specified is measured.
+             * @description Whether every figure that is both specified and measured passes; null: there is no such figure.
              */
             passed: boolean | null;
             /**
@@ -3453,7 +3453,7 @@ export interface components {
             ok: boolean;
             /**
              * Text
-             * @description What is bad or, where nothing is, everything in one line.
+             * @description The bad findings or, if there are none, all findings, in one line.
              */
             text: string;
             /**
@@ -3464,14 +3464,14 @@ export interface components {
             kind: "table" | "chamber" | "reference" | "gyro" | "other";
             /**
              * State
-             * @description doubtful: a campaign can run, its figures may be worse. bad: it cannot, or they would be wrong.
+             * @description doubtful: a campaign can run, but its results may be less accurate. bad: a campaign cannot run, or its results would be wrong.
              * @default good
              * @enum {string}
              */
             state: "good" | "doubtful" | "bad";
             /**
              * Address
-             * @description Its port, or host and TCP port.
+             * @description Port of the instrument, or its host and TCP port.
              * @default
              */
             address: string;
@@ -3479,14 +3479,14 @@ export interface components {
             findings: components["schemas"]["FindingResponse"][];
             /**
              * Reported
-             * @description What it and its USB adapter say of themselves: serial, firmware, adapter ...
+             * @description Identification reported by the instrument and its USB adapter: serial, firmware, adapter ...
              */
             reported: {
                 [key: string]: string;
             };
             /**
              * Driver
-             * @description Name of its driver.
+             * @description Name of the driver of the instrument.
              * @default
              */
             driver: string;
@@ -3518,7 +3518,7 @@ export interface components {
             compared: components["schemas"]["ComparedModel"][];
             /**
              * Smallest Heldout
-             * @description Model with the smallest held-out error; null: none has one.
+             * @description Model with the smallest held-out error; null: no model has a held-out error.
              */
             smallest_heldout: string | null;
             /**
@@ -3538,27 +3538,27 @@ export interface components {
              * @description Objections to a certification of the draft.
              */
             objections: components["schemas"]["Objection"][];
-            /** @description The version in force; null: see `as_found_why`. */
+            /** @description Errors of the recording corrected by the version in force; null: see `as_found_why`. */
             as_found: components["schemas"]["AppliedDraft"] | null;
             /**
              * As Found Why
              * @default
              */
             as_found_why: string;
-            /** @description The draft; null: it cannot be applied, see `as_left_why`. */
+            /** @description Errors of the recording corrected by the draft; null: the draft cannot be applied, see `as_left_why`. */
             as_left: components["schemas"]["AppliedDraft"] | null;
             /**
              * As Left Why
              * @default
              */
             as_left_why: string;
-            /** @description Null: no version was in force, or it was not asked for. */
+            /** @description Difference between the draft and the version in force; null: no version was in force, or the recipe does not request it. */
             drift: components["schemas"]["DriftFromVersion"] | null;
             /** Limits */
             limits: components["schemas"]["LimitResult"][];
             /**
              * Within Limits
-             * @description Whether all limits are kept; null: the recipe has none, or a figure is not known.
+             * @description Whether all limits of the recipe are kept; null: the recipe has no limits, or a figure is not known.
              */
             within_limits: boolean | null;
             /**
@@ -3580,13 +3580,13 @@ export interface components {
             recording: number;
             /**
              * State
-             * @description due: it is made when the campaign is done; fitted: the version is kept, the report is not yet; made; failed: see `reason`.
+             * @description due: the draft will be made when the campaign is done; fitted: the version is stored, its report is not; made: both are stored; failed: see `reason`.
              * @enum {string}
              */
             state: "due" | "fitted" | "made" | "failed";
             /**
              * Version
-             * @description The version of the unit that the draft is.
+             * @description Version number of the draft; null: no version was made.
              */
             version: number | null;
             /**
@@ -3597,12 +3597,12 @@ export interface components {
             certified: boolean;
             /**
              * At
-             * @description When it was made or failed.
+             * @description Time at which the draft was made, or failed.
              */
             at: string | null;
             /**
              * Reason
-             * @description Why it failed, and what to do; else empty.
+             * @description Why the draft failed, and what to do; else empty.
              */
             reason: string;
             report: components["schemas"]["DraftReport"] | null;
@@ -3614,7 +3614,7 @@ export interface components {
         DraftsRequest: {
             /**
              * Again
-             * @description Also try those again that failed before.
+             * @description Also try again the drafts that failed before.
              * @default false
              */
             again?: boolean;
@@ -3628,7 +3628,7 @@ export interface components {
             campaign: number;
             /**
              * Drafts
-             * @description By recording; empty: the recipe has no [fit].
+             * @description The drafts (proposed calibrations), one per recording; empty: the recipe has no [fit].
              */
             drafts: components["schemas"]["DraftResponse"][];
         };
@@ -3675,7 +3675,7 @@ export interface components {
              * @description Whether 0 is outside the 95 % interval of `per_year`.
              */
             significant: boolean;
-            /** @description Points of the line, for a picture. */
+            /** @description Points of the straight line through the figures, for drawing. */
             line: components["schemas"]["DriftLine"];
         };
         /**
@@ -3704,7 +3704,7 @@ export interface components {
             };
             /**
              * Coefficients
-             * @description Empty: the models differ, see `why`.
+             * @description Change of each coefficient; empty: the two models differ, see `why`.
              */
             coefficients: components["schemas"]["CoefficientChange"][];
             /**
@@ -3888,7 +3888,7 @@ export interface components {
         ExportFormatResponse: {
             /**
              * Id
-             * @description The value of `format`.
+             * @description Name of the format, to be sent as `format`.
              */
             id: string;
             /** Title */
@@ -3900,7 +3900,7 @@ export interface components {
             suffix: string;
             /**
              * Options
-             * @description Name of an option -> what it is, its unit and its default.
+             * @description For each option of the format: its meaning, unit and default.
              */
             options: {
                 [key: string]: string;
@@ -3930,7 +3930,7 @@ export interface components {
             what: string;
             /**
              * Text
-             * @description Of one that is not good: what is wrong and what to do.
+             * @description The finding in words; if it is doubtful or bad, what is wrong and what to do.
              */
             text: string;
             /**
@@ -3973,7 +3973,7 @@ export interface components {
         FitRequest: {
             /**
              * Recording
-             * @description Recording; default: the unit's newest.
+             * @description Number of the recording; default: the unit's newest recording.
              */
             recording?: number | null;
             /**
@@ -3993,7 +3993,7 @@ export interface components {
             effects?: string[];
             /**
              * Accept Warnings
-             * @description Fit data that are certainly wrong, and keep a fit that is worse than no correction; the response still lists the warnings.
+             * @description Fit the data although labctl found errors in them, and keep the fit even if it is worse than no correction; the response still lists the warnings.
              * @default false
              */
             accept_warnings?: boolean;
@@ -4039,14 +4039,14 @@ export interface components {
              * @description The recording that the model was fitted to.
              */
             recording: number | null;
-            /** @description Only by hand: results for rests, accelerometer, moves, held-out moves. */
+            /** @description Only for a recording of poses (turned by hand): results for rests, accelerometer, moves and held-out moves. */
             poses: components["schemas"]["PosesJson"] | null;
             /**
              * Recordings
              * @description All recordings that the model was fitted to; `recording` is the newest of these.
              */
             recordings: number[];
-            /** @description Only for several: repeatability, agreement, each predicted by the others. */
+            /** @description Only for several recordings: repeatability, agreement, and the error when each is predicted by a fit to the others. */
             joint: components["schemas"]["JointJson"] | null;
             /** Version */
             version: number;
@@ -4077,7 +4077,7 @@ export interface components {
             kind: "lag" | "play";
             /**
              * Parameter
-             * @description Time constant of a lag, s; width of a play, K.
+             * @description Time constant of a thermal lag, s, or width of a hysteresis (play), K.
              */
             parameter: number;
             /**
@@ -4087,7 +4087,7 @@ export interface components {
             unit: "s" | "K";
             /**
              * Size
-             * @description For each axis, deg/s: error per K of lag, or error at an edge of the play.
+             * @description For each axis: error per K of temperature lag, (deg/s)/K, or error at an edge of the hysteresis, deg/s.
              */
             size: {
                 [key: string]: number;
@@ -4233,12 +4233,12 @@ export interface components {
             formula?: string[];
             /**
              * Version
-             * @description Version to change; default: the newest.
+             * @description Number of the version to change; default: the unit's newest version.
              */
             version?: number | null;
             /**
              * Recording
-             * @description Recording; default: the unit's newest.
+             * @description Number of the recording; default: the unit's newest recording.
              */
             recording?: number | null;
             /**
@@ -4248,7 +4248,7 @@ export interface components {
             recordings?: number[];
             /**
              * Accept Warnings
-             * @description Fit data that are certainly wrong, and keep a fit that is worse than no correction; the response still lists the warnings.
+             * @description Fit the data although labctl found errors in them, and keep the fit even if it is worse than no correction; the response still lists the warnings.
              * @default false
              */
             accept_warnings?: boolean;
@@ -4294,14 +4294,14 @@ export interface components {
              * @description The recording that the model was fitted to.
              */
             recording: number | null;
-            /** @description Only by hand: results for rests, accelerometer, moves, held-out moves. */
+            /** @description Only for a recording of poses (turned by hand): results for rests, accelerometer, moves and held-out moves. */
             poses: components["schemas"]["PosesJson"] | null;
             /**
              * Recordings
              * @description All recordings that the model was fitted to; `recording` is the newest of these.
              */
             recordings: number[];
-            /** @description Only for several: repeatability, agreement, each predicted by the others. */
+            /** @description Only for several recordings: repeatability, agreement, and the error when each is predicted by a fit to the others. */
             joint: components["schemas"]["JointJson"] | null;
             /**
              * Improved From
@@ -4312,7 +4312,7 @@ export interface components {
             before: components["schemas"]["ErrorFigures"];
             /**
              * Plausible
-             * @description For each effect: its usual range, and whether the size is inside.
+             * @description For each effect: the usual range of its size, and whether the fitted size is inside.
              */
             plausible: {
                 [key: string]: components["schemas"]["UsualRange"];
@@ -4373,14 +4373,14 @@ export interface components {
              * @description The recording that the model was fitted to.
              */
             recording: number | null;
-            /** @description Only by hand: results for rests, accelerometer, moves, held-out moves. */
+            /** @description Only for a recording of poses (turned by hand): results for rests, accelerometer, moves and held-out moves. */
             poses: components["schemas"]["PosesJson"] | null;
             /**
              * Recordings
              * @description All recordings that the model was fitted to; `recording` is the newest of these.
              */
             recordings: number[];
-            /** @description Only for several: repeatability, agreement, each predicted by the others. */
+            /** @description Only for several recordings: repeatability, agreement, and the error when each is predicted by a fit to the others. */
             joint: components["schemas"]["JointJson"] | null;
             /**
              * Improved From
@@ -4391,7 +4391,7 @@ export interface components {
             before: components["schemas"]["ErrorFigures"];
             /**
              * Plausible
-             * @description For each effect: its usual range, and whether the size is inside.
+             * @description For each effect: the usual range of its size, and whether the fitted size is inside.
              */
             plausible: {
                 [key: string]: components["schemas"]["UsualRange"];
@@ -4426,13 +4426,13 @@ export interface components {
             certification: components["schemas"]["CertificationResponse"] | null;
             /**
              * Rate Reference
-             * @description What the rates of its recordings were known from; empty: not known.
+             * @description How the table rates of the version's recordings were determined; empty: not known.
              * @default
              */
             rate_reference: string;
             /**
              * Remembers
-             * @description Lags and plays to be updated with the temperature of every sample.
+             * @description Temperature states (thermal lag or hysteresis) that must be updated with the temperature of every sample.
              */
             remembers: components["schemas"]["Follower"][];
         };
@@ -4499,7 +4499,7 @@ export interface components {
             name?: string;
             /**
              * Street
-             * @description Street and number, or box.
+             * @description Street and number, or post-office box.
              * @default
              */
             street?: string;
@@ -4515,7 +4515,7 @@ export interface components {
             city?: string;
             /**
              * Country
-             * @description ISO 3166-1 alpha-2, as DE.
+             * @description Code of the country (ISO 3166-1 alpha-2), such as DE.
              * @default
              */
             country?: string;
@@ -4531,7 +4531,7 @@ export interface components {
             phone?: string;
             /**
              * Accreditation
-             * @description Code under which it is accredited; empty: none.
+             * @description Accreditation number of the laboratory; empty: not accredited.
              * @default
              */
             accreditation?: string;
@@ -4553,7 +4553,7 @@ export interface components {
             number_prefix?: string;
             /**
              * Procedure
-             * @description Number of its written procedure.
+             * @description Number of the laboratory's written calibration procedure.
              * @default
              */
             procedure?: string;
@@ -4620,7 +4620,7 @@ export interface components {
             effects: string[];
             /**
              * Applied Rms Dps
-             * @description Only in `others`: RMS error on this recording without refitting, deg/s.
+             * @description Only for versions in `others`: RMS error on this recording without refitting, deg/s.
              */
             applied_rms_dps: number | null;
             /** Raw Rms Dps */
@@ -4675,12 +4675,12 @@ export interface components {
         LegError: {
             /**
              * Fitted
-             * @description Data sets that were fitted: heating, cooling, or all legs but one.
+             * @description Data sets that the model was fitted to: those measured while heating, while cooling, or all legs but one.
              */
             fitted: string;
             /**
              * Tested
-             * @description Data sets that were predicted by the fit: cooling, heating, or each leg in turn.
+             * @description Data sets that this fit predicted: those measured while cooling, while heating, or each leg in turn.
              */
             tested: string;
             /**
@@ -4731,19 +4731,19 @@ export interface components {
             limit: "heldout_rms_dps" | "max_error_dps" | "drift_dps";
             /**
              * Axis
-             * @description Axis; null: over all axes.
+             * @description Axis of the figure; null: all axes together.
              */
             axis: string | null;
             /**
              * Value Dps
-             * @description The figure, deg/s; null: it is not known, see `why`.
+             * @description Figure that is compared with the limit, deg/s; null: not known, see `why`.
              */
             value_dps: number | null;
             /** At Most Dps */
             at_most_dps: number;
             /**
              * Passed
-             * @description Null: the figure is not known, so that nothing is decided.
+             * @description Whether the limit is kept; null: not decided, because the figure is not known.
              */
             passed: boolean | null;
             /**
@@ -4774,7 +4774,7 @@ export interface components {
         };
         /**
          * LogPreview
-         * @description A log, its column map, and the recording that it would become; nothing of it was kept.
+         * @description A log, its column map, and the recording that it would become; nothing was imported.
          */
         LogPreview: {
             /** File */
@@ -4816,7 +4816,7 @@ export interface components {
             problems: string[];
             /**
              * Unused
-             * @description Columns of the file that nothing uses.
+             * @description Columns of the file that are not used.
              */
             unused: string[];
             /** Serial */
@@ -4881,7 +4881,7 @@ export interface components {
             recording: number;
             /**
              * Version
-             * @description Version that the figure is a coefficient of; null: it is from the recording itself.
+             * @description Calibration version of which the figure is a coefficient; null: the figure was computed from the recording.
              */
             version: number | null;
             /**
@@ -4902,12 +4902,12 @@ export interface components {
             ] | null;
             /**
              * Runs
-             * @description Powered sessions; null: unknown.
+             * @description Number of power-on sessions; null: unknown.
              */
             runs: number | null;
             /**
              * Datasets
-             * @description Data sets that the figure is from; null: unknown.
+             * @description Number of data sets from which the figure was computed; null: unknown.
              */
             datasets: number | null;
         };
@@ -4942,7 +4942,7 @@ export interface components {
         };
         /**
          * ModelResponse
-         * @description Which effects a calibration is made of; null: made by an older labctl, which did not say.
+         * @description Which effects a calibration is made of; null: made by an older version of labctl, which did not say.
          */
         ModelResponse: {
             /** Name */
@@ -4960,7 +4960,7 @@ export interface components {
              * @description Effects, with orders and parameters.
              */
             terms: components["schemas"]["TermJson"][] | null;
-            /** @description How temperature enters the model. */
+            /** @description Polynomial or interpolation by which the model depends on the temperature. */
             temperature: components["schemas"]["TemperatureBasisJson"] | null;
             /** @description Zero point of the temperature terms. */
             reference: components["schemas"]["ReferenceJson"] | null;
@@ -5189,7 +5189,7 @@ export interface components {
         OrderedMethod: {
             /**
              * Name
-             * @description Of an imported recording; a campaign has its recipe.
+             * @description Name of the method; only for an imported recording, since a campaign names its recipe.
              * @default
              */
             name?: string;
@@ -5201,7 +5201,7 @@ export interface components {
             deviations?: string;
             /**
              * Performed From
-             * @description Of an imported recording; a campaign has its own.
+             * @description First day of the measurements; only for an imported recording, since a campaign knows its dates.
              */
             performed_from?: string | null;
             /** Performed Until */
@@ -5216,50 +5216,50 @@ export interface components {
             axis: string;
             /**
              * Version
-             * @description Calibration that the rates were corrected by; null: none.
+             * @description Version of the calibration by which the rates were corrected; null: no correction.
              */
             version: number | null;
             /** Readings */
             readings: number;
             /**
              * Left Out
-             * @description Readings that were not valid, or no numbers.
+             * @description Number of readings left out because they were marked invalid or were not numbers.
              */
             left_out: number;
             /** Seconds */
             seconds: number;
-            /** @description Taken off; null: no rest was named. */
+            /** @description Static bias that was subtracted; null: no rest at the beginning was given. */
             static_bias: components["schemas"]["StaticBiasResponse"] | null;
             /**
              * Angle Deg
-             * @description At the end; 0 at the end of the rest.
+             * @description Angle at the end, deg; the angle is 0 at the end of the rest at the beginning.
              */
             angle_deg: number;
             /** Drift Between Stops Deg Per Min */
             drift_between_stops_deg_per_min: number[];
             /**
              * Drift Deg Per Min
-             * @description Angle over time: the drift where the unit stood; null: no time.
+             * @description Angle divided by the time, deg/min: the drift if the unit was at rest; null: the time is 0.
              */
             drift_deg_per_min: number | null;
             /**
              * Offset Dps
-             * @description Taken off at the end: the static bias, or learned at standstill since.
+             * @description Offset that is subtracted at the end, deg/s: the static bias, or the offset estimated during the last standstill.
              */
             offset_dps: number;
             /**
              * Standing S
-             * @description Time for which the unit counted as standing, its angle held.
+             * @description Time for which the unit was taken to stand still and its angle was held, s.
              */
             standing_s: number;
             /**
              * Gap S
-             * @description Time without readings, bridged in a straight line.
+             * @description Time without readings, s; the angle is interpolated linearly over it.
              */
             gap_s: number;
             /**
              * T S
-             * @description Times of the course below, s.
+             * @description Times of the values in `course_deg`, s.
              */
             t_s: number[];
             /**
@@ -5269,7 +5269,7 @@ export interface components {
             course_deg: number[];
             /**
              * Warning
-             * @description That the calibration is overdue or was revoked; empty: it is not.
+             * @description Warning that the calibration is overdue or was revoked; empty: neither.
              * @default
              */
             warning: string;
@@ -5498,14 +5498,14 @@ export interface components {
              * @description The recording that the model was fitted to.
              */
             recording: number | null;
-            /** @description Only by hand: results for rests, accelerometer, moves, held-out moves. */
+            /** @description Only for a recording of poses (turned by hand): results for rests, accelerometer, moves and held-out moves. */
             poses: components["schemas"]["PosesJson"] | null;
             /**
              * Recordings
              * @description All recordings that the model was fitted to; `recording` is the newest of these.
              */
             recordings: number[];
-            /** @description Only for several: repeatability, agreement, each predicted by the others. */
+            /** @description Only for several recordings: repeatability, agreement, and the error when each is predicted by a fit to the others. */
             joint: components["schemas"]["JointJson"] | null;
             /**
              * Improved From
@@ -5516,7 +5516,7 @@ export interface components {
             before: components["schemas"]["ErrorFigures"];
             /**
              * Plausible
-             * @description For each effect: its usual range, and whether the size is inside.
+             * @description For each effect: the usual range of its size, and whether the fitted size is inside.
              */
             plausible: {
                 [key: string]: components["schemas"]["UsualRange"];
@@ -5698,7 +5698,7 @@ export interface components {
             campaign: number | null;
             /**
              * Kind
-             * @description samples, points or coefficients.
+             * @description Kind of data: samples (every reading), points (one mean per data set) or coefficients (a published table).
              */
             kind: string;
             /**
@@ -5728,7 +5728,7 @@ export interface components {
             serial: string;
             /**
              * Kind
-             * @description samples, points or coefficients.
+             * @description Kind of data: samples (every reading), points (one mean per data set) or coefficients (a published table).
              */
             kind: string;
             /**
@@ -5777,7 +5777,7 @@ export interface components {
             campaign: number | null;
             /**
              * Kind
-             * @description samples, points or coefficients.
+             * @description Kind of data: samples (every reading), points (one mean per data set) or coefficients (a published table).
              */
             kind: string;
             /**
@@ -5834,7 +5834,7 @@ export interface components {
             u_bias_dps: number;
             /**
              * Scale Factor
-             * @description Error over rate (1 = 100 %); null: the recording has one rate.
+             * @description Scale factor error: error divided by rate (1 = 100 %); null: the recording has only one rate.
              */
             scale_factor: number | null;
             /** U Scale Factor */
@@ -5917,7 +5917,7 @@ export interface components {
             table_rate_dps: number[];
             /**
              * Own Rate Dps
-             * @description True rate along the axis itself, the Earth's included where it is known.
+             * @description True rate along the output axis, deg/s; it includes the Earth's rate where that is known.
              */
             own_rate_dps: number[];
             /** Temperature C */
@@ -5931,14 +5931,14 @@ export interface components {
             n: (number | null)[];
             /**
              * Measured Error Dps
-             * @description Output minus own rate.
+             * @description Error of the output: output minus true rate along the axis, deg/s.
              */
             measured_error_dps: number[];
             /** Modelled Error Dps */
             modelled_error_dps: number[];
             /**
              * Residual Dps
-             * @description Measured minus modelled error.
+             * @description Measured error minus modelled error, deg/s.
              */
             residual_dps: number[];
             /**
@@ -6101,7 +6101,7 @@ export interface components {
             reason: string;
             /**
              * Due Days
-             * @description Of a certification: days until the unit is due for its next calibration; 0: no date; absent: those of the recipe (`recalibrate_after_days`), else of the service ($LABCTL_DUE_DAYS), else no date.
+             * @description Only for a certification: days until the next calibration is due; 0: no due date; absent: the number in the recipe (`recalibrate_after_days`), else in the service ($LABCTL_DUE_DAYS), else no due date.
              */
             due_days?: number | null;
         };
@@ -6132,7 +6132,7 @@ export interface components {
             expected_s: number[];
             /**
              * Temperature C
-             * @description Set point of the chamber during the step, deg C; null: none was set yet.
+             * @description Set point of the chamber during the step, deg C; null: no set point was set yet.
              */
             temperature_c: (number | null)[];
             /**
@@ -6163,7 +6163,7 @@ export interface components {
             ended_s: (number | null)[];
             /**
              * Forecast S
-             * @description Start of the step, s of campaign time: measured, or for steps to come forecast from the expected times.
+             * @description Start of the step, s of campaign time: measured, or for future steps computed from the expected times.
              */
             forecast_s: number[];
         };
@@ -6180,7 +6180,7 @@ export interface components {
             readings: number;
             /**
              * Columns
-             * @description For each column: one value per reading, as many as were requested.
+             * @description For each column: one value per reading, up to the number of readings that was requested.
              */
             columns: {
                 [key: string]: (number | null)[] | number[] | string[] | boolean[];
@@ -6199,7 +6199,7 @@ export interface components {
             recipe: string;
             /**
              * State
-             * @description waiting, ended or cancelled.
+             * @description State of the start: waiting, ended or cancelled.
              */
             state: string;
             /**
@@ -6398,7 +6398,7 @@ export interface components {
             bias_dps: number;
             /**
              * U Dps
-             * @description Standard uncertainty: white noise of the mean, and the bias instability.
+             * @description Standard uncertainty of the static bias, deg/s, from the white noise of the mean and the bias instability.
              */
             u_dps: number;
             /** Readings */
@@ -6612,7 +6612,7 @@ export interface components {
             expected_s: number[];
             /**
              * Temperature C
-             * @description Set point of the chamber during the step, deg C; null: none was set yet.
+             * @description Set point of the chamber during the step, deg C; null: no set point was set yet.
              */
             temperature_c: (number | null)[];
             /**
@@ -6842,7 +6842,7 @@ export interface components {
         };
         /**
          * UncertaintyResponse
-         * @description The uncertainty of a corrected rate on later days; the noise of a single reading comes on top.
+         * @description The uncertainty of a corrected rate on later days; the noise of a single reading is not included.
          */
         UncertaintyResponse: {
             /** Serial */
@@ -6860,7 +6860,7 @@ export interface components {
             coverage_factor: number;
             /**
              * Coverage
-             * @description Probability that the interval covers.
+             * @description Probability that the interval contains the true value.
              */
             coverage: number;
             /**
@@ -6920,18 +6920,18 @@ export interface components {
             certified_version: number | null;
             /**
              * Due
-             * @description Until when the version in force is valid; null: no date, or none is in force.
+             * @description Time until which the version in force is valid; null: no due date, or no version is in force.
              */
             due: string | null;
             /**
              * Overdue
-             * @description Whether that date has passed.
+             * @description Whether the date in `due` has passed.
              * @default false
              */
             overdue: boolean;
-            /** @description Null: the version in force is not from a campaign. Only of one unit, or with `due_within`. */
+            /** @description How to recalibrate the unit: the campaign behind the version in force, and its recipe; null: that version is not from a campaign, or the response lists units without `due_within`. */
             recalibration: components["schemas"]["RecalibrationResponse"] | null;
-            /** @description The draft that a campaign ended in last; null: none did. Only of one unit, or with `due_within`. */
+            /** @description Newest draft calibration of the unit; null: there is none, or the response lists units without `due_within`. */
             draft: components["schemas"]["DraftResponse"] | null;
             /**
              * Formats
@@ -7080,14 +7080,14 @@ export interface components {
              * @description The recording that the model was fitted to.
              */
             recording: number | null;
-            /** @description Only by hand: results for rests, accelerometer, moves, held-out moves. */
+            /** @description Only for a recording of poses (turned by hand): results for rests, accelerometer, moves and held-out moves. */
             poses: components["schemas"]["PosesJson"] | null;
             /**
              * Recordings
              * @description All recordings that the model was fitted to; `recording` is the newest of these.
              */
             recordings: number[];
-            /** @description Only for several: repeatability, agreement, each predicted by the others. */
+            /** @description Only for several recordings: repeatability, agreement, and the error when each is predicted by a fit to the others. */
             joint: components["schemas"]["JointJson"] | null;
             /** Version */
             version: number;
@@ -7121,7 +7121,7 @@ export interface components {
             certification: components["schemas"]["CertificationResponse"] | null;
             /**
              * Rate Reference
-             * @description What the rates of its recordings were known from; empty: not known.
+             * @description How the table rates of the version's recordings were determined; empty: not known.
              * @default
              */
             rate_reference: string;
@@ -7132,7 +7132,7 @@ export interface components {
             left_out: components["schemas"]["LeftOut"][];
             /**
              * Remembers
-             * @description Lags and plays to be updated with the temperature of every sample.
+             * @description Temperature states (thermal lag or hysteresis) that must be updated with the temperature of every sample.
              */
             remembers: components["schemas"]["Follower"][];
             /** Parent */
@@ -7547,7 +7547,7 @@ export interface operations {
     calibration_api_units__serial__calibration_get: {
         parameters: {
             query?: {
-                /** @description Version; default: the certified version (404 if there is none). */
+                /** @description Number of the version; default: the certified version (status 404 if there is none). */
                 version?: number | null;
                 /** @description Format of the file, such as json or c; `GET /api/units/{serial}` lists the formats. */
                 format?: string;
@@ -7719,7 +7719,7 @@ export interface operations {
     verification_api_units__serial__calibrations__version__verification_get: {
         parameters: {
             query?: {
-                /** @description Recording; default: the unit's newest. */
+                /** @description Number of the recording; default: the unit's newest recording. */
                 recording?: number | null;
                 /** @description Accept a recording of another unit than the one in the address. */
                 other_unit?: boolean;
@@ -7756,7 +7756,7 @@ export interface operations {
     criticism_api_units__serial__calibrations__version__criticism_get: {
         parameters: {
             query?: {
-                /** @description Recording; default: the unit's newest. */
+                /** @description Number of the recording; default: the unit's newest recording. */
                 recording?: number | null;
                 /** @description Several recordings of the unit, used together; instead of `recording`. */
                 recordings?: number[] | null;
@@ -7797,7 +7797,7 @@ export interface operations {
     criticism_events_api_units__serial__calibrations__version__criticism_events_get: {
         parameters: {
             query?: {
-                /** @description Recording; default: the unit's newest. */
+                /** @description Number of the recording; default: the unit's newest recording. */
                 recording?: number | null;
                 /** @description Several recordings of the unit, used together; instead of `recording`. */
                 recordings?: number[] | null;
@@ -7838,7 +7838,7 @@ export interface operations {
     residuals_api_units__serial__calibrations__version__residuals_get: {
         parameters: {
             query?: {
-                /** @description Recording; default: the unit's newest. */
+                /** @description Number of the recording; default: the unit's newest recording. */
                 recording?: number | null;
                 /** @description Several recordings of the unit, used together; instead of `recording`. */
                 recordings?: number[] | null;
@@ -7875,7 +7875,7 @@ export interface operations {
     pictures_api_units__serial__calibrations__version__pictures_get: {
         parameters: {
             query?: {
-                /** @description Recording; default: the unit's newest. */
+                /** @description Number of the recording; default: the unit's newest recording. */
                 recording?: number | null;
             };
             header?: never;
@@ -7910,7 +7910,7 @@ export interface operations {
     comparison_api_units__serial__calibrations__version__comparison_get: {
         parameters: {
             query?: {
-                /** @description Recording; default: the unit's newest. */
+                /** @description Number of the recording; default: the unit's newest recording. */
                 recording?: number | null;
                 /** @description Several recordings of the unit, used together; instead of `recording`. */
                 recordings?: number[] | null;
@@ -8259,9 +8259,9 @@ export interface operations {
     certificate_api_units__serial__calibrations__version__certificate_get: {
         parameters: {
             query?: {
-                /** @description pdf (PDF/A-3), xml (DCC 3.3.0) or json. */
+                /** @description Format of the certificate: pdf (PDF/A-3), xml (DCC 3.3.0) or json. */
                 format?: string;
-                /** @description Number of a certificate of the version; default: the one that is valid. */
+                /** @description Number of a certificate of the version; default: the valid certificate. */
                 number?: string | null;
             };
             header?: {
@@ -8717,7 +8717,7 @@ export interface operations {
     schedule_api_schedule_get: {
         parameters: {
             query?: {
-                /** @description List entries that have ended too. */
+                /** @description List starts that have ended as well. */
                 ended?: boolean;
             };
             header?: never;
@@ -8932,7 +8932,7 @@ export interface operations {
             query?: never;
             header?: never;
             path: {
-                /** @description What moves the unit. */
+                /** @description How the unit is moved: at table rates, at rest, by turns, along a profile, or by hand between poses. */
                 kind: "rates" | "rest" | "turns" | "profile" | "poses";
             };
             cookie?: never;
@@ -9133,7 +9133,7 @@ export interface operations {
     allan_api_recordings__recording__allan_get: {
         parameters: {
             query?: {
-                /** @description Number of the data set to use; default: the longest section at rest. */
+                /** @description Number of the data set to use; default: the longest section of the recording at rest. */
                 dataset?: number | null;
             };
             header?: never;
@@ -9167,15 +9167,15 @@ export interface operations {
     orientation_api_recordings__recording__orientation_get: {
         parameters: {
             query?: {
-                /** @description x, y or z; default: the only one. */
+                /** @description Axis x, y or z; default: the only axis of the recording. */
                 axis?: string | null;
-                /** @description Calibration that corrects it; 0: none; default: the certified one, if any. */
+                /** @description Version of the calibration that corrects the readings; 0: no correction; default: the certified version, if any. */
                 version?: number | null;
-                /** @description At rest so long at first: its static bias is taken off, s. */
+                /** @description Time for which the unit is at rest at the beginning, s; the mean rate of that time (static bias) is subtracted. */
                 rest_s?: number;
-                /** @description Bias instability, for the uncertainty. */
+                /** @description Bias instability of the gyro, deg/s; it is part of the uncertainty of the static bias. */
                 instability_dps?: number;
-                /** @description Hold the angle and learn the offset at standstill. */
+                /** @description While the unit stands still, hold the angle and estimate the offset again. */
                 standstill?: boolean;
             };
             header?: never;
@@ -9308,7 +9308,7 @@ export interface operations {
     version_motion_api_units__serial__calibrations__version__motion_get: {
         parameters: {
             query?: {
-                /** @description Recording; default: the unit's newest. */
+                /** @description Number of the recording; default: the unit's newest recording. */
                 recording?: number | null;
                 /** @description Accept a recording of another unit than the one in the address. */
                 other_unit?: boolean;
@@ -9433,11 +9433,11 @@ export interface operations {
     audit_api_audit_get: {
         parameters: {
             query?: {
-                /** @description Only rows from this instant on, ISO 8601; an instant without a time zone is UTC. */
+                /** @description Only rows written at or after this time (ISO 8601; UTC if no time zone is given). */
                 since?: string | null;
-                /** @description Only rows whose number is larger than this. */
+                /** @description Only rows with a number larger than this number. */
                 after?: number;
-                /** @description At most this many rows. */
+                /** @description Largest number of rows in the response. */
                 limit?: number;
             };
             header?: never;
