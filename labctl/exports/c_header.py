@@ -10,6 +10,7 @@ import numpy as np
 from labctl.calibration import Calibration
 from labctl.compensator import MARGIN_C, output_limits_dps
 from labctl.errors import BadInput
+from labctl.exports.c_force import force_body, force_head
 from labctl.exports.c_memory import memory_body
 from labctl.exports.c_orientation import orientation_body
 from labctl.exports.c_sine import sine_body
@@ -169,6 +170,7 @@ def c_header(calibration: Calibration) -> bytes:
     surface = surface_of(fitted, calibration.axes)
     linear = linear_of(fitted, calibration.axes)
     sine = sine_form_of(fitted, calibration.axes)
+    is_direct = fitted.model.argument == "output"
     if surface is not None:
         body = _surface(name, surface)
     elif linear is not None:
@@ -183,7 +185,9 @@ def c_header(calibration: Calibration) -> bytes:
             f"({', '.join(blocking)}); use the JSON file with labctl's Compensator"
         )
     if memory is not None:
-        body += memory_body(name, memory, is_direct=fitted.model.argument == "output")
+        body += memory_body(name, memory, is_direct=is_direct)
+    if calibration.force_sensitivity is not None:
+        body += force_body(name, calibration.force_sensitivity, is_direct=is_direct, remembers=memory is not None)
     return (_head(name, calibration) + body + orientation_body(name) + TAIL).encode()
 
 
@@ -215,7 +219,8 @@ def _head(name: str, calibration: Calibration) -> str:
         guard=f"LABCTL_{name}_V{calibration.version}_{calibration.hash[:GUARD_DIGITS]}_H",
         name=name,
         axes=len(calibration.axes),
-        uncertainty="".join(f" * {_in_comment(line)}\n" for line in bound_lines(calibration)),
+        uncertainty="".join(f" * {_in_comment(line)}\n" for line in bound_lines(calibration))
+        + force_head(name, calibration.force_sensitivity),
         bound=bound_constant(name, calibration),
     )
 

@@ -83,7 +83,7 @@ def write(calibration: Calibration, options: Mapping[str, str]) -> Written:
     n = whole_number(options, "temperatures", (2, MOST), TEMPERATURES, NAME)
     table = table_of(part, part.outputs(m), part.temperatures(n))
     differs = largest_difference(part, table)
-    losses = part.memory_losses()
+    losses = part.losses()
     head = head_lines(calibration, "the whole correction of output and temperature", differs, losses, [
         "Rate of an axis = its output - the sum over by_axis of error_dps, linear between output_dps of by_axis and",
         "between temperature_c; outside the table hold both at its edge. All rates in deg/s.",

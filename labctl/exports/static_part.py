@@ -9,9 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from labctl.calibration import Calibration
-from labctl.compensator import correction
 from labctl.errors import BadInput
+from labctl.exports.force_text import force_losses
 from labctl.exports.format import Loss
+from labctl.fitting.models.correction import correction
 from labctl.fitting.models.memory import Memory, split_memory
 from labctl.fitting.numeric.arrays import Array
 
@@ -67,6 +68,10 @@ class StaticPart:
     def memory_losses(self) -> tuple[Loss, ...]:
         """Return what is lost where lag and hysteresis are not carried."""
         return follower_losses(self.memory)
+
+    def losses(self) -> tuple[Loss, ...]:
+        """Return what is lost where a format knows output and temperature alone."""
+        return (*self.memory_losses(), *force_losses(self.calibration))
 
 
 def follower_losses(memory: Memory | None) -> tuple[Loss, ...]:

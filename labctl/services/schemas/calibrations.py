@@ -282,3 +282,8 @@ class CompensationResponse(ResponseModel):
     outside: int = Field(description="Number of rows outside the calibrated rates or temperatures.")
     file: str
     warning: str = Field(default="", description="That the calibration is overdue or was revoked; empty: it is not.")
+    left_out: str = Field(
+        default="",
+        description="What was not corrected because the file lacks columns of specific force, with its size in deg/s; "
+        "empty: nothing.",
+    )
