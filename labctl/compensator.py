@@ -141,10 +141,10 @@ class Compensator:
     ) -> Compensated:
         """Correct rates, (n, axes) deg/s, or (n,) for one axis, at temperatures (n,), (n, axes) or one for all.
 
-        None for the temperature where the calibration was made without a thermometer. `channels`
-        hold what the model `needs` besides, (n,) each; `history`, of a recording, what the temperatures were between
-        the samples too; `specific_force_g` is (3,) or (n, 3). Raises BadInput where a channel is missing, for a shape that does not fit, for times that go
-        back, or outside the calibrated range when that is refused.
+        None for the temperature where the calibration was made without a thermometer. `channels` hold what the model
+        `needs` besides, (n,) each; `history`, of a recording, what the temperatures were between the samples too;
+        `specific_force_g` is (3,) or (n, 3). Raises BadInput where a channel is missing, for a shape that does not fit,
+        for times that go back, or outside the calibrated range when that is refused.
         """
         known = channels or {}
         for name in self.needs:

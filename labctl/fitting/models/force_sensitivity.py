@@ -6,6 +6,7 @@ The bias is the same at every rate and temperature, so that it is taken off befo
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,12 +33,12 @@ class ForceSensitivity:
     per_g: NDArray[np.float64]  #: (axes, 3) deg/s/g, of the force along body axes x, y, z
     per_g2: Array  #: (axes,) deg/s/g^2, of the force along the gyro axis
 
-    @property
+    @cached_property
     def known_per_g(self) -> NDArray[np.float64]:
         """The coefficients with 0 for what was not measured, and so is not corrected; (axes, 3) deg/s/g."""
         return np.nan_to_num(self.per_g)
 
-    @property
+    @cached_property
     def known_per_g2(self) -> Array:
         """The same of the square, (axes,) deg/s/g^2."""
         return np.nan_to_num(self.per_g2)
@@ -66,10 +67,10 @@ class ForceSensitivity:
 
     def error_dps(self, specific_force_g: Array) -> Array:
         """Return the error, (n, axes) deg/s, of forces (n, 3) g; no number where a force is not finite."""
-        own = specific_force_g[:, [BODY_AXES.index(axis) for axis in self.axes]]
-        found = specific_force_g @ self.known_per_g.T + self.known_per_g2 * own * own
-        found[~np.isfinite(specific_force_g).all(axis=1)] = np.nan
-        return np.asarray(found, dtype=np.float64)
+        known = np.isfinite(specific_force_g).all(axis=1, keepdims=True)
+        force = np.where(known, specific_force_g, np.nan)
+        own = force[:, [BODY_AXES.index(axis) for axis in self.axes]]
+        return np.asarray(force @ self.known_per_g.T + self.known_per_g2 * own * own)
 
     def forces(self, given: object, n: int) -> Array:
         """Return forces as (n, 3) g from (3,) or (n, 3); raises BadInput for another shape."""

@@ -23,10 +23,10 @@ MAIN = """
 #include <stdio.h>
 #include "calibration.h"
 int main(void) {{
-    int32_t w[{axes}], rate[{axes}]; int t, a, in;
+    int32_t w[{inputs}], rate[{axes}]; int t, a, in;
     while (scanf("%d", &t) == 1) {{
-        for (a = 0; a < {axes}; a++) {{ if (scanf("%d", &in) != 1) return 1; w[a] = in; }}
-        printf("%d", {name}_q31_correct(w, t, rate));
+        for (a = 0; a < {inputs}; a++) {{ if (scanf("%d", &in) != 1) return 1; w[a] = in; }}
+        printf("%d", {call});
         for (a = 0; a < {axes}; a++) printf(" %d", (int)rate[a]);
         printf("\\n");
     }}
@@ -35,12 +35,14 @@ int main(void) {{
 """
 
 
-def compiled(folder: Path, calibration: Calibration, rows: np.ndarray) -> np.ndarray:
-    """Return flag and rates, (n, 1 + axes), of rows of temperature and outputs in whole numbers."""
+def compiled(folder: Path, calibration: Calibration, rows: np.ndarray, *, with_force: bool = False) -> np.ndarray:
+    """Return flag and rates, (n, 1 + axes), of rows of temperature, outputs and, `with_force`, forces."""
     compiler = shutil.which("cc")
     assert compiler is not None
     (folder / "calibration.h").write_bytes(export_calibration(calibration.to_bytes(), "c-q31")[0])
-    (folder / "main.c").write_text(MAIN.format(axes=len(calibration.axes), name=c_name(calibration.serial)))
+    name, axes = c_name(calibration.serial), len(calibration.axes)
+    call = f"{name}_q31_correct_with_force(w, t, w + {axes}, rate)" if with_force else f"{name}_q31_correct(w, t, rate)"
+    (folder / "main.c").write_text(MAIN.format(axes=axes, inputs=rows.shape[1] - 1, call=call))
     subprocess.run([compiler, *STRICT, "main.c", "-o", "main"], cwd=folder, check=True, capture_output=True)
     given = "\n".join(" ".join(map(str, row)) for row in rows.tolist())
     said = subprocess.run([folder / "main"], input=given, text=True, check=True, capture_output=True).stdout
