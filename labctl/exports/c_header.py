@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 import string
 
-import numpy as np
-
 from labctl.calibration import Calibration
 from labctl.compensator import MARGIN_C, output_limits_dps
 from labctl.errors import BadInput
 from labctl.exports.c_force import force_body, force_head
 from labctl.exports.c_memory import memory_body
+from labctl.exports.c_nodes import temperature_nodes
 from labctl.exports.c_orientation import orientation_body
 from labctl.exports.c_sine import sine_body
 from labctl.exports.c_tables import c_table
@@ -22,8 +21,6 @@ from labctl.fitting.models.matrix_form import Linear, linear_of
 from labctl.fitting.models.memory import split_memory
 from labctl.fitting.models.polynomial_surface import Surface, surface_of
 from labctl.fitting.models.sine_form import SINE, sine_form_of
-from labctl.fitting.models.temperature import LagrangeTable
-from labctl.fitting.numeric.arrays import Array
 
 HEAD = """/* Calibration of gyro {serial}, version {version}: model {model}.
  * Hash of the calibration: {hash}
@@ -145,8 +142,6 @@ static inline int {name}_correct(const LABCTL_REAL *w, LABCTL_REAL temperature_c
 }}
 """
 
-#: Polynomials in temperature are exact on this many nodes with as many points.
-POLYNOMIAL_NODES = 6
 #: What may stand in a C name, the underscore set apart for codes.
 PLAIN = frozenset(string.ascii_letters + string.digits)
 #: Hexadecimal digits of the calibration's hash that the include guard carries.
@@ -240,17 +235,6 @@ def _surface(name: str, surface: Surface) -> str:
     return SURFACE.format(
         name=name, rows=rows, columns=columns, reference=surface.reference_c, table=c_table(surface.coefficients)
     )
-
-
-def temperature_nodes(linear: Linear, span_c: tuple[float, float]) -> tuple[Array, int]:
-    """Return the temperatures (n,) at which a model is tabulated, and over how many of them it is interpolated."""
-    basis = linear.fitted.model.temperature
-    if isinstance(basis, LagrangeTable) and not any("temperature" in e for e in linear.fitted.model.effect_ids):
-        return np.array(basis.nodes_c), basis.points
-    low, high = span_c
-    if not math.isfinite(high - low):  # made without a thermometer: the same at every temperature
-        return np.array([0.0]), 1
-    return np.linspace(low, max(high, low + 1.0), POLYNOMIAL_NODES), POLYNOMIAL_NODES
 
 
 def _linear(name: str, linear: Linear, span_c: tuple[float, float]) -> str:
