@@ -9,6 +9,7 @@ ends the study with an error.
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import subprocess
 import tempfile
@@ -22,7 +23,6 @@ from labctl.calibration import Calibration
 from labctl.compensator import Compensator
 from labctl.exports import written_calibration
 from labctl.exports.c_header import c_name
-from labctl.exports.c_rounding import DOUBLE, SINGLE, rounding_dps
 from labctl.fitting.numeric.rounding import at_most
 from studies.c_units import UNITS
 
@@ -108,11 +108,19 @@ def variants(calibration: Calibration, given: Points, folder: Path) -> Iterator[
     """Yield variant, largest difference and the bound that is stated, deg/s; without those that refuse the model."""
     header = written_calibration(calibration.to_bytes(), "c").content
     rows = np.column_stack([given.raw, given.warm, *([given.force] if given.force is not None else [])])
-    for number, roundoff in (("double", DOUBLE), ("float", SINGLE)):
+    for number, before in (("double", "from the calibration in double"), ("float", "in single")):
         rates = compiled(calibration, header, number, rows, folder)
-        yield number, float(np.abs(rates - given.rate).max()), at_most(rounding_dps(calibration, roundoff))
+        yield number, float(np.abs(rates - given.rate).max()), _stated(header, before)
     if np.isfinite(calibration.temperature_c).all() and not Compensator(calibration).remembers:
         yield ("Q31", *_fixed(calibration, given, folder))
+
+
+def _stated(header: bytes, before: str) -> float:
+    """Return the bound that stands in a header before these words, deg/s."""
+    found = re.search(r"([0-9.e+-]+) deg/s " + before, header.decode())
+    if found is None:
+        raise ValueError(f"the header states no bound {before}")
+    return float(found[1])
 
 
 def _fixed(calibration: Calibration, given: Points, folder: Path) -> tuple[float, float]:

@@ -12,6 +12,7 @@ from labctl.exports.c_force import force_body, force_head
 from labctl.exports.c_memory import memory_body
 from labctl.exports.c_nodes import temperature_nodes
 from labctl.exports.c_orientation import orientation_body
+from labctl.exports.c_rounding import rounding_line
 from labctl.exports.c_sine import sine_body
 from labctl.exports.c_tables import c_table
 from labctl.exports.format import Format
@@ -31,7 +32,8 @@ HEAD = """/* Calibration of gyro {serial}, version {version}: model {model}.
  * inside: a thermometer's last digits, corrected at the edge, and rates in the output's, as the range is of true rates.
  * What is not a number gives no number, and 1.
  * Input: output of the gyro as a rate, deg/s ({nominal}); result: rate in deg/s.
-{uncertainty} * Define LABCTL_REAL as float before including it for single precision. */
+{uncertainty} * {rounding}.
+ * Define LABCTL_REAL as float before including it for single precision. */
 #ifndef {guard}
 #define {guard}
 
@@ -216,6 +218,7 @@ def _head(name: str, calibration: Calibration) -> str:
         axes=len(calibration.axes),
         uncertainty="".join(f" * {_in_comment(line)}\n" for line in bound_lines(calibration))
         + force_head(name, calibration.force_sensitivity),
+        rounding=rounding_line(calibration),
         bound=bound_constant(name, calibration),
     )
 

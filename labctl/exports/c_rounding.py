@@ -23,6 +23,7 @@ from labctl.fitting.models.memory import Memory, split_memory
 from labctl.fitting.models.polynomial_surface import Surface, surface_of
 from labctl.fitting.models.sine_form import sine_form_of
 from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.numeric.rounding import at_most
 
 #: Unit roundoff of the two precisions.
 DOUBLE, SINGLE = 2.0**-53, 2.0**-24
@@ -78,6 +79,16 @@ def rounding_dps(calibration: Calibration, roundoff: float) -> float:
     whole = BEYOND * (found + gain * before)
     # the calibration is itself evaluated in double, and so is part of the code in any precision
     return whole + (rounding_dps(calibration, DOUBLE) if roundoff > DOUBLE else whole)
+
+
+def rounding_line(calibration: Calibration) -> str:
+    """Return the bounds as a sentence of a header: in which range, and in both precisions."""
+    over = range_of(calibration)
+    double, single = (at_most(rounding_dps(calibration, roundoff)) for roundoff in (DOUBLE, SINGLE))
+    return (
+        f"Rounding takes a rate at most {double:.3g} deg/s from the calibration in double, {single:.3g} deg/s in "
+        f"single precision, inputs rounded to it too; outputs up to {over.output_dps:g} deg/s"
+    )
 
 
 def _roundings(calibration: Calibration, *, is_sine: bool) -> tuple[float, float]:

@@ -61,7 +61,7 @@ def table_of(part: StaticPart, outputs: Array, temperatures_c: Array) -> Table:
 
 def largest_difference(part: StaticPart, table: Table) -> float:
     """Return how far the table is from the calibration at most, deg/s: between its points, and where all axes turn."""
-    fine = [_refined(table.outputs), _refined(table.temperatures_c)]
+    fine = [_refined(table.outputs), part.with_kinks(_refined(table.temperatures_c))]
     exact = table_of(part, *fine)
     raw, warm = (grid.ravel() for grid in np.meshgrid(*fine, indexing="ij"))
     axes = len(part.axes)

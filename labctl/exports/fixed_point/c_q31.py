@@ -104,7 +104,7 @@ def largest_difference(part: StaticPart, fixed: FixedPoint) -> float:
     between = np.clip(
         np.linspace(fixed.low_q16, fixed.high_q16, 2 * nodes - 1) / 2.0**16, *part.calibration.temperature_c
     )
-    warm = np.union1d(warm, between)
+    warm = part.with_kinks(np.union1d(warm, between))
     apart = np.zeros((axes, axes))
     outputs = part.outputs(OUTPUTS)
     still = np.zeros((len(warm), axes))
