@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -16,10 +17,12 @@ from labctl.exports.c_header import c_name
 from labctl.exports.fixed_point.force import fixed_force
 from labctl.exports.fixed_point.whole_numbers import fixed_point
 from labctl.exports.static_part import static_part
-from tests.helpers.calibrations import with_force
+from labctl.recording import Recording
+from tests.helpers.calibrations import calibrated, with_force
 from tests.helpers.cortex_m import INSTRUCTIONS_PER_TICK, TICKS, on_cortex_m
 from tests.helpers.exported import exported, stated, whole_range
 
+Grid = tuple[np.ndarray, np.ndarray]
 STRICT = ["-std=c99", "-O1", "-Wall", "-Wextra", "-pedantic", "-Wconversion", "-Werror"]
 MAIN = """
 #include <stdio.h>
@@ -150,3 +153,18 @@ def test_a_cortex_m4_computes_the_same(request: pytest.FixtureRequest, tmp_path:
     assert flags == 0
     instructions = [INSTRUCTIONS_PER_TICK * count / SAMPLES for count in ticks]
     assert all(20 < each < 20_000 for each in instructions), instructions
+
+
+def test_the_stated_difference_holds_where_a_table_over_temperature_bends(
+    make_points: Callable[..., Recording], grid_11_by_11: Grid
+) -> None:
+    rate, even = grid_11_by_11
+    warm = 25 + 20 * ((even - 25) / 20) ** 1.3
+    zigzag = np.where(np.arange(121) // 11 % 2, 0.3, -0.3)  # another slope between every two temperatures
+    bent = calibrated(make_points(rate, warm, rate * 1.01 + zigzag), "weiss1995")
+    _, written = exported(bent, "c-q31", temperatures="129")
+    fixed = fixed_point(static_part(bent, "c-q31", carries=""), 129, "c-q31")
+    dense = np.linspace(*bent.temperature_c, 20_001)
+    raw = np.full((len(dense), 1), 50.0)
+    apart = fixed.rate_dps(raw, dense) - Compensator(bent).compensate(raw, dense).rate_dps
+    assert np.abs(apart).max() <= (written.differs_dps or 0.0)
