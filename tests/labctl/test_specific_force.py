@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from functools import lru_cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +13,8 @@ from labctl.calibration import Calibration, read_calibration
 from labctl.certification import LeftOutWarning
 from labctl.compensator import Compensator
 from labctl.errors import BadCalibrationFile, BadInput
+from labctl.recording.data_files import read_table
+from labctl.services.calibrations.apply import compensate_file
 from labctl.services.simulation.plan_simulation import hidden_recording
 from tests.helpers.calibrations import calibrated, inside, with_force
 from tests.helpers.simulated_recordings import plan_on
@@ -150,3 +153,18 @@ def test_a_spoilt_part_is_refused(fog: Calibration) -> None:
     calibration.document["specific_force"]["coefficients"] = {}
     with pytest.raises(BadCalibrationFile, match="its specific_force cannot be read"):
         Compensator(calibration)
+
+
+def test_a_file_is_corrected_by_its_accelerometer_columns_or_says_what_is_left(
+    fog: Calibration, tmp_path: Path
+) -> None:
+    file, source, target = (tmp_path / name for name in ("fog.json", "in.csv", "out.csv"))
+    file.write_bytes(with_force(fog, np.array([[np.nan, np.nan, 0.01]]), np.array([np.nan])).to_bytes())
+    rates = []
+    for head, value in (("", ""), (",accel_z_g", ",-2.0")):
+        source.write_text(f"gyro_z,temperature_c{head}\n10.0,35.0{value}\n")
+        answer = compensate_file(file, source, target, "clamp")
+        rates.append(float(read_table(target)["rate_z_dps"][0]))
+        said = "column accel_z_g is missing: g-sensitivity is not corrected without specific_force_g; at 1 g at most: "
+        assert answer.left_out == ("" if head else f"{said}z 0.01 deg/s")
+    assert rates[1] - rates[0] == pytest.approx(0.02, abs=1e-12)
