@@ -56,11 +56,11 @@ class Range:
 
 def range_of(calibration: Calibration) -> Range:
     """Return the range of a calibration, with the margin that counts as inside."""
-    limits, span = output_limits_dps(calibration), np.array(calibration.temperature_c)
-    fastest = float(np.abs(limits).max())
-    if not np.isfinite(span).all():
-        span = np.array([-UNLIMITED_C, UNLIMITED_C])
-    return Range(fastest if np.isfinite(fastest) else UNLIMITED_DPS, np.linspace(*span, 649))
+    fastest = float(np.abs(output_limits_dps(calibration)).max())
+    low, high = calibration.temperature_c
+    if not np.isfinite(high - low):
+        low, high = -UNLIMITED_C, UNLIMITED_C
+    return Range(fastest if np.isfinite(fastest) else UNLIMITED_DPS, np.linspace(low, high, 649))
 
 
 def rounding_dps(calibration: Calibration, roundoff: float) -> float:

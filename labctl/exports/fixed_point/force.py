@@ -79,7 +79,9 @@ class FixedForce:
         """Return corrected rates (n, axes) of outputs (n, axes) at temperatures (n,) and forces (n, 3), and outside."""
         held = np.clip(force_q16, -MOST_G << Q16, MOST_G << Q16)
         own = held[:, [BODY_AXES.index(axis) for axis in self.force.axes]]
-        error = product(held @ self.per_g.T + product(own, own, Q16) * self.per_g2, np.int64(1), Q16 + self.shift)
+        error = product(
+            held @ self.per_g.T + product(own, own, Q16) * self.per_g2, np.ones(1, dtype=np.int64), Q16 + self.shift
+        )
         rate, outside = self.fixed.corrected(raw_q31, temperature_q16) if self.is_direct else (raw_q31, None)
         left = np.clip(rate - error, -MOST_Q31 - 1, MOST_Q31)
         beyond = np.any(held != force_q16, axis=1) | np.any(left != rate - error, axis=1)
@@ -128,8 +130,8 @@ def fixed_force(fixed: FixedPoint, force: ForceSensitivity, format_name: str, *,
             f"{fixed.full_scale_dps:g} deg/s; use c or json"
         )
     scale = 2.0 ** (Q31 + shift) / fixed.full_scale_dps
-    whole = (np.rint(values * scale).astype(np.int64) for values in (per_g, per_g2))
-    return FixedForce(fixed, force, *whole, shift, is_direct)
+    whole, whole2 = (np.rint(values * scale).astype(np.int64) for values in (per_g, per_g2))
+    return FixedForce(fixed, force, whole, whole2, shift, is_direct)
 
 
 def _row(values: list[int]) -> str:
