@@ -8,13 +8,13 @@ import string
 from labctl.calibration import Calibration
 from labctl.compensator import MARGIN_C, output_limits_dps
 from labctl.errors import BadInput
-from labctl.exports.c_force import force_body, force_head
-from labctl.exports.c_memory import memory_body
-from labctl.exports.c_nodes import temperature_nodes
-from labctl.exports.c_orientation import orientation_body
-from labctl.exports.c_rounding import rounding_line
-from labctl.exports.c_sine import sine_body
-from labctl.exports.c_tables import c_table
+from labctl.exports.c_code.force import force_body, force_head
+from labctl.exports.c_code.memory import memory_body
+from labctl.exports.c_code.nodes import temperature_nodes
+from labctl.exports.c_code.orientation import orientation_body
+from labctl.exports.c_code.rounding import rounding_line
+from labctl.exports.c_code.sine import sine_body
+from labctl.exports.c_code.tables import c_table
 from labctl.exports.format import Format
 from labctl.exports.uncertainty_bound import bound_constant, bound_lines
 from labctl.fitting.models.matrix_form import LINEAR as LINEAR_EFFECTS

@@ -10,7 +10,7 @@ import numpy as np
 from labctl.calibration import Calibration
 from labctl.compensator import MARGIN_C, output_limits_dps
 from labctl.errors import BadInput
-from labctl.exports.c_nodes import temperature_nodes
+from labctl.exports.c_code.nodes import temperature_nodes
 from labctl.exports.comments import head_lines
 from labctl.exports.force_text import size_line
 from labctl.exports.format import Format, Written

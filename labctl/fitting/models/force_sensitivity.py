@@ -108,7 +108,7 @@ class ForceSensitivity:
 def specific_force_json(fitted: FittedModel) -> SpecificForceJson | None:
     """Return a fitted model's sensitivity to specific force for its document; None for a model without one.
 
-    One that changes with the temperature is none: a table of it cannot be told from the bias on a bench.
+    One that changes with the temperature is none: a table of it cannot be distinguished from the bias on a bench.
     """
     terms = [term for term in fitted.model.terms if term.effect in EFFECTS]
     by_axis = {axis: _coefficients(fit) for axis, fit in fitted.axes.items()}

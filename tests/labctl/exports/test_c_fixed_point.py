@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
-import subprocess
 from collections.abc import Callable
 from pathlib import Path
 
@@ -18,40 +16,12 @@ from labctl.exports.fixed_point.force import fixed_force
 from labctl.exports.fixed_point.whole_numbers import fixed_point
 from labctl.exports.static_part import static_part
 from labctl.recording import Recording
+from tests.helpers.c_fixed_point import compiled
 from tests.helpers.calibrations import calibrated, with_force
 from tests.helpers.cortex_m import INSTRUCTIONS_PER_TICK, TICKS, on_cortex_m
 from tests.helpers.exported import exported, stated, whole_range
 
 Grid = tuple[np.ndarray, np.ndarray]
-STRICT = ["-std=c99", "-O1", "-Wall", "-Wextra", "-pedantic", "-Wconversion", "-Werror"]
-MAIN = """
-#include <stdio.h>
-#include "calibration.h"
-int main(void) {{
-    int32_t w[{inputs}], rate[{axes}]; int t, a, in;
-    while (scanf("%d", &t) == 1) {{
-        for (a = 0; a < {inputs}; a++) {{ if (scanf("%d", &in) != 1) return 1; w[a] = in; }}
-        printf("%d", {call});
-        for (a = 0; a < {axes}; a++) printf(" %d", (int)rate[a]);
-        printf("\\n");
-    }}
-    return 0;
-}}
-"""
-
-
-def compiled(folder: Path, calibration: Calibration, rows: np.ndarray, *, with_force: bool = False) -> np.ndarray:
-    """Return flag and rates, (n, 1 + axes), of rows of temperature, outputs and, `with_force`, forces."""
-    compiler = shutil.which("cc")
-    assert compiler is not None
-    (folder / "calibration.h").write_bytes(export_calibration(calibration.to_bytes(), "c-q31")[0])
-    name, axes = c_name(calibration.serial), len(calibration.axes)
-    call = f"{name}_q31_correct_with_force(w, t, w + {axes}, rate)" if with_force else f"{name}_q31_correct(w, t, rate)"
-    (folder / "main.c").write_text(MAIN.format(axes=axes, inputs=rows.shape[1] - 1, call=call))
-    subprocess.run([compiler, *STRICT, "main.c", "-o", "main"], cwd=folder, check=True, capture_output=True)
-    given = "\n".join(" ".join(map(str, row)) for row in rows.tolist())
-    said = subprocess.run([folder / "main"], input=given, text=True, check=True, capture_output=True).stdout
-    return np.array([[int(word) for word in line.split()] for line in said.splitlines()])
 
 
 @pytest.mark.needs_cc

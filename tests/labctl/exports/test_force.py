@@ -13,14 +13,14 @@ from labctl.compensator import Compensator
 from labctl.exports.fixed_point.force import fixed_force
 from labctl.exports.fixed_point.whole_numbers import fixed_point
 from labctl.exports.static_part import static_part
+from tests.helpers.c_fixed_point import compiled
 from tests.helpers.c_header import in_c
 from tests.helpers.calibrations import calibrated, inside, with_force
 from tests.helpers.exported import exported, stated
 from tests.helpers.rest import at_rest
-from tests.labctl.exports.test_c_fixed_point import compiled
-from tests.labctl.test_running_memory import BOTH
 
 SEED = 11
+LAGGING = ["bias", "bias_temperature", "thermal_lag", "thermal_hysteresis"]
 
 
 @pytest.fixture(params=["fog", "mems"])
@@ -148,7 +148,7 @@ def test_a_file_that_cannot_carry_it_names_the_loss(mems: Calibration, name: str
 @pytest.mark.needs_cc
 def test_a_step_of_a_unit_that_remembers_takes_the_force_too(tmp_path: Path) -> None:
     calibration = with_force(
-        calibrated(at_rest(("z",), lag_s=400.0), effects=BOTH), np.array([[0.01, 0.0, -0.02]]), np.zeros(1)
+        calibrated(at_rest(("z",), lag_s=400.0), effects=LAGGING), np.array([[0.01, 0.0, -0.02]]), np.zeros(1)
     )
     t_s, warm = np.arange(0.0, 3000.0, 60.0), np.linspace(20, 40, 50)
     raw, force = np.zeros((50, 1)), np.random.default_rng(SEED).uniform(-16, 16, (50, 3))

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from labctl.calibration import Calibration
 from labctl.compensator import output_limits_dps
-from labctl.exports.c_nodes import temperature_nodes
+from labctl.exports.c_code.nodes import temperature_nodes
 from labctl.exports.static_part import CORNERS, SLOPE_STEP_DPS, StaticPart, all_turning
 from labctl.fitting.models.correction import correction
 from labctl.fitting.models.force_sensitivity import ForceSensitivity

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from labctl.exports.c_tables import c_table
+from labctl.exports.c_code.tables import c_table
 from labctl.exports.force_text import size_line, unmeasured_line
 from labctl.fitting.data.channels import BODY_AXES
 from labctl.fitting.models.force_sensitivity import ForceSensitivity
