@@ -19,7 +19,15 @@ from labctl.fitting.data.temperature.history import TemperatureHistory
 from labctl.fitting.models.correction import correction
 from labctl.fitting.models.memory import RunningMemory, course, split_memory
 
-__all__ = ["MARGIN_C", "MARGIN_SHARE", "Compensated", "Compensator", "Outside", "output_limits_dps"]
+__all__ = [
+    "MARGIN_C",
+    "MARGIN_SHARE",
+    "Compensated",
+    "Compensator",
+    "LeftOutWarning",
+    "Outside",
+    "output_limits_dps",
+]
 
 Array = NDArray[np.float64]
 Outside = Literal["clamp", "refuse"]
