@@ -17,6 +17,7 @@ from typing import cast, get_args
 from labctl.certification import CalibrationWarning, Certification, read_certification
 from labctl.errors import BadCalibrationFile
 from labctl.fitting import FitResult, FittedModel, coefficients_json
+from labctl.fitting.models.force_sensitivity import ForceSensitivity, specific_force_json
 from labctl.fitting.models.paper_units import in_paper_units
 from labctl.fitting.uncertainty import AxisEvidence, BenchConditions, conditions_of
 from labctl.fitting.uncertainty.document import Covered, uncertainty_json
@@ -94,6 +95,16 @@ class Calibration:
         """The fitted model that the document holds: sensor and package effects only."""
         with _reading("model"):
             return FittedModel.from_dict(self.document["model"])
+
+    @cached_property
+    def force_sensitivity(self) -> ForceSensitivity | None:
+        """What specific force adds to the output, for a consumer with an accelerometer; None: the fit has no such term.
+
+        It is beside `fitted`, and of its effects `left_out` says what they do where no specific force is given.
+        """
+        with _reading("specific_force"):
+            given = self.document.get("specific_force")
+            return None if given is None else ForceSensitivity.from_json(given, self.axes)
 
     @property
     def output(self) -> dict[str, OutputUnit]:
@@ -175,6 +186,8 @@ def build_calibration(
         "how_to_use": HOW_TO_USE,
         "hash": "",
     }
+    if (force := specific_force_json(result.fitted)) is not None:
+        document["specific_force"] = force
     if result.poses is not None:
         document["poses"] = result.poses
     document["hash"] = hash_of(document)

@@ -20,6 +20,10 @@ class CalibrationWarning(UserWarning):
     """A calibration that is loaded is overdue, or was revoked."""
 
 
+class LeftOutWarning(UserWarning):
+    """A calibration is used without an input that part of its correction needs."""
+
+
 @dataclass(frozen=True)
 class Certification:
     """The newest act of certifying or revoking a version; `due` is aware UTC, None where no date was given."""
@@ -69,14 +73,14 @@ def read_certification(given: Mapping[str, object]) -> Certification:
     )  # fmt: skip
 
 
-def warn(text: str) -> None:
-    """Issue a CalibrationWarning at the line of the program that called labctl; nothing for an empty text."""
+def warn(text: str, category: type[Warning] = CalibrationWarning) -> None:
+    """Issue a warning at the line of the program that called labctl; nothing for an empty text."""
     if not text:
         return
     depth, frame = 1, sys._getframe(1)  # noqa: SLF001  Python 3.12 can skip a package's own frames
     while frame.f_back is not None and str(frame.f_globals.get("__name__", "")).partition(".")[0] == "labctl":
         depth, frame = depth + 1, frame.f_back
-    warnings.warn(text, CalibrationWarning, stacklevel=depth + 1)
+    warnings.warn(text, category, stacklevel=depth + 1)
 
 
 def _instant(text: object) -> datetime:

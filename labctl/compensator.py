@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -12,18 +12,22 @@ from numpy.typing import ArrayLike, NDArray
 
 from instruments.clock import Clock, SystemClock
 from labctl.calibration import Calibration, read_calibration
-from labctl.certification import warn
+from labctl.certification import LeftOutWarning, warn
 from labctl.errors import BadInput
-from labctl.fitting.data.channels import Channels
 from labctl.fitting.data.temperature.channel import STAND_IN_C
 from labctl.fitting.data.temperature.history import TemperatureHistory
-from labctl.fitting.models.fitted_model import FittedModel
-from labctl.fitting.models.matrix_form import Linear, linear_of
+from labctl.fitting.models.correction import correction
 from labctl.fitting.models.memory import RunningMemory, course, split_memory
-from labctl.fitting.models.polynomial_surface import Surface, surface_of
-from labctl.fitting.models.sine_form import sine_form_of
 
-__all__ = ["MARGIN_C", "MARGIN_SHARE", "Compensated", "Compensator", "Outside", "output_limits_dps"]
+__all__ = [
+    "MARGIN_C",
+    "MARGIN_SHARE",
+    "Compensated",
+    "Compensator",
+    "LeftOutWarning",
+    "Outside",
+    "output_limits_dps",
+]
 
 Array = NDArray[np.float64]
 Outside = Literal["clamp", "refuse"]
@@ -31,7 +35,6 @@ Outside = Literal["clamp", "refuse"]
 MARGIN_C = 0.5
 #: The range of rates is taken wider by this share: it was measured in true rates and is compared with output rates.
 MARGIN_SHARE = 0.02
-Correct = Callable[[Array, Array, Mapping[str, Array]], Array]
 
 
 @dataclass(frozen=True)
@@ -40,6 +43,9 @@ class Compensated:
 
     rate_dps: Array
     outside: NDArray[np.bool_]
+    #: The largest error by 1 g of each axis, (axes,) deg/s, that was not corrected because no specific force was given;
+    #: None: nothing was left out that the calibration knows of.
+    left_out_dps: Array | None = None
 
 
 def output_limits_dps(calibration: Calibration) -> tuple[float, float]:
@@ -59,6 +65,11 @@ class Compensator:
 
     A lag or a hysteresis (`remembers`) is followed from sample to sample: `step` goes on from the last one, an array is
     a course of its own. Both then need the times, `t_s`. The unit is taken to have rested at its first temperature.
+
+    g-sensitivity (`force_sensitivity`) is corrected where `specific_force_g` is given: (3,) or (n, 3) g along the body
+    axes x, y, z, +1 along an axis that points up at rest. Without it the answer says what was left out; `step`, which
+    answers with numbers alone, issues a LeftOutWarning once. It is measured at 1 g, taken as proportional beyond, and
+    no range of forces is flagged. A calibration without g-sensitivity ignores the force.
     """
 
     def __init__(self, calibration: Calibration, outside: Outside = "clamp", *, clock: Clock | None = None) -> None:
@@ -82,6 +93,10 @@ class Compensator:
         rest, self._memory = split_memory(calibration.fitted, self.axes)
         self._correct = correction(rest, self.axes)
         self._running = RunningMemory(self._memory) if self._memory else None
+        #: What specific force adds; None: the calibration knows of nothing.
+        self.force_sensitivity = calibration.force_sensitivity
+        self._left_out_dps = self.force_sensitivity.at_1_g_dps if self.force_sensitivity else None
+        self._has_warned = False
         self._is_direct = calibration.fitted.model.argument == "output"
         #: Channels beside output and temperature that the model's effects need, such as power_s, supply_v or t_s.
         self.needs = tuple(dict.fromkeys((*rest.model.needs, *(("t_s",) if self._memory else ()))))
@@ -110,12 +125,18 @@ class Compensator:
             self._running.reset()
 
     def compensate_output(
-        self, output: Array, temperature_c: Array | None, channels: Mapping[str, Array] | None = None
+        self,
+        output: Array,
+        temperature_c: Array | None,
+        channels: Mapping[str, Array] | None = None,
+        *,
+        specific_force_g: ArrayLike | None = None,
     ) -> Compensated:
         """Correct what the device gives in its own unit, (n, axes) or (n,); see `compensate`."""
         values = np.asarray(output, dtype=np.float64)
         offset, scale = (self._offset, self._scale) if values.ndim == 2 else (self._offset[0], self._scale[0])
-        return self.compensate((values - offset) / scale, temperature_c, channels)
+        rates = (values - offset) / scale
+        return self.compensate(rates, temperature_c, channels, specific_force_g=specific_force_g)
 
     def compensate(
         self,
@@ -124,13 +145,14 @@ class Compensator:
         channels: Mapping[str, Array] | None = None,
         *,
         history: TemperatureHistory | None = None,
+        specific_force_g: ArrayLike | None = None,
     ) -> Compensated:
         """Correct rates, (n, axes) deg/s, or (n,) for one axis, at temperatures (n,), (n, axes) or one for all.
 
-        None for the temperature where the calibration was made without a thermometer. `channels`
-        hold what the model `needs` besides, (n,) each; `history`, of a recording, what the temperatures were between
-        the samples too. Raises BadInput where a channel is missing, for a shape that does not fit, for times that go
-        back, or outside the calibrated range when that is refused.
+        None for the temperature where the calibration was made without a thermometer. `channels` hold what the model
+        `needs` besides, (n,) each; `history`, of a recording, what the temperatures were between the samples too;
+        `specific_force_g` is (3,) or (n, 3). Raises BadInput where a channel is missing, for a shape that does not fit,
+        for times that go back, or outside the calibrated range when that is refused.
         """
         known = channels or {}
         for name in self.needs:
@@ -146,22 +168,33 @@ class Compensator:
                 "for each"
             )
         warm = np.asarray(self._known(temperature_c), dtype=np.float64)
-        if self._memory is None:
-            found = self._held(raw, warm, known)
-            return Compensated(found.rate_dps.reshape(given.shape), found.outside)
-        if history is not None:
-            remembered = self._memory.of_history(history, known)
-        else:
-            remembered = course(RunningMemory(self._memory), np.asarray(known["t_s"], dtype=np.float64), warm)
-        return self._beside(remembered, raw, warm, known, given.shape)
+        beside = self._by_force(specific_force_g, len(raw))
+        if self._memory is not None:
+            remembered = (
+                course(RunningMemory(self._memory), np.asarray(known["t_s"], dtype=np.float64), warm)
+                if history is None
+                else self._memory.of_history(history, known)
+            )
+            beside = remembered if beside is None else remembered + beside
+        return self._beside(beside, raw, warm, known, given.shape, has_force=specific_force_g is not None)
 
     def _beside(
-        self, remembered: Array, raw: Array, warm: Array, known: Mapping[str, Array], shape: tuple[int, ...]
-    ) -> Compensated:
-        """Correct outputs (n, axes) of which the error that is remembered, (n, axes) deg/s, is known."""
-        found = self._held(raw if self._is_direct else raw - remembered, warm, known)
-        rate = found.rate_dps - remembered if self._is_direct else found.rate_dps
-        return Compensated(rate.reshape(shape), found.outside)
+        self, beside: Array | None, raw: Array, warm: Array, known: Mapping[str, Array], shape: tuple[int, ...],
+        *, has_force: bool,
+    ) -> Compensated:  # fmt: skip
+        """Correct outputs (n, axes) of which an error that no rate changes, (n, axes) deg/s, is known; None: none."""
+        left_out = None if has_force else self._left_out_dps
+        if beside is None:
+            found = self._held(raw, warm, known)
+            return Compensated(found.rate_dps.reshape(shape), found.outside, left_out)
+        found = self._held(np.where(np.isnan(beside), np.nan, raw) if self._is_direct else raw - beside, warm, known)
+        rate = found.rate_dps - beside if self._is_direct else found.rate_dps
+        return Compensated(rate.reshape(shape), found.outside, left_out)
+
+    def _by_force(self, specific_force_g: ArrayLike | None, n: int) -> Array | None:
+        if specific_force_g is None or self.force_sensitivity is None:
+            return None
+        return self.force_sensitivity.error_dps(self.force_sensitivity.forces(specific_force_g, n))
 
     def _held(self, raw: Array, warm: Array, known: Mapping[str, Array]) -> Compensated:
         """Correct outputs (n, axes) by what does not remember, at the edge of the range where they are outside."""
@@ -212,15 +245,25 @@ class Compensator:
             )
         return np.asarray(cold | fast)
 
-    def step(self, raw_dps: ArrayLike, temperature_c: float | None, t_s: float | None = None) -> tuple[Array, bool]:
-        """Correct one sample, (axes,) deg/s; returns the corrected rates and whether it lay outside.
+    def step(
+        self,
+        raw_dps: ArrayLike,
+        temperature_c: float | None,
+        t_s: float | None = None,
+        *,
+        specific_force_g: ArrayLike | None = None,
+    ) -> tuple[Array, bool]:
+        """Correct one sample, (axes,) deg/s, at a specific force (3,) g; returns the rates and whether it lay outside.
 
         Where the unit `remembers` samples come in order of time, with their times `t_s` in s; raises BadInput for one
         without, or one from before the last.
         """
         raw = np.asarray(raw_dps, dtype=np.float64).reshape(1, -1)
+        if specific_force_g is None and self.force_sensitivity is not None and not self._has_warned:
+            self._has_warned = True
+            warn(f"{self.calibration.serial}: {self.force_sensitivity.sentence()}", LeftOutWarning)
         if self._running is None:
-            found = self.compensate(raw, temperature_c)
+            found = self.compensate(raw, temperature_c, specific_force_g=specific_force_g)
             return found.rate_dps[0], bool(found.outside[0])
         if t_s is None or temperature_c is None:
             raise BadInput(
@@ -231,32 +274,10 @@ class Compensator:
                 f"t_s = {t_s:.9g} s is before the last sample's {self._running.last_s:.9g} s; give samples in order of "
                 "time, or call reset()"
             )
-        remembered = self._running.error_dps(t_s, temperature_c)[None, :]
-        found = self._beside(remembered, raw, np.array([temperature_c]), {"t_s": np.array([t_s])}, raw.shape)
+        by_force = self._by_force(specific_force_g, 1)
+        beside = self._running.error_dps(t_s, temperature_c)[None, :]
+        found = self._beside(
+            beside if by_force is None else beside + by_force, raw, np.array([temperature_c]),
+            {"t_s": np.array([t_s])}, raw.shape, has_force=specific_force_g is not None,
+        )  # fmt: skip
         return found.rate_dps[0], bool(found.outside[0])
-
-
-def correction(fitted: FittedModel, axes: tuple[str, ...]) -> Correct:
-    """Return the fastest exact way to apply a model: (rates (n, axes), temperatures) -> rates (n, axes)."""
-    surface: Surface | None = surface_of(fitted, axes)
-    if surface is not None:
-        return lambda raw, warm, _: surface.correct(raw, warm)
-    linear: Linear | None = linear_of(fitted, axes)
-    if linear is not None:
-        return lambda raw, warm, _: linear.correct(raw, warm)
-
-    sine = sine_form_of(fitted, axes)
-    if sine is not None:
-        return lambda raw, warm, _: sine.correct(raw, warm)
-
-    def general(raw: Array, temperature_c: Array, channels: Mapping[str, Array]) -> Array:
-        n = len(raw)
-        warm = np.broadcast_to(temperature_c, (n,)) if temperature_c.ndim < 2 else temperature_c.mean(axis=1)
-        columns: dict[str, Array] = {"temperature_c": warm, **channels}
-        if temperature_c.ndim == 2:
-            columns |= {f"temperature_{axis}_c": temperature_c[:, i] for i, axis in enumerate(axes)}
-        outputs = {axis: raw[:, i] for i, axis in enumerate(axes)}
-        corrected = fitted.compensate(outputs, Channels(columns, outputs))
-        return np.column_stack([corrected[axis] for axis in axes])
-
-    return general

@@ -24,6 +24,7 @@ STUDIES = (
     "attacks",
     "endurance",
     "log_size",
+    "c_points",
 )
 
 

@@ -5,15 +5,16 @@ from __future__ import annotations
 import math
 import string
 
-import numpy as np
-
 from labctl.calibration import Calibration
 from labctl.compensator import MARGIN_C, output_limits_dps
 from labctl.errors import BadInput
-from labctl.exports.c_memory import memory_body
-from labctl.exports.c_orientation import orientation_body
-from labctl.exports.c_sine import sine_body
-from labctl.exports.c_tables import c_table
+from labctl.exports.c_code.force import force_body, force_head
+from labctl.exports.c_code.memory import memory_body
+from labctl.exports.c_code.nodes import temperature_nodes
+from labctl.exports.c_code.orientation import orientation_body
+from labctl.exports.c_code.rounding import rounding_line
+from labctl.exports.c_code.sine import sine_body
+from labctl.exports.c_code.tables import c_table
 from labctl.exports.format import Format
 from labctl.exports.uncertainty_bound import bound_constant, bound_lines
 from labctl.fitting.models.matrix_form import LINEAR as LINEAR_EFFECTS
@@ -21,8 +22,6 @@ from labctl.fitting.models.matrix_form import Linear, linear_of
 from labctl.fitting.models.memory import split_memory
 from labctl.fitting.models.polynomial_surface import Surface, surface_of
 from labctl.fitting.models.sine_form import SINE, sine_form_of
-from labctl.fitting.models.temperature import LagrangeTable
-from labctl.fitting.numeric.arrays import Array
 
 HEAD = """/* Calibration of gyro {serial}, version {version}: model {model}.
  * Hash of the calibration: {hash}
@@ -33,7 +32,8 @@ HEAD = """/* Calibration of gyro {serial}, version {version}: model {model}.
  * inside: a thermometer's last digits, corrected at the edge, and rates in the output's, as the range is of true rates.
  * What is not a number gives no number, and 1.
  * Input: output of the gyro as a rate, deg/s ({nominal}); result: rate in deg/s.
-{uncertainty} * Define LABCTL_REAL as float before including it for single precision. */
+{uncertainty} * {rounding}.
+ * Define LABCTL_REAL as float before including it for single precision. */
 #ifndef {guard}
 #define {guard}
 
@@ -144,8 +144,6 @@ static inline int {name}_correct(const LABCTL_REAL *w, LABCTL_REAL temperature_c
 }}
 """
 
-#: Polynomials in temperature are exact on this many nodes with as many points.
-POLYNOMIAL_NODES = 6
 #: What may stand in a C name, the underscore set apart for codes.
 PLAIN = frozenset(string.ascii_letters + string.digits)
 #: Hexadecimal digits of the calibration's hash that the include guard carries.
@@ -169,6 +167,7 @@ def c_header(calibration: Calibration) -> bytes:
     surface = surface_of(fitted, calibration.axes)
     linear = linear_of(fitted, calibration.axes)
     sine = sine_form_of(fitted, calibration.axes)
+    is_direct = fitted.model.argument == "output"
     if surface is not None:
         body = _surface(name, surface)
     elif linear is not None:
@@ -183,7 +182,9 @@ def c_header(calibration: Calibration) -> bytes:
             f"({', '.join(blocking)}); use the JSON file with labctl's Compensator"
         )
     if memory is not None:
-        body += memory_body(name, memory, is_direct=fitted.model.argument == "output")
+        body += memory_body(name, memory, is_direct=is_direct)
+    if calibration.force_sensitivity is not None:
+        body += force_body(name, calibration.force_sensitivity, is_direct=is_direct, remembers=memory is not None)
     return (_head(name, calibration) + body + orientation_body(name) + TAIL).encode()
 
 
@@ -215,7 +216,9 @@ def _head(name: str, calibration: Calibration) -> str:
         guard=f"LABCTL_{name}_V{calibration.version}_{calibration.hash[:GUARD_DIGITS]}_H",
         name=name,
         axes=len(calibration.axes),
-        uncertainty="".join(f" * {_in_comment(line)}\n" for line in bound_lines(calibration)),
+        uncertainty="".join(f" * {_in_comment(line)}\n" for line in bound_lines(calibration))
+        + force_head(name, calibration.force_sensitivity),
+        rounding=rounding_line(calibration),
         bound=bound_constant(name, calibration),
     )
 
@@ -235,17 +238,6 @@ def _surface(name: str, surface: Surface) -> str:
     return SURFACE.format(
         name=name, rows=rows, columns=columns, reference=surface.reference_c, table=c_table(surface.coefficients)
     )
-
-
-def temperature_nodes(linear: Linear, span_c: tuple[float, float]) -> tuple[Array, int]:
-    """Return the temperatures (n,) at which a model is tabulated, and over how many of them it is interpolated."""
-    basis = linear.fitted.model.temperature
-    if isinstance(basis, LagrangeTable) and not any("temperature" in e for e in linear.fitted.model.effect_ids):
-        return np.array(basis.nodes_c), basis.points
-    low, high = span_c
-    if not math.isfinite(high - low):  # made without a thermometer: the same at every temperature
-        return np.array([0.0]), 1
-    return np.linspace(low, max(high, low + 1.0), POLYNOMIAL_NODES), POLYNOMIAL_NODES
 
 
 def _linear(name: str, linear: Linear, span_c: tuple[float, float]) -> str:

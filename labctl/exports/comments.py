@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from labctl.calibration import Calibration
-from labctl.exports.format import Loss, at_most
+from labctl.exports.format import Loss
 from labctl.exports.uncertainty_bound import bound_lines
+from labctl.fitting.numeric.rounding import at_most
 
 
 def plain(text: str) -> str:

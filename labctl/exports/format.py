@@ -2,20 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
-#: Digits of a size that is said; it is rounded up.
-DIGITS = 3
-
-
-def at_most(size: float) -> float:
-    """Return a size rounded up to three digits, so that it stays a bound."""
-    if size <= 0 or not math.isfinite(size):
-        return size
-    step = 10.0 ** (math.floor(math.log10(size)) + 1 - DIGITS)
-    return float(f"{math.ceil(size / step * (1 - 1e-12)) * step:.{DIGITS}g}")
+from labctl.fitting.numeric.rounding import at_most
 
 
 @dataclass(frozen=True)

@@ -61,7 +61,7 @@ def table_of(part: StaticPart, outputs: Array, temperatures_c: Array) -> Table:
 
 def largest_difference(part: StaticPart, table: Table) -> float:
     """Return how far the table is from the calibration at most, deg/s: between its points, and where all axes turn."""
-    fine = [_refined(table.outputs), _refined(table.temperatures_c)]
+    fine = [_refined(table.outputs), part.with_kinks(_refined(table.temperatures_c))]
     exact = table_of(part, *fine)
     raw, warm = (grid.ravel() for grid in np.meshgrid(*fine, indexing="ij"))
     axes = len(part.axes)
@@ -87,7 +87,7 @@ def write(calibration: Calibration, options: Mapping[str, str]) -> Written:
     n = whole_number(options, "temperatures", (2, MOST), TEMPERATURES, NAME)
     table = table_of(part, part.outputs(m), part.temperatures(n))
     differs = largest_difference(part, table)
-    losses = part.memory_losses()
+    losses = part.losses()
     head = head_lines(calibration, "the whole correction of output and temperature", differs, losses, [
         "Rate of an axis = its output - the sum over by_axis of error_dps, linear between output_dps of by_axis and",
         "between temperature_c; outside the table hold both at its edge. All rates in deg/s.",

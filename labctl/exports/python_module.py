@@ -10,11 +10,20 @@ import numpy as np
 from labctl.calibration import Calibration
 from labctl.compensator import MARGIN_C, output_limits_dps
 from labctl.errors import BadInput
-from labctl.exports.c_header import temperature_nodes
+from labctl.exports.c_code.nodes import temperature_nodes
 from labctl.exports.comments import head_lines
+from labctl.exports.force_text import size_line
 from labctl.exports.format import Format, Written
-from labctl.exports.python_source import LINEAR_CORRECTION, OPENING, SURFACE_CORRECTION
+from labctl.exports.python_source import (
+    AFTER_CORRECTION,
+    BEFORE_CORRECTION,
+    FORCE_CORRECTION,
+    LINEAR_CORRECTION,
+    OPENING,
+    SURFACE_CORRECTION,
+)
 from labctl.exports.static_part import follower_losses
+from labctl.fitting.models.force_sensitivity import ForceSensitivity
 from labctl.fitting.models.matrix_form import linear_of
 from labctl.fitting.models.memory import split_memory
 from labctl.fitting.models.polynomial_surface import surface_of
@@ -53,8 +62,13 @@ def write(calibration: Calibration) -> Written:
         },
         **tables,
     }
+    force, notes = calibration.force_sensitivity, []
+    if force is not None:
+        content["specific_force"] = _force_table(force)
+        body += FORCE_CORRECTION + (AFTER_CORRECTION if fitted.model.argument == "output" else BEFORE_CORRECTION)
+        notes = [size_line(force, "correct_with_force") + "."]
     carries = "the whole correction, in double precision, for any Python from 3.8 on"
-    head = "\n".join(head_lines(calibration, carries, DIFFERS_DPS, losses)).replace("\\", "/").replace('"', "'")
+    head = "\n".join(head_lines(calibration, carries, DIFFERS_DPS, losses, notes)).replace("\\", "/").replace('"', "'")
     data = pprint.pformat(content, width=110, sort_dicts=False)
     text = OPENING.format(head=head, data=data) + body
     return Written(text.encode("utf-8"), losses, DIFFERS_DPS)
@@ -77,6 +91,13 @@ def _tables(calibration: Calibration) -> tuple[JsonObject | None, str]:
         "points": points, "node_c": nodes_c.tolist(), "k": k.tolist(), "b": b.tolist(), "k_squared": squared.tolist(),
         "steps": STEPS if sine is not None else 1, "followed": FOLLOWED,
     }, LINEAR_CORRECTION  # fmt: skip
+
+
+def _force_table(force: ForceSensitivity) -> JsonObject:
+    return {
+        "at_1_g_dps": force.at_1_g_dps.tolist(), "per_g": force.known_per_g.tolist(),
+        "per_g2": force.known_per_g2.tolist(), "not_measured": force.not_measured,
+    }  # fmt: skip
 
 
 def _limit(value: float) -> float | None:

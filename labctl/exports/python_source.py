@@ -141,3 +141,38 @@ def _eliminated(rows):
         found[r] = (rows[r][n] - sum(rows[r][c] * found[c] for c in range(r + 1, n))) / rows[r][r]
     return found
 '''
+
+FORCE_CORRECTION = '''
+
+def force_errors(specific_force_g):
+    """Return what specific force adds to each output, deg/s: per_g . force + per_g2 * (force along the axis)^2.
+
+    specific_force_g: g along body axes x, y, z, +1 along an axis that points up at rest.
+    """
+    known = CALIBRATION["specific_force"]
+    force = [float(value) for value in specific_force_g]
+    if len(force) != 3:
+        raise ValueError("give the specific force in g along body axes x, y and z")
+    if not all(math.isfinite(value) for value in force):
+        return [math.nan for _ in CALIBRATION["axes"]]
+    owns = [force["xyz".index(axis)] for axis in CALIBRATION["axes"]]
+    return [
+        sum(each * value for each, value in zip(row, force)) + square * own * own
+        for row, square, own in zip(known["per_g"], known["per_g2"], owns)
+    ]
+
+
+def correct_with_force(outputs_dps, temperature_c, specific_force_g):
+    """Return the same as correct, with g-sensitivity corrected."""
+    errors, outputs = force_errors(specific_force_g), [float(value) for value in outputs_dps]
+    if len(outputs) != len(errors):
+        raise ValueError("give one output for each axis: " + ", ".join(CALIBRATION["axes"]))
+'''
+
+BEFORE_CORRECTION = """    return correct([output - error for output, error in zip(outputs, errors)], temperature_c)
+"""
+
+AFTER_CORRECTION = """    known = [output if error == error else error for output, error in zip(outputs, errors)]
+    rates, is_outside = correct(known, temperature_c)
+    return [rate - error for rate, error in zip(rates, errors)], is_outside
+"""

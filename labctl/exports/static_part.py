@@ -9,10 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from labctl.calibration import Calibration
-from labctl.compensator import correction
 from labctl.errors import BadInput
+from labctl.exports.force_text import force_losses
 from labctl.exports.format import Loss
+from labctl.fitting.models.correction import correction
 from labctl.fitting.models.memory import Memory, split_memory
+from labctl.fitting.models.temperature import LagrangeTable
 from labctl.fitting.numeric.arrays import Array
 
 #: Points of a range at which a difference is looked for.
@@ -46,6 +48,12 @@ class StaticPart:
         """Return n temperatures from end to end, (n,) deg C; raises BadInput where none was calibrated."""
         return np.linspace(*self.calibration.temperature_c, n)
 
+    def with_kinks(self, temperature_c: Array) -> Array:
+        """Return rising temperatures with those at which a table over temperature bends: a difference peaks there."""
+        basis, (low, high) = self.calibration.fitted.model.temperature, self.calibration.temperature_c
+        nodes = np.array(basis.nodes_c if isinstance(basis, LagrangeTable) else [])
+        return np.union1d(temperature_c, nodes[(nodes > low) & (nodes < high)])
+
     def outputs(self, n: int = RATES) -> Array:
         """Return n outputs of one axis from end to end of the calibrated rates, (n,) deg/s; one, 0, without rates."""
         return np.linspace(*self.calibration.rate_dps, n) if self.has_rates else np.zeros(1)
@@ -67,6 +75,10 @@ class StaticPart:
     def memory_losses(self) -> tuple[Loss, ...]:
         """Return what is lost where lag and hysteresis are not carried."""
         return follower_losses(self.memory)
+
+    def losses(self) -> tuple[Loss, ...]:
+        """Return what is lost where a format knows output and temperature alone."""
+        return (*self.memory_losses(), *force_losses(self.calibration))
 
 
 def follower_losses(memory: Memory | None) -> tuple[Loss, ...]:
@@ -128,15 +140,16 @@ def differences(part: StaticPart, formula: Callable[[Array, Array], Array]) -> D
     through a matrix, and is evaluated in the corners of the range for the others.
     """
     axes = len(part.axes)
-    dense_c = part.temperatures(1 + 8 * (TEMPERATURES - 1))
+    dense_c = part.with_kinks(part.temperatures(1 + 8 * (TEMPERATURES - 1)))
     still = part.bias_dps(dense_c)
     at_rest = np.abs(formula(still, dense_c) - part.rate(still, dense_c)).max(axis=0)
-    warm = np.repeat(part.temperatures(), len(part.outputs()))
-    base = np.repeat(still[::8], len(part.outputs()), axis=0)
+    coarse_c = part.with_kinks(part.temperatures())
+    warm = np.repeat(coarse_c, len(part.outputs()))
+    base = np.repeat(part.bias_dps(coarse_c), len(part.outputs()), axis=0)
     apart = np.zeros((axes, axes))
     for turning in range(axes):
         raw = base.copy()
-        raw[:, turning] = np.tile(part.outputs(), TEMPERATURES)
+        raw[:, turning] = np.tile(part.outputs(), len(coarse_c))
         apart[:, turning] = np.abs(formula(raw, warm) - part.rate(raw, warm)).max(axis=0)
     own = np.maximum(np.diag(apart), at_rest)
     raw, warm = all_turning(part)

@@ -14,6 +14,7 @@ from labctl.json_types.models import (
     FitEnvironment,
     FittedModelJson,
     LeftOut,
+    SpecificForceJson,
     ValidityJson,
 )
 from labctl.json_types.poses import PosesJson
@@ -81,6 +82,7 @@ class CalibrationJson(TypedDict):
     coefficients: dict[str, Coefficients]
     papers: dict[str, object]
     left_out: list[LeftOut]
+    specific_force: NotRequired[SpecificForceJson]
     error: ErrorFiguresJson
     noise: dict[str, AxisNoiseJson]
     environment: FitEnvironment

@@ -97,6 +97,20 @@ Entry = Coefficient | CoefficientTable | list[float]
 Coefficients = dict[str, Entry]
 
 
+class SpecificForceJson(TypedDict):
+    """Sensitivity to specific force, for a consumer that has an accelerometer.
+
+    Output axis -> name -> coefficient: `g_own`, `g_x` ... of the force in g along the axis itself and along another
+    body axis, `g_own_squared` of its square. At rest the force is +1 g along an axis that points up. `at_1_g_dps`: the
+    largest error of each axis by 1 g in any direction. `not_measured`: axis -> body axes that no force was along.
+    """
+
+    input: str
+    coefficients: dict[str, dict[str, Coefficient]]
+    at_1_g_dps: dict[str, float]
+    not_measured: dict[str, list[str]]
+
+
 class AxisCoefficients(TypedDict):
     """The coefficients of one output axis, by name."""
 
@@ -167,7 +181,11 @@ class FitResultJson(TypedDict):
 
 
 class LeftOut(TypedDict):
-    """An effect of a fit that is not exported with its calibration, because it does not belong to the unit."""
+    """An effect of a fit that no correction by output and temperature contains.
+
+    It does not belong to the unit, or its input is known on the bench only; `specific_force` of a file has those for
+    which a consumer needs an accelerometer.
+    """
 
     effect: str
     origin: Origin

@@ -169,7 +169,9 @@ def compensate(
     source: Annotated[
         Path,
         typer.Argument(
-            metavar="IN", help="File of samples to correct: CSV or Parquet with columns gyro_x ... and temperature_c."
+            metavar="IN",
+            help="File of samples to correct: CSV or Parquet with columns gyro_x ... and temperature_c, "
+            "and accel_x_g ... where g-sensitivity is to be corrected.",
         ),
     ],
     target: Annotated[
@@ -202,6 +204,8 @@ def compensate(
     if answer.warning:
         stderr.print(f"labctl: {answer.warning}", style="bold red", markup=False)
     console.print(f"{answer.rows} readings -> {target}", markup=False)
+    if answer.left_out:
+        console.print(answer.left_out, style="yellow", markup=False)
     if answer.outside:
         console.print(
             f"{answer.outside} rows lie outside the calibrated range and are flagged in column `outside`",

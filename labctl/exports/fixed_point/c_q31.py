@@ -9,6 +9,7 @@ import numpy as np
 from labctl.calibration import Calibration
 from labctl.exports.c_header import GUARD_DIGITS, c_name
 from labctl.exports.comments import head_lines
+from labctl.exports.fixed_point.force import FixedForce, fixed_force
 from labctl.exports.fixed_point.whole_numbers import POSITION_BITS, RECIPROCAL_BITS, FixedPoint, fixed_point
 from labctl.exports.format import Format, Written
 from labctl.exports.options import whole_number
@@ -72,7 +73,7 @@ static inline int {name}_q31_correct(const int32_t *w, int32_t temperature_q16, 
     }}
     return outside;
 }}
-
+{force}
 #endif
 """
 
@@ -85,12 +86,16 @@ def write(calibration: Calibration, options: Mapping[str, str]) -> Written:
     part = static_part(calibration, NAME, carries="the table of this format depends on output and temperature only")
     nodes = whole_number(options, "temperatures", (2, MOST_NODES), NODES, NAME)
     fixed = fixed_point(part, nodes, NAME)
-    differs = largest_difference(part, fixed)
+    force = None
+    if calibration.force_sensitivity is not None:
+        is_direct = calibration.fitted.model.argument == "output"
+        force = fixed_force(fixed, calibration.force_sensitivity, NAME, is_direct=is_direct)
+    differs = largest_difference(part, fixed) + (force.rounding_dps() if force is not None else 0.0)
     losses = part.memory_losses()
     bytes_ = 4 * fixed.tables.size
     head = head_lines(calibration, f"the whole correction of output and temperature, in {bytes_} bytes of tables",
                       differs, losses)  # fmt: skip
-    return Written(_source(calibration, fixed, head).encode("ascii"), losses, differs)
+    return Written(_source(calibration, fixed, force, head).encode("ascii"), losses, differs)
 
 
 def largest_difference(part: StaticPart, fixed: FixedPoint) -> float:
@@ -101,7 +106,7 @@ def largest_difference(part: StaticPart, fixed: FixedPoint) -> float:
     between = np.clip(
         np.linspace(fixed.low_q16, fixed.high_q16, 2 * nodes - 1) / 2.0**16, *part.calibration.temperature_c
     )
-    warm = np.union1d(warm, between)
+    warm = part.with_kinks(np.union1d(warm, between))
     apart = np.zeros((axes, axes))
     outputs = part.outputs(OUTPUTS)
     still = np.zeros((len(warm), axes))
@@ -119,7 +124,7 @@ def _apart(part: StaticPart, fixed: FixedPoint, raw: Array, warm: Array) -> Arra
     return fixed.rate_dps(raw, warm) - part.rate(raw, warm)
 
 
-def _source(calibration: Calibration, fixed: FixedPoint, head: list[str]) -> str:
+def _source(calibration: Calibration, fixed: FixedPoint, force: FixedForce | None, head: list[str]) -> str:
     name = c_name(calibration.serial)
     axes, _, terms, nodes = fixed.tables.shape
     shift = fixed.shift
@@ -131,6 +136,7 @@ def _source(calibration: Calibration, fixed: FixedPoint, head: list[str]) -> str
         low=fixed.low_q16, high=fixed.high_q16, coldest=fixed.inside_q16[0], warmest=fixed.inside_q16[1],
         slowest=fixed.outputs_q31[0], fastest=fixed.outputs_q31[1], reciprocal=fixed.reciprocal,
         reciprocal_bits=RECIPROCAL_BITS, position_bits=POSITION_BITS,
+        force="" if force is None else force.source(name),
         rounded="error" if shift == 0 else f"((error + INT64_C({1 << (shift - 1)})) >> {shift})",
     )  # fmt: skip
 

@@ -82,6 +82,12 @@ class FixedPoint:
         unit_dps = self.full_scale_dps / 2.0**Q31
         return float(steepest * unit_dps / 2**self.shift / 2 ** (Q16 + 1)) + 2 * unit_dps
 
+    @property
+    def steepest(self) -> float:
+        """How much the error of an axis can change for each deg/s that all outputs change by: a bound."""
+        powers = np.arange(self.tables.shape[2])[None, None, :, None]
+        return float((np.abs(self.tables) * powers).max(axis=-1).sum(axis=(1, 2)).max() / 2.0 ** (Q31 + self.shift))
+
     def as_q31(self, rate_dps: Array) -> Whole:
         """Return rates in Q31 of the full scale."""
         return np.clip(np.rint(rate_dps * (2.0**Q31 / self.full_scale_dps)), -(2.0**Q31), MOST_Q31).astype(np.int64)

@@ -10,10 +10,11 @@ from numpy.polynomial import chebyshev, polynomial
 
 from labctl.calibration import Calibration
 from labctl.errors import BadInput
-from labctl.exports.format import Loss, at_most
+from labctl.exports.format import Loss
 from labctl.exports.options import number
 from labctl.exports.static_part import Differences, StaticPart, differences, needs_thermometer, static_part
 from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.numeric.rounding import at_most
 
 ORDER = 3
 #: Chebyshev nodes through which the cubic goes by least squares: nearly the best one for the largest error.
@@ -38,7 +39,7 @@ class BiasCubic:
     def losses(self, seen: Differences, consumer: str) -> tuple[Loss, ...]:
         """Return what a bias alone loses of the calibration."""
         if not self.part.has_rates:
-            return (Loss("scale factor and misalignment are not in this calibration"), *self.part.memory_losses())
+            return (Loss("scale factor and misalignment are not in this calibration"), *self.part.losses())
         slow, fast = self.part.calibration.rate_dps
         over = f"over {slow:g} to {fast:g} deg/s"
         return (
@@ -50,7 +51,7 @@ class BiasCubic:
                 f"misalignment, {over} of the other axes ({consumer} has no parameter for it)", float(seen.cross.max())
             ),
             Loss("both together, bias included", seen.together),
-            *self.part.memory_losses(),
+            *self.part.losses(),
         )
 
 

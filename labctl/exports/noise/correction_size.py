@@ -6,6 +6,7 @@ import numpy as np
 
 from labctl.calibration import Calibration
 from labctl.errors import BadInput
+from labctl.exports.force_text import force_losses
 from labctl.exports.format import Loss
 from labctl.exports.static_part import differences, static_part
 
@@ -14,9 +15,10 @@ def correction_losses(calibration: Calibration, why: str) -> tuple[Loss, ...]:
     """Return the whole correction as what is lost, with its size where it depends on output and temperature alone."""
     what = f"the correction of bias, scale factor and misalignment ({why})"
     if not np.isfinite(calibration.temperature_c).all():
-        return (Loss(what),)
+        return (Loss(what), *force_losses(calibration))
     try:
         part = static_part(calibration, "", carries="")
     except BadInput:
-        return (Loss(what),)
-    return (Loss(what, differences(part, lambda raw, _: raw).together),)
+        return (Loss(what), *force_losses(calibration))
+    size = differences(part, lambda raw, _: raw).together
+    return (Loss(what, size), *force_losses(calibration))

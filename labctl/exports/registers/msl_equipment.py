@@ -60,7 +60,7 @@ def write(calibration: Calibration, options: Mapping[str, str]) -> Written:
     n = whole_number(options, "temperatures", (2, MOST), TEMPERATURES, NAME)
     table = table_of(part, part.outputs(m), part.temperatures(n))
     differs = largest_difference(part, table)
-    losses = (Loss("the uncertainty of the correction"), *part.memory_losses())
+    losses = (Loss("the uncertainty of the correction"), *part.losses())
     head = head_lines(calibration, "the whole correction of output and temperature", differs, losses, [
         "Rate of a component = its Output - the sum over By axis of Error, linear between Output of By axis and",
         "between Temperature; outside the table hold both at its edge.",

@@ -16,7 +16,7 @@ GRAVITY = 9.80665
 
 class _Acceleration(Effect):
     origin: ClassVar[Origin] = "sensor"
-    in_use = False  # on the bench gravity is known from the position; a robot would need an accelerometer
+    in_use = False  # gravity is known from the position on the bench; in use `force_sensitivity` needs an accelerometer
     rows: ClassVar[Rows] = "all"
     shows_at_rest = True
 

@@ -13,6 +13,8 @@ LEAST_POWER, MOST_POWER = -4, 5
 MOST_DECIMALS = 12
 #: Significant digits of a value without an uncertainty.
 DIGITS = 4
+#: Digits of a bound that is said; it is rounded up.
+BOUND_DIGITS = 3
 
 
 @dataclass(frozen=True)
@@ -43,3 +45,11 @@ def rounded_to_uncertainty(value: float, uncertainty: float | None) -> Rounded:
     texts = [f"{round(number / 10.0**exponent / unit) * unit:.0f}" if place > 0 else
              f"{number / 10.0**exponent:.{decimals}f}" for number in (value, u)]  # fmt: skip
     return Rounded(texts[0], texts[1], exponent)
+
+
+def at_most(size: float) -> float:
+    """Return a size rounded up to three digits, so that it stays a bound."""
+    if size <= 0 or not math.isfinite(size):
+        return size
+    step = 10.0 ** (math.floor(math.log10(size)) + 1 - BOUND_DIGITS)
+    return float(f"{math.ceil(size / step * (1 - 1e-12)) * step:.{BOUND_DIGITS}g}")

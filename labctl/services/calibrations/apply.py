@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ import pyarrow.parquet as pq
 from labctl.certification import CalibrationWarning
 from labctl.compensator import Compensator
 from labctl.errors import BadInput
+from labctl.fitting.data.channels import BODY_AXES
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording.data_files import read_table
 from labctl.recording.recording import Column
@@ -41,10 +43,12 @@ def compensate_file(calibration: Path, source: Path, target: Path, outside: str)
                 f"{source}: column {name!r} is missing; add it (the calibration has axes {compensator.axes})"
             )
     raw = np.column_stack([_floats(columns[f"gyro_{axis}"]) for axis in compensator.axes])
+    force_g, left_out = _specific_force(compensator, columns)
     corrected = compensator.compensate_output(
         raw,
         _floats(columns["temperature_c"]) if thermometer else None,
         {name: _floats(columns[name]) for name in compensator.needs},
+        specific_force_g=force_g,
     )
     for index, axis in enumerate(compensator.axes):
         columns[f"rate_{axis}_dps"] = corrected.rate_dps[:, index]
@@ -55,8 +59,25 @@ def compensate_file(calibration: Path, source: Path, target: Path, outside: str)
     else:
         pacsv.write_csv(table, target)
     return CompensationResponse(
-        rows=len(raw), outside=int(corrected.outside.sum()), file=str(target), warning=compensator.warning
-    )
+        rows=len(raw), outside=int(corrected.outside.sum()), file=str(target), warning=compensator.warning,
+        left_out=left_out,
+    )  # fmt: skip
+
+
+def _specific_force(compensator: Compensator, columns: Mapping[str, Column]) -> tuple[Array | None, str]:
+    """Return forces (n, 3) g of a file, None without them, and what is therefore not corrected; empty: nothing.
+
+    A column that no coefficient needs may be missing.
+    """
+    force = compensator.force_sensitivity
+    if force is None:
+        return None, ""
+    lacking = [f"accel_{axis}_g" for axis in force.needs if f"accel_{axis}_g" not in columns]
+    if lacking:
+        return None, f"column {', '.join(lacking)} is missing: {force.sentence()}"
+    n = len(next(iter(columns.values())))
+    found = [_floats(columns[f"accel_{axis}_g"]) if axis in force.needs else np.zeros(n) for axis in BODY_AXES]
+    return np.column_stack(found), ""
 
 
 def _floats(column: Column) -> Array:

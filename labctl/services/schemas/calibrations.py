@@ -305,3 +305,8 @@ class CompensationResponse(ResponseModel):
     warning: str = Field(
         default="", description="Warning that the calibration is overdue or was revoked; empty: neither."
     )
+    left_out: str = Field(
+        default="",
+        description="Effects that were not corrected because the file has no columns of specific force, with their size "
+        "in deg/s; empty: none.",
+    )

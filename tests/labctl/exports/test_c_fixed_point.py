@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import shutil
-import subprocess
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -13,38 +12,16 @@ from labctl.calibration import Calibration
 from labctl.compensator import Compensator
 from labctl.exports import export_calibration
 from labctl.exports.c_header import c_name
+from labctl.exports.fixed_point.force import fixed_force
 from labctl.exports.fixed_point.whole_numbers import fixed_point
 from labctl.exports.static_part import static_part
+from labctl.recording import Recording
+from tests.helpers.c_fixed_point import compiled
+from tests.helpers.calibrations import calibrated, with_force
 from tests.helpers.cortex_m import INSTRUCTIONS_PER_TICK, TICKS, on_cortex_m
 from tests.helpers.exported import exported, stated, whole_range
 
-STRICT = ["-std=c99", "-O1", "-Wall", "-Wextra", "-pedantic", "-Wconversion", "-Werror"]
-MAIN = """
-#include <stdio.h>
-#include "calibration.h"
-int main(void) {{
-    int32_t w[{axes}], rate[{axes}]; int t, a, in;
-    while (scanf("%d", &t) == 1) {{
-        for (a = 0; a < {axes}; a++) {{ if (scanf("%d", &in) != 1) return 1; w[a] = in; }}
-        printf("%d", {name}_q31_correct(w, t, rate));
-        for (a = 0; a < {axes}; a++) printf(" %d", (int)rate[a]);
-        printf("\\n");
-    }}
-    return 0;
-}}
-"""
-
-
-def compiled(folder: Path, calibration: Calibration, rows: np.ndarray) -> np.ndarray:
-    """Return flag and rates, (n, 1 + axes), of rows of temperature and outputs in whole numbers."""
-    compiler = shutil.which("cc")
-    assert compiler is not None
-    (folder / "calibration.h").write_bytes(export_calibration(calibration.to_bytes(), "c-q31")[0])
-    (folder / "main.c").write_text(MAIN.format(axes=len(calibration.axes), name=c_name(calibration.serial)))
-    subprocess.run([compiler, *STRICT, "main.c", "-o", "main"], cwd=folder, check=True, capture_output=True)
-    given = "\n".join(" ".join(map(str, row)) for row in rows.tolist())
-    said = subprocess.run([folder / "main"], input=given, text=True, check=True, capture_output=True).stdout
-    return np.array([[int(word) for word in line.split()] for line in said.splitlines()])
+Grid = tuple[np.ndarray, np.ndarray]
 
 
 @pytest.mark.needs_cc
@@ -80,25 +57,35 @@ ON_ARM = """
 #define LABCTL_REAL float
 #include "float.h"
 #include "q31.h"
-static const int32_t in[{n}][{axes} + 1] = {{{rows}}};
-static float real[{n}][{axes}], hot[{n}], real_rate[{n}][{axes}];
-static int32_t rate[{n}][{axes}];
+static const int32_t in[{n}][{axes} + 4] = {{{rows}}};
+static float real[{n}][{axes}], hot[{n}], force[{n}][3], real_rate[2][{n}][{axes}];
+static int32_t rate[2][{n}][{axes}];
 int main(void) {{
-    uint32_t begun, took[2]; int i, a, flags = 0;
+    uint32_t begun, took[4]; int i, a, flags = 0;
     for (i = 0; i < {n}; i++) {{
         hot[i] = (float)in[i][0] / 65536.0f;
+        for (a = 0; a < 3; a++) force[i][a] = (float)in[i][{axes} + 1 + a] / 65536.0f;
         for (a = 0; a < {axes}; a++) real[i][a] = (float)in[i][a + 1] * {scale:.9g}f;
     }}
     ticks_begin();
     begun = ticks();
-    for (i = 0; i < {n}; i++) flags += {name}_q31_correct(in[i] + 1, in[i][0], rate[i]);
+    for (i = 0; i < {n}; i++) flags += {name}_q31_correct(in[i] + 1, in[i][0], rate[0][i]);
     took[0] = ticks() - begun;
     begun = ticks();
-    for (i = 0; i < {n}; i++) flags += {name}_correct(real[i], hot[i], real_rate[i]);
+    for (i = 0; i < {n}; i++) flags += {name}_correct(real[i], hot[i], real_rate[0][i]);
     took[1] = ticks() - begun;
-    printf("ticks %u %u %d\\n", (unsigned)took[0], (unsigned)took[1], flags);
-    for (i = 0; i < {n}; i++) for (a = 0; a < {axes}; a++)
-        printf("%d %.9g\\n", (int)rate[i][a], (double)real_rate[i][a]);
+    begun = ticks();
+    for (i = 0; i < {n}; i++)
+        flags += {name}_q31_correct_with_force(in[i] + 1, in[i][0], in[i] + {axes} + 1, rate[1][i]);
+    took[2] = ticks() - begun;
+    begun = ticks();
+    for (i = 0; i < {n}; i++) flags += {name}_correct_with_force(real[i], hot[i], force[i], real_rate[1][i]);
+    took[3] = ticks() - begun;
+    printf("ticks");
+    for (a = 0; a < 4; a++) printf(" %u", (unsigned)took[a]);
+    printf(" %d\\n", flags);
+    for (a = 0; a < 2 * {n} * {axes}; a++)
+        printf("%d %.9g\\n", (int)(&rate[0][0][0])[a], (double)(&real_rate[0][0][0])[a]);
     return 0;
 }}
 """
@@ -108,22 +95,46 @@ SAMPLES = 40
 @pytest.mark.needs_cortex_m
 @pytest.mark.parametrize("which", ["fog", "mems"])
 def test_a_cortex_m4_computes_the_same(request: pytest.FixtureRequest, tmp_path: Path, which: str) -> None:
-    calibration: Calibration = request.getfixturevalue(which)
+    plain: Calibration = request.getfixturevalue(which)
+    axes, rng = len(plain.axes), np.random.default_rng(4)
+    calibration = with_force(plain, rng.normal(0, 0.03, (axes, 3)), rng.normal(0, 0.003, axes))
     for name, file in (("c", "float.h"), ("c-q31", "q31.h")):
         (tmp_path / file).write_bytes(export_calibration(calibration.to_bytes(), name)[0])
     fixed = fixed_point(static_part(calibration, "c-q31", carries=""), 65, "c-q31")
     raw, warm = (values[-SAMPLES:] for values in whole_range(calibration))
-    inputs, hot = fixed.as_q31(raw), np.rint(warm * 65536).astype(np.int64)
-    rows = ", ".join("{" + ", ".join(map(str, row)) + "}" for row in np.column_stack([hot, inputs]).tolist())
+    raw, pull = 0.9 * raw, rng.uniform(-16, 16, (SAMPLES, 3))
+    inputs, hot, force = fixed.as_q31(raw), *(np.rint(each * 65536).astype(np.int64) for each in (warm, pull))
+    rows = ", ".join("{" + ", ".join(map(str, row)) + "}" for row in np.column_stack([hot, inputs, force]).tolist())
     source = ON_ARM.format(ticks=TICKS, n=SAMPLES, axes=raw.shape[1], rows=rows, name=c_name(calibration.serial),
                            scale=fixed.full_scale_dps / 2**31)  # fmt: skip
     (tmp_path / "main.c").write_text(source)
     lines = on_cortex_m(tmp_path).splitlines()
-    found = np.array([[float(word) for word in line.split()] for line in lines[1:]]).reshape(SAMPLES, -1, 2)
-    assert np.array_equal(found[:, :, 0], fixed.corrected(inputs, hot)[0])
-    expected = Compensator(calibration).compensate(raw, warm).rate_dps
-    assert np.abs(found[:, :, 1] - expected).max() < 2e-3
-    whole, single, flags = (int(word) for word in lines[0].split()[1:])
+    found = np.array([[float(word) for word in line.split()] for line in lines[1:]]).reshape(2, SAMPLES, -1, 2)
+    assert calibration.force_sensitivity is not None
+    is_direct = calibration.fitted.model.argument == "output"
+    forced = fixed_force(fixed, calibration.force_sensitivity, "c-q31", is_direct=is_direct)
+    assert np.array_equal(found[0, :, :, 0], fixed.corrected(inputs, hot)[0])
+    assert np.array_equal(found[1, :, :, 0], forced.corrected(inputs, hot, force)[0])
+    compensator = Compensator(calibration)
+    assert np.abs(found[0, :, :, 1] - compensator.compensate(raw, warm).rate_dps).max() < 2e-3
+    by_force = compensator.compensate(raw, warm, specific_force_g=pull).rate_dps
+    assert np.abs(found[1, :, :, 1] - by_force).max() < 2e-3
+    *ticks, flags = (int(word) for word in lines[0].split()[1:])
     assert flags == 0
-    instructions = [INSTRUCTIONS_PER_TICK * count / SAMPLES for count in (whole, single)]
+    instructions = [INSTRUCTIONS_PER_TICK * count / SAMPLES for count in ticks]
     assert all(20 < each < 20_000 for each in instructions), instructions
+
+
+def test_the_stated_difference_holds_where_a_table_over_temperature_bends(
+    make_points: Callable[..., Recording], grid_11_by_11: Grid
+) -> None:
+    rate, even = grid_11_by_11
+    warm = 25 + 20 * ((even - 25) / 20) ** 1.3
+    zigzag = np.where(np.arange(121) // 11 % 2, 0.3, -0.3)  # another slope between every two temperatures
+    bent = calibrated(make_points(rate, warm, rate * 1.01 + zigzag), "weiss1995")
+    _, written = exported(bent, "c-q31", temperatures="129")
+    fixed = fixed_point(static_part(bent, "c-q31", carries=""), 129, "c-q31")
+    dense = np.linspace(*bent.temperature_c, 20_001)
+    raw = np.full((len(dense), 1), 50.0)
+    apart = fixed.rate_dps(raw, dense) - Compensator(bent).compensate(raw, dense).rate_dps
+    assert np.abs(apart).max() <= (written.differs_dps or 0.0)

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from labctl.compensator import correction
 from labctl.fitting import FittedModel, fit
 from labctl.fitting.criticism import criticise
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.effects import Term
 from labctl.fitting.estimation.result import FitResult
+from labctl.fitting.models.correction import correction
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.fitted_model import AxisFit
 from labctl.fitting.models.sine_form import sine_form_of

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from labctl.exports.c_tables import c_table
+from labctl.exports.c_code.tables import c_table
 from labctl.fitting.models.memory import Memory
 from labctl.fitting.numeric.arrays import Array
 

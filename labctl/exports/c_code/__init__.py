@@ -1,0 +1,1 @@
+"""The parts of a C header: what is evaluated, what remembers, and how far rounding goes."""

@@ -1,0 +1,42 @@
+"""A fitted model as a function of outputs and temperatures, in its fastest exact form."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from labctl.fitting.data.channels import Channels
+from labctl.fitting.models.fitted_model import FittedModel
+from labctl.fitting.models.matrix_form import Linear, linear_of
+from labctl.fitting.models.polynomial_surface import Surface, surface_of
+from labctl.fitting.models.sine_form import sine_form_of
+from labctl.fitting.numeric.arrays import Array
+
+Correct = Callable[[Array, Array, Mapping[str, Array]], Array]
+
+
+def correction(fitted: FittedModel, axes: tuple[str, ...]) -> Correct:
+    """Return the fastest exact way to apply a model: (rates (n, axes), temperatures) -> rates (n, axes)."""
+    surface: Surface | None = surface_of(fitted, axes)
+    if surface is not None:
+        return lambda raw, warm, _: surface.correct(raw, warm)
+    linear: Linear | None = linear_of(fitted, axes)
+    if linear is not None:
+        return lambda raw, warm, _: linear.correct(raw, warm)
+
+    sine = sine_form_of(fitted, axes)
+    if sine is not None:
+        return lambda raw, warm, _: sine.correct(raw, warm)
+
+    def general(raw: Array, temperature_c: Array, channels: Mapping[str, Array]) -> Array:
+        n = len(raw)
+        warm = np.broadcast_to(temperature_c, (n,)) if temperature_c.ndim < 2 else temperature_c.mean(axis=1)
+        columns: dict[str, Array] = {"temperature_c": warm, **channels}
+        if temperature_c.ndim == 2:
+            columns |= {f"temperature_{axis}_c": temperature_c[:, i] for i, axis in enumerate(axes)}
+        outputs = {axis: raw[:, i] for i, axis in enumerate(axes)}
+        corrected = fitted.compensate(outputs, Channels(columns, outputs))
+        return np.column_stack([corrected[axis] for axis in axes])
+
+    return general
