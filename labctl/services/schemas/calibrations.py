@@ -307,6 +307,6 @@ class CompensationResponse(ResponseModel):
     )
     left_out: str = Field(
         default="",
-        description="Effects that were not corrected because the file has no columns of specific force, with their size "
-        "in deg/s; empty: none.",
+        description="Effects that were not corrected because the file has no columns of specific force, with their "
+        "size in deg/s; empty: none.",
     )

@@ -4653,7 +4653,10 @@ export interface components {
         };
         /**
          * LeftOut
-         * @description An effect of a fit that is not exported with its calibration, because it does not belong to the unit.
+         * @description An effect of a fit that no correction by output and temperature contains.
+         *
+         *     It does not belong to the unit, or its input is known on the bench only; `specific_force` of a file has those for
+         *     which a consumer needs an accelerometer.
          */
         LeftOut: {
             /** Effect */
