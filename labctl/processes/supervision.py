@@ -45,7 +45,8 @@ class Supervision:
                 own = self._settings
                 raise Conflict(
                     f"a bench process that outlived its service drives bench {own.bench} at speed {own.speed:g} and "
-                    "holds this database; start the service with the same --bench and --speed, or stop that process"
+                    "holds this database; start the service with the same --bench, --speed and --simulated-start, or "
+                    "stop that process"
                 )
             self._line = line
         self._settings = wanted

@@ -10,7 +10,7 @@ import typer
 
 from labctl.cli.command_log import log_of_command
 from labctl.cli.error_reporting import one_clear_line
-from labctl.cli.options import BenchName, Database, Json
+from labctl.cli.options import BenchName, Database, Json, SimulatedStart, simulated_start
 from labctl.cli.output import console, print_json, stderr
 
 
@@ -21,6 +21,7 @@ def serve(
         float,
         typer.Option("--speed", metavar="X", help="Simulated bench: X times real time; 0: as fast as possible."),
     ] = 1.0,
+    simulated_from: SimulatedStart = None,
     host: Annotated[str, typer.Option("--host", metavar="ADDRESS", help="Address to listen on.")] = "127.0.0.1",
     port: Annotated[int, typer.Option("--port", metavar="N", help="TCP port; 0 chooses a free port.")] = 8420,
     require_keys: Annotated[
@@ -42,8 +43,10 @@ def serve(
     from labctl.processes.supervisor import Ready, serve_forever
     from labctl.services.schemas.service import ServiceReady
 
+    with one_clear_line():
+        start_at = simulated_start(simulated_from)
     request = ServeRequest(
-        bench=bench, simulate=simulate, speed=speed, host=host, port=port, database=database,
+        bench=bench, simulate=simulate, speed=speed, simulated_start=start_at, host=host, port=port, database=database,
         require_keys=require_keys, max_upload_mib=max_upload_mib,
     )  # fmt: skip
 
@@ -55,6 +58,8 @@ def serve(
             print_json(said, one_line=True)
             return
         console.print(f"labctl listens on {service.url}  (HTTP interface: {service.url}/api-docs)", markup=False)
+        if start_at is not None:
+            console.print(f"the date of this service is simulated: {start_at:%Y-%m-%d %H:%M} UTC", markup=False)
         for text in filter(None, (unconfirmed, cut_short)):
             console.print(text, style="yellow", markup=False, soft_wrap=True)
 

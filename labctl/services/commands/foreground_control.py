@@ -56,7 +56,7 @@ class ForegroundControl:
         """Run a campaign in this process until it is over."""
         request = StartRequest(
             recipe=asked.body.recipe, bench=asked.bench, clip=asked.body.clip, hide=asked.body.hide, fit=asked.body.fit,
-            speed=asked.speed, seed=asked.seed,
+            speed=asked.speed, seed=asked.seed, simulated_start=asked.simulated_start,
             confirmed_by=asked.body.confirmed_by, checks=asked.body.checks,
         )  # fmt: skip
         with self._open_terminal() as terminal:
@@ -74,12 +74,15 @@ class ForegroundControl:
                 return answer
             from labctl.services.drafts.make import make_drafts  # noqa: PLC0415  it loads the libraries of the fit
 
-            make_drafts(store, answer.id, DraftsRequest(), SystemClock().utc())
+            now = SystemClock().utc()
+            at = max(now, answer.ended_at or now)  # a simulated campaign may end in another year
+            make_drafts(store, answer.id, DraftsRequest(), at)
             return with_drafts(store, answer)
 
     def schedule(self, context: CommandContext, asked: CampaignStart) -> ScheduledResponse:
         """Enter a campaign into the schedule of a bench; a service that holds this bench and database starts it."""
-        for option, value in (("--speed", asked.speed), ("--seed", asked.seed)):
+        options = {"--speed": asked.speed, "--seed": asked.seed, "--simulated-start": asked.simulated_start}
+        for option, value in options.items():
             if value is not None:
                 raise BadInput(
                     f"{option} {value}: the service that runs a scheduled start sets it; leave the option out"

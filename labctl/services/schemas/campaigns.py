@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Literal, get_args
 
-from pydantic import Field
+from pydantic import AwareDatetime, Field
 
 from labctl.services.schemas.base import Request, ResponseModel
 from labctl.services.schemas.plans import RecipeSource
@@ -91,6 +91,11 @@ class StartRequest(Request):
         description="Speed of a simulated bench, as a multiple of real time; default: as fast as possible.",
     )
     seed: int | None = Field(default=None, ge=0, description="Seed of the random numbers of a simulated bench.")
+    simulated_start: AwareDatetime | None = Field(
+        default=None,
+        description="Instant at which the time of a simulated bench begins; default: 2026-01-05 08:00 UTC, with "
+        "`speed` the present.",
+    )
     confirmed_by: str = Field(default="", max_length=200, description="Same as in `POST /api/campaigns`.")
     checks: list[BenchCheck] = Field(default_factory=list, description="Same as in `POST /api/campaigns`.")
 
