@@ -217,5 +217,7 @@ def make_unit(driver: str, axes: tuple[str, ...], settings: Mapping[str, object]
     }
     for name in given:
         if name not in known:
-            raise ValueError(f"simulated unit has no setting {name!r} (there are {', '.join(sorted({*known, 'ageing'}))})")
+            raise ValueError(
+                f"simulated unit has no setting {name!r} (there are {', '.join(sorted({*known, 'ageing'}))})"
+            )
     return UnitTruth(**{**made.__dict__, **given, "ageing": ageing})

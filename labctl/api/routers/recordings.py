@@ -12,7 +12,7 @@ from labctl.api.computation import execute, while_connected, with_files
 from labctl.api.dependencies import ServiceDep, command_route
 from labctl.recording.column_map.templates import template
 from labctl.recording.info import Motion
-from labctl.services.calibrations.orientation import OrientationOptions, orientation_of_recording
+from labctl.services.calibrations.orientation import orientation_of_recording
 from labctl.services.commands.registry import IMPORT_EXAMPLE, IMPORT_LOG, IMPORT_RECORDING, SIMULATE_RECORDING
 from labctl.services.commands.requests import LogFile, RecordingFolder
 from labctl.services.recordings import catalogue
@@ -22,6 +22,7 @@ from labctl.services.recordings.log_preview import preview_log
 from labctl.services.recordings.traces import trace as trace_of
 from labctl.services.recordings.transfer import import_files, zip_recording
 from labctl.services.recordings.uploads import sent_map, with_staged
+from labctl.services.schemas.orientation import OrientationQuery
 from labctl.services.schemas.recordings import (
     AllanResponse,
     DataSetsResponse,
@@ -195,24 +196,11 @@ async def allan(
 
 @router.get("/{recording}/orientation", summary="Static bias and angle of a recording", tags=["calibrations"])
 async def orientation(
-    request: Request,
-    recording: int,
-    service: ServiceDep,
-    axis: Annotated[str | None, Query(description="x, y or z; default: the only one.", max_length=1)] = None,
-    version: Annotated[
-        int | None,
-        Query(ge=0, description="Calibration that corrects it; 0: none; default: the certified one, if any."),
-    ] = None,
-    rest_s: Annotated[
-        float, Query(ge=0, le=1e6, description="At rest so long at first: its static bias is taken off, s.")
-    ] = 0.0,
-    instability_dps: Annotated[float, Query(ge=0, le=1e6, description="Bias instability, for the uncertainty.")] = 0.0,
-    standstill: Annotated[bool, Query(description="Hold the angle and learn the offset at standstill.")] = True,
+    request: Request, recording: int, service: ServiceDep, asked: Annotated[OrientationQuery, Query()]
 ) -> OrientationResponse:
     """The angle of one axis from its rate: static bias taken off (Ojeda et al. 2000, eqs. 15 and 16), offset renewed
-    at standstill (Weiss)."""
-    options = OrientationOptions(axis, rest_s, instability_dps, standstill)
-    return await while_connected(request, service, orientation_of_recording, recording, version, options)
+    at standstill; of a record at rest, the drift between declared stops (Weiss)."""
+    return await while_connected(request, service, orientation_of_recording, recording, asked.version, asked)
 
 
 @router.get("/{recording}/file", summary="Download the recording", response_class=StreamingResponse)

@@ -95,11 +95,15 @@ def orientation(
 ) -> None:
     """Follow the angle of one axis: static bias off (Ojeda 2000, eqs. 15-16), offset renewed at standstill (Weiss)."""
     from labctl.errors import BadInput
-    from labctl.services.calibrations.orientation import OrientationOptions, orientation_of_file, orientation_of_unit
+    from labctl.services.calibrations.orientation import orientation_of_file, orientation_of_unit
     from labctl.services.commands.open import open_readonly
+    from labctl.services.schemas.orientation import OrientationOptions
 
-    options = OrientationOptions(axis, rest_s, instability_dps, standstill, warm_up_s, stop_every_s)
     with one_clear_line():
+        options = OrientationOptions(
+            axis=axis, rest_s=rest_s, instability_dps=instability_dps, standstill=standstill, warm_up_s=warm_up_s,
+            stop_every_s=stop_every_s,
+        )  # fmt: skip
         if Path(source).is_file():
             answer = orientation_of_file(Path(source), calibration, out, options)
         elif calibration is not None or out is not None:

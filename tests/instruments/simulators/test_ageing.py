@@ -51,7 +51,9 @@ def test_without_a_law_or_on_its_first_day_a_unit_is_as_its_profile() -> None:
 
 
 def test_a_campaign_keeps_the_day_as_text() -> None:
-    kept = BenchFile.model_validate(bench({"bias_dps_per_year": 0.5, "since": date(2024, 1, 5)}).model_dump(mode="json"))
+    kept = BenchFile.model_validate(
+        bench({"bias_dps_per_year": 0.5, "since": date(2024, 1, 5)}).model_dump(mode="json")
+    )
     found = open_simulation(kept, VirtualClock()).world.gyro("mems").truth.ageing
     assert found is not None
     assert found.since == datetime(2024, 1, 5, tzinfo=UTC)
