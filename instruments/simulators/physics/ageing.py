@@ -76,5 +76,5 @@ def _since(value: object) -> datetime:
         return VIRTUAL_START
     if not isinstance(day, date):
         raise ValueError(f"simulated unit: ageing.{SINCE} = {value!r} is not a date; write 2026-01-05")
-    moment = day if isinstance(day, datetime) else datetime(day.year, day.month, day.day)
+    moment = day if isinstance(day, datetime) else datetime(day.year, day.month, day.day, tzinfo=UTC)
     return moment.replace(tzinfo=UTC) if moment.tzinfo is None else moment.astimezone(UTC)

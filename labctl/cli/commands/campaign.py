@@ -80,7 +80,8 @@ Hide = Annotated[
     typer.Option(
         "--hide",
         metavar="EFFECT[=SIZE]",
-        help="Hide an effect in the units of a simulated bench; may be repeated; SIZE in the unit of the effect.",
+        help="Hide an effect in the units of a simulated bench; may be repeated; SIZE in the unit of the effect, or "
+        "z10 for a signal of ten standard deviations of the noise on this plan.",
     ),
 ]
 NoFit = Annotated[bool, typer.Option("--no-fit", help="Make no draft, whatever [fit] of the recipe says.")]

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 
+from instruments.bench_config import BenchFile
 from instruments.clock import SystemClock
 from labctl.errors import BadInput
 from labctl.services.benches.check import check_bench
@@ -52,6 +53,10 @@ class ForegroundControl:
         self._database = database
         self._open_terminal = open_terminal
 
+    def bench_of(self, asked: CampaignStart) -> BenchFile:
+        """Return the bench that a start names, or the shipped one that fits its recipe."""
+        return load_bench(asked.bench or bench_for(load_recipe(asked.body.recipe)))
+
     def start(self, _: CommandContext, asked: CampaignStart) -> CampaignResponse:
         """Run a campaign in this process until it is over."""
         request = StartRequest(
@@ -87,7 +92,7 @@ class ForegroundControl:
                 raise BadInput(
                     f"{option} {value}: the service that runs a scheduled start sets it; leave the option out"
                 )
-        bench = load_bench(asked.bench or bench_for(load_recipe(asked.body.recipe)))
+        bench = self.bench_of(asked)
         answer = queue.add_start(context.store, asked.body, bench, context.now())
         note = "; ".join(filter(None, (queue.NO_SERVICE.format(bench=bench.name), answer.note)))
         return answer.model_copy(update={"note": note})

@@ -41,8 +41,8 @@ class HttpExecutor:
             if address[name] is not None:
                 raise Conflict(
                     f"--{name.replace('_', '-')} {address[name]}: the service at {self._connection.url} holds this "
-                    "database and runs campaigns on its own bench at its own speed and date; leave the option out, stop "
-                    "the service, or name another --database"
+                    "database and runs campaigns on its own bench at its own speed and date; leave the option out, "
+                    "stop the service, or name another --database"
                 )
         newest = command.newest
         if newest is not None and address[newest.parameter] is None:

@@ -26,7 +26,7 @@ class CampaignRequest(Request):
         default_factory=list,
         max_length=20,
         description="Effects to hide in the units of a simulated bench, each as EFFECT or EFFECT=SIZE, SIZE in the "
-        "unit of the effect.",
+        "unit of the effect, or z10 for a signal of ten standard deviations of the noise on this plan.",
     )
     fit: bool = Field(
         default=True,
