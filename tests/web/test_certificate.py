@@ -1,4 +1,4 @@
-"""The certificate on the page of a unit: its dialog is filled in, what is missing is named, and the files are issued."""
+"""The certificate on the page of a unit: its dialog is filled in, what is missing is named, the files are issued."""
 
 from __future__ import annotations
 

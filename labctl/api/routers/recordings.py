@@ -22,14 +22,12 @@ from labctl.services.recordings.log_preview import preview_log
 from labctl.services.recordings.traces import trace as trace_of
 from labctl.services.recordings.transfer import import_files, zip_recording
 from labctl.services.recordings.uploads import sent_map, with_staged
-from labctl.services.schemas.orientation import OrientationQuery
 from labctl.services.schemas.recordings import (
     AllanResponse,
     DataSetsResponse,
     ExampleRequest,
     ImportResponse,
     LogPreview,
-    OrientationResponse,
     RecordingAlone,
     RecordingResponse,
     RecordingWithPoints,
@@ -38,6 +36,7 @@ from labctl.services.schemas.recordings import (
     SimulatedRequest,
     TraceResponse,
 )
+from labctl.services.schemas.reports.orientation import OrientationQuery, OrientationResponse
 
 MapField = Annotated[
     str,

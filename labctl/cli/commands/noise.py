@@ -13,7 +13,7 @@ from labctl.cli.output import console, format_number, print_json, stderr
 from labctl.cli.printing.noise import print_allan
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.recordings import OrientationResponse
+    from labctl.services.schemas.reports.orientation import OrientationResponse
 
 
 WarmUp = Annotated[
@@ -26,6 +26,9 @@ StopEvery = Annotated[
         metavar="S",
         help="Of a record at rest: declare a stop of 10 s every S seconds and motion between, and print the drift.",
     ),
+]
+Rest = Annotated[
+    float, typer.Option("--rest-s", metavar="S", min=0, help="At rest so long at first: take its static bias off.")
 ]
 
 
@@ -68,9 +71,7 @@ def orientation(
         str, typer.Argument(metavar="SERIAL|FILE", help="A unit, or a table of t_s, gyro_z ... and temperature_c.")
     ],
     axis: Annotated[str | None, typer.Option("--axis", help="x, y or z; default: the only one.")] = None,
-    rest_s: Annotated[
-        float, typer.Option("--rest-s", metavar="S", min=0, help="At rest so long at first: take its static bias off.")
-    ] = 0.0,
+    rest_s: Rest = 0.0,
     instability_dps: Annotated[
         float, typer.Option("--instability-dps", metavar="X", min=0, help="Bias instability, for the uncertainty.")
     ] = 0.0,
@@ -97,7 +98,7 @@ def orientation(
     from labctl.errors import BadInput
     from labctl.services.calibrations.orientation import orientation_of_file, orientation_of_unit
     from labctl.services.commands.open import open_readonly
-    from labctl.services.schemas.orientation import OrientationOptions
+    from labctl.services.schemas.reports.orientation import OrientationOptions
 
     with one_clear_line():
         options = OrientationOptions(

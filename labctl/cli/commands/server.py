@@ -13,6 +13,10 @@ from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import BenchName, Database, Json, SimulatedStart, simulated_start
 from labctl.cli.output import console, print_json, stderr
 
+MaxUpload = Annotated[
+    int, typer.Option("--max-upload-mib", metavar="N", help="Largest recording that may be sent, in MiB.")
+]
+
 
 def serve(
     bench: BenchName = None,
@@ -31,9 +35,7 @@ def serve(
             help="Require an API key on loopback (127.0.0.1) too; on other addresses a key is always required.",
         ),
     ] = False,
-    max_upload_mib: Annotated[
-        int, typer.Option("--max-upload-mib", metavar="N", help="Largest recording that may be sent, in MiB.")
-    ] = 2048,
+    max_upload_mib: MaxUpload = 2048,
     as_json: Json = False,
     database: Database = None,
 ) -> None:

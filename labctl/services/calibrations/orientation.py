@@ -25,8 +25,12 @@ from labctl.recording.info import Axis
 from labctl.recording.recording import Columns
 from labctl.services.calibrations.served import calibration_file
 from labctl.services.recordings.loading import newest_row
-from labctl.services.schemas.orientation import STOP_S, OrientationOptions
-from labctl.services.schemas.recordings import OrientationResponse, StaticBiasResponse
+from labctl.services.schemas.reports.orientation import (
+    STOP_S,
+    OrientationOptions,
+    OrientationResponse,
+    StaticBiasResponse,
+)
 from labctl.store import Store
 
 #: Points of a course that is sent.

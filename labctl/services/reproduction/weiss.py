@@ -15,8 +15,7 @@ from labctl.recording import OutputUnit, Recording
 from labctl.services.calibrations.orientation import orientation_of_readings
 from labctl.services.reproduction.findings import Findings, Missing, Value, panel, trace
 from labctl.services.reproduction.sources import Measured, measured_from, shipped, simulated_readings
-from labctl.services.schemas.orientation import OrientationOptions
-from labctl.services.schemas.recordings import OrientationResponse
+from labctl.services.schemas.reports.orientation import OrientationOptions, OrientationResponse
 
 BENCH = "gyrostar-sim"
 TABLE = "WEISS-ENV05S is the report's own table, shipped with labctl as coefficients: no readings were published."

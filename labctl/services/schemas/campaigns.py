@@ -91,11 +91,7 @@ class StartRequest(Request):
         description="Speed of a simulated bench, as a multiple of real time; default: as fast as possible.",
     )
     seed: int | None = Field(default=None, ge=0, description="Seed of the random numbers of a simulated bench.")
-    simulated_start: AwareDatetime | None = Field(
-        default=None,
-        description="Instant at which the time of a simulated bench begins; default: 2026-01-05 08:00 UTC, with "
-        "`speed` the present.",
-    )
+    simulated_start: AwareDatetime | None = Field(default=None, description="Begin of the time of a simulated bench.")
     confirmed_by: str = Field(default="", max_length=200, description="Same as in `POST /api/campaigns`.")
     checks: list[BenchCheck] = Field(default_factory=list, description="Same as in `POST /api/campaigns`.")
 

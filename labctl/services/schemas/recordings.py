@@ -202,37 +202,6 @@ class AllanResponse(ResponseModel):
     )
 
 
-class StaticBiasResponse(ResponseModel):
-    """The mean output at rest before a mission (Ojeda et al. 2000, eqs. 1, 15 and 16); it contains the Earth's rate."""
-
-    bias_dps: float
-    u_dps: float = Field(description="Standard uncertainty: white noise of the mean, and the bias instability.")
-    readings: int
-    seconds: float
-
-
-class OrientationResponse(ResponseModel):
-    """The angle of one axis, positive counter-clockwise and never wrapped, from its rate."""
-
-    axis: str
-    version: int | None = Field(description="Calibration that the rates were corrected by; null: none.")
-    readings: int
-    left_out: int = Field(description="Readings that were not valid, or no numbers.")
-    seconds: float
-    static_bias: StaticBiasResponse | None = Field(description="Taken off; null: no rest was named.")
-    angle_deg: float = Field(description="At the end; 0 at the end of the rest.")
-    drift_between_stops_deg_per_min: list[float] = Field(default_factory=list)  #: with declared stops, of each leg
-    drift_deg_per_min: float | None = Field(
-        description="Angle over time: the drift where the unit stood; null: no time."
-    )
-    offset_dps: float = Field(description="Taken off at the end: the static bias, or learned at standstill since.")
-    standing_s: float = Field(description="Time for which the unit counted as standing, its angle held.")
-    gap_s: float = Field(description="Time without readings, bridged in a straight line.")
-    t_s: list[float] = Field(description="Times of the course below, s.")
-    course_deg: list[float] = Field(description="The angle at these times, deg; at most 2000 points.")
-    warning: str = Field(default="", description="That the calibration is overdue or was revoked; empty: it is not.")
-
-
 class LogColumn(ResponseModel):
     """One column of a log."""
 
