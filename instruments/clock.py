@@ -37,18 +37,33 @@ def sleep_until(clock: Clock, t_s: float) -> None:
     clock.sleep(t_s - clock.now_s())
 
 
+#: When virtual time begins where no other instant is stated.
+VIRTUAL_START = datetime(2026, 1, 5, 8, 0, tzinfo=UTC)
+
+
+def _aware(start: datetime) -> datetime:
+    """Return an instant as UTC; raises ValueError for one without a time zone."""
+    if start.tzinfo is None:
+        raise ValueError("the start of a clock has no time zone; give one, such as UTC")
+    return start.astimezone(UTC)
+
+
 class ScaledClock:
-    """Wall time, `speed` times as fast; 1 for real instruments. Raises ValueError for a speed that is not positive."""
+    """Wall time, `speed` times as fast; 1 for real instruments.
+
+    `start` is the instant at which the clock of a simulation is made, default now. Raises ValueError for a speed that
+    is not positive, and for a start without a time zone.
+    """
 
     #: Least useful time-out of a client library, s of real time, at every speed.
     MIN_WALL_TIMEOUT_S = 0.05
 
-    def __init__(self, speed: float = 1.0, *, now_s: float = 0.0) -> None:
+    def __init__(self, speed: float = 1.0, *, now_s: float = 0.0, start: datetime | None = None) -> None:
         if not speed > 0:
             raise ValueError(f"the speed of a clock is {speed}; give a number above 0 (1 is real time)")
         self.speed = speed
         self._wall_start_s = time.monotonic() - now_s / speed
-        self._utc_start = datetime.now(UTC) - timedelta(seconds=now_s)
+        self._utc_start = (datetime.now(UTC) if start is None else _aware(start)) - timedelta(seconds=now_s)
 
     def now_s(self) -> float:
         return (time.monotonic() - self._wall_start_s) * self.speed
@@ -72,10 +87,17 @@ class SystemClock(ScaledClock):
 
 
 class WallClock(SystemClock):
-    """Wall time whose `utc` follows changes of the system clock: for scheduled starts, not for measurements."""
+    """Wall time whose `utc` follows changes of the system clock: for scheduled starts, not for measurements.
+
+    `ahead` is added to it, in a service that simulates another date.
+    """
+
+    def __init__(self, ahead: timedelta = timedelta()) -> None:
+        super().__init__()
+        self._ahead = ahead
 
     def utc(self) -> datetime:
-        return datetime.now(UTC)
+        return datetime.now(UTC) + self._ahead
 
 
 class VirtualClock:
@@ -85,11 +107,9 @@ class VirtualClock:
     #: machine must not look like a slow wire.
     WALL_TIMEOUT_S = 10.0
 
-    def __init__(self, start: datetime = datetime(2026, 1, 5, 8, 0, tzinfo=UTC)) -> None:
-        if start.tzinfo is None:
-            raise ValueError("the start of a clock has no time zone; give one, such as UTC")
+    def __init__(self, start: datetime = VIRTUAL_START) -> None:
         self._now_s = 0.0
-        self._start = start.astimezone(UTC)
+        self._start = _aware(start)
 
     def now_s(self) -> float:
         return self._now_s

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from datetime import timedelta
+
 from instruments.bench_config import SIMULATED_SCHEME, BenchFile, is_simulated_address
 from instruments.clock import Clock
 from instruments.errors import LinkError
@@ -18,7 +20,7 @@ class SimulatedBench:
     """Every simulated instrument of a bench; the same address gives the same instrument."""
 
     def __init__(self, bench: BenchFile, clock: Clock) -> None:
-        self.world = World(bench)
+        self.world = World(bench, clock.utc() - timedelta(seconds=clock.now_s()))
         self._port_buffer_bytes = port_buffer_bytes(clock)
         self._bench = bench
         self._faults: dict[str, Faults] = {}

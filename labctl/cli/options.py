@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import UTC, datetime
 from typing import Annotated
 
 import typer
@@ -46,6 +47,28 @@ RecordingId = Annotated[
     int | None,
     typer.Option("--recording", metavar="ID", help="Number of the recording; default: the unit's newest recording."),
 ]
+
+SimulatedStart = Annotated[
+    str | None,
+    typer.Option(
+        "--simulated-start",
+        metavar="TIME",
+        help="Date at which the time of a simulated bench begins, such as 2027-11-23T08:00Z; without an offset: UTC.",
+    ),
+]
+
+
+def simulated_start(given: str | None) -> datetime | None:
+    """Return the instant at which simulated time begins, UTC. Raises BadInput."""
+    try:
+        moment = None if given is None else datetime.fromisoformat(given)
+        if moment is None:
+            return None
+        return moment.replace(tzinfo=UTC) if moment.tzinfo is None else moment.astimezone(UTC)
+    except (ValueError, OverflowError) as error:
+        raise BadInput(
+            f"--simulated-start {given!r} cannot be read; write 2027-11-23T08:00Z, or a date such as 2027-11-23"
+        ) from error
 
 
 def recording_numbers(given: str | None) -> list[int]:

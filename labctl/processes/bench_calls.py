@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from multiprocessing.connection import Connection
 from typing import Any
 
-from instruments.clock import WallClock
+from instruments.clock import Clock
 from labctl.acting_user import acting
 from labctl.log.context import for_request
 from labctl.processes.calls import Answer, Call, answer_with
@@ -37,9 +37,10 @@ class Beat:
 class BenchCalls:
     """Answers the calls of other processes."""
 
-    def __init__(self, store: Store, local: LocalBench, supervision: Supervision) -> None:
+    def __init__(self, store: Store, local: LocalBench, supervision: Supervision, clock: Clock) -> None:
+        """`clock` has the date of the service."""
         self._store, self._local, self._supervision = store, local, supervision
-        self._context = CommandContext(lambda: store, WallClock(), local.control)
+        self._context = CommandContext(lambda: store, clock, local.control)
 
     def stop(self, call: Call, _: Connection) -> Answer:
         """Ask for the end of a campaign, or of whatever runs: nothing is waited for, nothing is written."""

@@ -26,7 +26,7 @@ from labctl.processes.waker import Waker
 from labctl.services.benches.bench_left import BenchLeft
 from labctl.services.benches.lease import hold_bench
 from labctl.services.campaigns.bench_runner import BenchRunner
-from labctl.services.campaigns.preparation import clock_for
+from labctl.services.campaigns.preparation import clock_for, on_date
 from labctl.services.lab_service import VERSION
 from labctl.services.local_bench import LocalBench
 from labctl.services.planning.loading import load_bench
@@ -52,16 +52,17 @@ def open_bench_service(settings: BenchSettings) -> tuple[Store, LocalBench]:
     store = Store(Database(settings.location, write=True, address=address))
     try:
         store.imports.discard_unfinished()
-        return store, LocalBench(store, WallClock(), _runner(settings, store))
+        calendar = WallClock(settings.ahead)
+        return store, LocalBench(store, calendar, _runner(settings, store, calendar))
     except BaseException:
         store.close()
         raise
 
 
-def _runner(settings: BenchSettings, store: Store) -> BenchRunner | None:
+def _runner(settings: BenchSettings, store: Store, calendar: Clock) -> BenchRunner | None:
     if settings.bench is None:
         return None
-    bench = load_bench(settings.bench)
+    bench = on_date(load_bench(settings.bench), settings.simulated_start)
     if settings.simulate and not bench.is_simulated:
         raise BadInput(
             f"--simulate with --bench {settings.bench}: that bench has real instruments, which would move; leave "
@@ -71,8 +72,10 @@ def _runner(settings: BenchSettings, store: Store) -> BenchRunner | None:
 
     def make_clock() -> Clock:
         own_pace = settings.speed == 0 or not bench.is_simulated
-        return clock_for(bench, None if own_pace else settings.speed)
+        start = None if settings.simulated_start is None else calendar.utc()
+        return clock_for(bench, None if own_pace else settings.speed, start)
 
+    make_clock()  # a date that this bench cannot have is refused now
     return BenchRunner(store, bench, make_clock, hold_bench(store, bench), safe_within_s=ANSWER_WITHIN_S)
 
 
@@ -85,7 +88,7 @@ class BenchProcess:
         self._supervision = Supervision(settings, store, self._waker, EngineWatch(lambda: local.polls).is_stuck)
         if local.scheduler is not None:
             local.scheduler.attended = lambda: self._supervision.alone_s == 0.0
-        calls = BenchCalls(store, local, self._supervision)
+        calls = BenchCalls(store, local, self._supervision, WallClock(settings.ahead))
         self._servers = (
             CallServer(settings.folder / STOP, calls.stop, in_turn=True),
             CallServer(settings.folder / CALLS, calls.answer),
@@ -139,7 +142,10 @@ def main() -> int:
         log.debug("process.refused", exc_info=error)
         tell(line, error)
         return 2
-    log.info("process.started", version=VERSION, bench=settings.bench, speed=settings.speed, database=store.location)
+    log.info(
+        "process.started", version=VERSION, bench=settings.bench, speed=settings.speed, database=store.location,
+        simulated_start=None if settings.simulated_start is None else settings.simulated_start.isoformat(),
+    )  # fmt: skip
     BenchProcess(settings, store, local).run(line)
     return 0
 

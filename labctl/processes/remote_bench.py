@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from instruments.bench_config import BenchFile
-from labctl.errors import BenchSilent
+from labctl.errors import BenchSilent, Conflict
 from labctl.log import get_logger
 from labctl.processes.bench_calls import Beat
 from labctl.processes.calls import Call, Caller
@@ -19,6 +19,7 @@ from labctl.services.benches.bench_left import BenchLeft
 from labctl.services.campaigns.listeners import ChangeListeners
 from labctl.services.commands.context import CommandContext
 from labctl.services.commands.requests import CampaignResume, CampaignStart, ToBench, ToCampaign
+from labctl.services.commands.service_control import NO_BENCH
 from labctl.services.schemas.benches import BenchCheckResponse, BenchDescription, CheckRequest
 from labctl.services.schemas.campaigns import CampaignResponse, ConfirmRequest, ReasonRequest
 from labctl.services.schemas.schedule import ScheduledResponse
@@ -61,8 +62,15 @@ class RemoteWriter:
 class RemoteControl:
     """Control over the campaigns of the bench process."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, bench: BenchFile | None) -> None:
+        self._bench = bench
         self._calls, self._stop = Caller(folder / CALLS, ANSWER_S), Caller(folder / STOP, STOP_S, keeps=False)
+
+    def bench_of(self, _: CampaignStart) -> BenchFile:
+        """Return the bench of the bench process. Raises Conflict without one."""
+        if self._bench is None:
+            raise Conflict(NO_BENCH)
+        return self._bench
 
     def start(self, _: CommandContext, asked: CampaignStart) -> CampaignResponse:
         """Start a campaign on the bench."""
@@ -115,7 +123,7 @@ class RemoteBench:
 
     def __init__(self, folder: Path, bench: BenchFile | None) -> None:
         self.bench = bench
-        self.control = RemoteControl(folder)
+        self.control = RemoteControl(folder, bench)
         self._caller = Caller(folder / CALLS, ANSWER_S)
         self._listeners = ChangeListeners()
         self._beat = Beat(running=None, stops=False, schedule_trouble="")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from labctl.config import default_database
@@ -21,6 +22,7 @@ class ServeRequest:
     bench: str | None = None
     simulate: bool = False
     speed: float = 1.0  #: of a simulated bench; 0: as fast as it can
+    simulated_start: datetime | None = None  #: aware instant at which a service with a simulated bench begins
     host: str = "127.0.0.1"
     port: int = 8420
     database: str | None = None
@@ -41,6 +43,11 @@ class ServeRequest:
         """Raise BadInput for a number that is out of its range."""
         if not 0 <= self.speed < float("inf"):
             raise BadInput(f"--speed {self.speed}: give a positive number, or 0 for as fast as possible")
+        if self.simulated_start is not None and self.bench_name is None:
+            raise BadInput(
+                f"--simulated-start {self.simulated_start.isoformat()}: this service has no simulated bench; give "
+                "--simulate, or leave the option out"
+            )
         if not 0 <= self.port <= LAST_PORT:
             raise BadInput(f"--port {self.port}: give a port from 1 to {LAST_PORT}, or 0 for a free port")
         if not 1 <= self.max_upload_mib <= 1 << 20:
@@ -57,11 +64,13 @@ class BenchSettings:
     speed: float
     folder: Path  #: of its sockets
     url: str  #: of the web process
+    simulated_start: datetime | None = None
+    ahead: timedelta = timedelta()  #: how far the simulated date is ahead of this computer's
 
     @property
-    def drives(self) -> tuple[str, str | None, float]:
-        """The database, the bench and its pace."""
-        return self.location, self.bench, self.speed
+    def drives(self) -> tuple[str, str | None, float, datetime | None]:
+        """The database, the bench, its pace and its date."""
+        return self.location, self.bench, self.speed, self.simulated_start
 
 
 @dataclass(frozen=True)
@@ -72,3 +81,9 @@ class WebSettings:
     folder: Path  #: of the bench process's sockets
     listener: int  #: file descriptor of the socket that listens for HTTP
     at: str  #: the address, as a Host header names it
+    ahead: timedelta = timedelta()  #: how far the simulated date is ahead of this computer's
+
+
+def ahead_of(now: datetime, simulated_start: datetime | None) -> timedelta:
+    """Return how far a simulated date is ahead of the present, both aware; zero where none is simulated."""
+    return timedelta() if simulated_start is None else simulated_start.astimezone(UTC) - now

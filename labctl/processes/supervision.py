@@ -47,8 +47,8 @@ class Supervision:
                 own = self._settings
                 raise Conflict(
                     f"a bench process whose service has ended still drives bench {own.bench} at speed "
-                    f"{own.speed:g} and uses this database; start the service with the same --bench and "
-                    "--speed, or stop that process"
+                    f"{own.speed:g} and uses this database; start the service with the same --bench, "
+                    "--speed and --simulated-start, or stop that process"
                 )
             self._line = line
         self._settings = wanted

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from logging import ERROR, INFO
 from pathlib import Path
 
+from instruments.clock import WallClock
 from labctl.errors import BenchSilent, BenchUnconfirmed, Conflict, LabctlError
 from labctl.log import get_logger
 from labctl.processes import systemd
@@ -24,7 +25,7 @@ from labctl.processes.bench_line import BenchLine, bench_process_of
 from labctl.processes.children import Child
 from labctl.processes.listening import Listening, listening
 from labctl.processes.liveness import Elapsed
-from labctl.processes.settings import BenchSettings, ServeRequest, WebSettings
+from labctl.processes.settings import BenchSettings, ServeRequest, WebSettings, ahead_of
 from labctl.processes.waker import Waker
 from labctl.services.benches.bench_left import BenchLeft
 from procedures.execution.signals import ENDING, restore
@@ -100,6 +101,7 @@ class Supervisor:
 
     def __init__(self, request: ServeRequest, at: Listening, waker: Waker) -> None:
         self._request, self._at, self._waker = request, at, waker
+        self._ahead = ahead_of(WallClock().utc(), request.simulated_start)
         self._restarts = _Restarts()
 
     def run(self, ready: Callable[[Ready], None]) -> BenchLeft:
@@ -130,8 +132,9 @@ class Supervisor:
     def _settings(self, folder: Path) -> BenchSettings:
         request = self._request
         return BenchSettings(
-            request.location, request.bench_name, request.simulate, request.speed, folder, self._at.url
-        )
+            request.location, request.bench_name, request.simulate, request.speed, folder, self._at.url,
+            request.simulated_start, self._ahead,
+        )  # fmt: skip
 
     def _open_bench(self) -> BenchLine:
         """Take charge of the bench process that outlived its service, or start one.
@@ -203,7 +206,7 @@ class Supervisor:
         return Child("labctl.processes.web_process", pass_fds=[self._at.socket.fileno()])
 
     def _web_settings(self) -> WebSettings:
-        return WebSettings(self._request, self._folder, self._at.socket.fileno(), self._at.name)
+        return WebSettings(self._request, self._folder, self._at.socket.fileno(), self._at.name, self._ahead)
 
     def _end_web(self) -> None:
         self._web.signal(signal.SIGTERM)

@@ -50,7 +50,7 @@ def create_service(settings: WebSettings) -> LabService:
     store = Store(Database(request.location, write=False, writer=RemoteWriter(folder)))
     store.imports.discard_unfinished()  # of a web process that was killed
     computation = InWorkers(store, preload=WORKER_MODULES)
-    return LabService(store, WallClock(), computation=computation, access=RemoteBench(folder, bench))
+    return LabService(store, WallClock(settings.ahead), computation=computation, access=RemoteBench(folder, bench))
 
 
 def access_for(request: ServeRequest, store: Store, at: str) -> AccessPolicy:

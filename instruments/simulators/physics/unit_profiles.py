@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from instruments.simulators.physics.ageing import Ageing, ageing_of
+
 Array = NDArray[np.float64]
 #: temperature (n,) deg C -> (n, axes, 3): gain of each axis for the rates along x, y and z
 Gain = Callable[[Array], Array]
@@ -36,6 +38,7 @@ class UnitTruth:
     supply_v: float = 5.0
     warm_up: Callable[[Array], Array] | None = field(default=None)  #: (seconds since power-on (n,)) -> (n,) deg/s
     sample_clock_ppm: float = 0.0  #: by how much more readings come than the bench file says
+    ageing: Ageing | None = None  #: None: the unit stays as it is
 
     def k(self, temperature_c: float) -> Array:
         """Return K at a temperature, (axes, 3): K[output, input]."""
@@ -208,10 +211,15 @@ def make_unit(driver: str, axes: tuple[str, ...], settings: Mapping[str, object]
     if not isinstance(profile, str) or profile not in PROFILES:
         raise ValueError(f"simulated unit profile {profile!r} is not known; choose one of {', '.join(PROFILES)}")
     made = PROFILES[profile](axes, np.random.default_rng(seed))
+    ageing = ageing_of(given.pop("ageing", None), len(axes))
     known = {
-        name for name in UnitTruth.__dataclass_fields__ if name not in {"axes", "gain", "offset", "bend", "warm_up"}
+        name
+        for name in UnitTruth.__dataclass_fields__
+        if name not in {"axes", "gain", "offset", "bend", "warm_up", "ageing"}
     }
     for name in given:
         if name not in known:
-            raise ValueError(f"simulated unit has no setting {name!r}; choose one of {', '.join(sorted(known))}")
-    return UnitTruth(**{**made.__dict__, **given})
+            raise ValueError(
+                f"simulated unit has no setting {name!r}; choose one of {', '.join(sorted({*known, 'ageing'}))}"
+            )
+    return UnitTruth(**{**made.__dict__, **given, "ageing": ageing})

@@ -8,11 +8,13 @@ from __future__ import annotations
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
+from datetime import datetime
 
 import numpy as np
 from numpy.typing import NDArray
 
 from instruments.bench_config import BenchFile, GyroSettings, SimulationSettings
+from instruments.clock import VIRTUAL_START
 from instruments.simulators.hidden import HiddenEffect, State, hidden_effects
 from instruments.simulators.physics.ambient import humidity_pct, supply_wander_v
 from instruments.simulators.physics.bench_errors import BenchErrors
@@ -51,8 +53,10 @@ def number(settings: Mapping[str, object], name: str, usual: float) -> float:
 class World:
     """Shared state of the simulated instruments. Raises ValueError for an unknown profile, setting or effect."""
 
-    def __init__(self, bench: BenchFile) -> None:
+    def __init__(self, bench: BenchFile, starts_at: datetime = VIRTUAL_START) -> None:
+        """Make the world of a bench; `starts_at` is the instant of its time 0: units age by the calendar."""
         settings = bench.simulation or SimulationSettings()
+        self.starts_at = starts_at
         self.settings = settings
         self.north_deg = number(settings.table, "north_deg", 33.0)
         latitude_deg = settings.latitude_deg if settings.latitude_deg is not None else bench.latitude_deg
@@ -197,8 +201,11 @@ class SimulatedGyro:
         table_dps, angle = self._felt(t_s, period)
         body = world.body_rates(table_dps, angle)
         sensor = world.heat.sensor_c(self.settings.name, t_s)
-        gain = truth.gain(sensor)
-        rate = np.einsum("nij,nj->ni", gain, body) + truth.offset(sensor)
+        gain, offset = truth.gain(sensor), truth.offset(sensor)
+        if truth.ageing is not None:
+            years = truth.ageing.years(world.starts_at, t_s)
+            gain, offset = gain * truth.ageing.gain(years)[:, :, None], offset + truth.ageing.bias_dps(years)
+        rate = np.einsum("nij,nj->ni", gain, body) + offset
         if truth.bend is not None:
             rate = rate + truth.bend(body[:, self._rows], sensor)
         on_s = t_s - (world.powered_on_s if world.powered_on_s is not None else 0.0)

@@ -12,7 +12,7 @@ from labctl.api.computation import execute, while_connected, with_files
 from labctl.api.dependencies import ServiceDep, command_route
 from labctl.recording.column_map.templates import template
 from labctl.recording.info import Motion
-from labctl.services.calibrations.orientation import OrientationOptions, orientation_of_recording
+from labctl.services.calibrations.orientation import orientation_of_recording
 from labctl.services.commands.registry import IMPORT_EXAMPLE, IMPORT_LOG, IMPORT_RECORDING, SIMULATE_RECORDING
 from labctl.services.commands.requests import LogFile, RecordingFolder
 from labctl.services.recordings import catalogue
@@ -28,7 +28,6 @@ from labctl.services.schemas.recordings import (
     ExampleRequest,
     ImportResponse,
     LogPreview,
-    OrientationResponse,
     RecordingAlone,
     RecordingResponse,
     RecordingWithPoints,
@@ -37,6 +36,7 @@ from labctl.services.schemas.recordings import (
     SimulatedRequest,
     TraceResponse,
 )
+from labctl.services.schemas.reports.orientation import OrientationQuery, OrientationResponse
 
 MapField = Annotated[
     str,
@@ -206,45 +206,11 @@ async def allan(
 
 @router.get("/{recording}/orientation", summary="Static bias and angle of a recording", tags=["calibrations"])
 async def orientation(
-    request: Request,
-    recording: int,
-    service: ServiceDep,
-    axis: Annotated[
-        str | None, Query(description="Axis x, y or z; default: the only axis of the recording.", max_length=1)
-    ] = None,
-    version: Annotated[
-        int | None,
-        Query(
-            ge=0,
-            description="Version of the calibration that corrects the readings; 0: no correction; "
-            "default: the certified version, if any.",
-        ),
-    ] = None,
-    rest_s: Annotated[
-        float,
-        Query(
-            ge=0,
-            le=1e6,
-            description="Time for which the unit is at rest at the beginning, s; the "
-            "mean rate of that time (static bias) is subtracted.",
-        ),
-    ] = 0.0,
-    instability_dps: Annotated[
-        float,
-        Query(
-            ge=0,
-            le=1e6,
-            description="Bias instability of the gyro, deg/s; it is part of the uncertainty of the static bias.",
-        ),
-    ] = 0.0,
-    standstill: Annotated[
-        bool, Query(description="While the unit stands still, hold the angle and estimate the offset again.")
-    ] = True,
+    request: Request, recording: int, service: ServiceDep, asked: Annotated[OrientationQuery, Query()]
 ) -> OrientationResponse:
     """The angle of one axis from its rate: static bias taken off (Ojeda et al. 2000, eqs. 15 and 16), offset renewed
-    at standstill (Weiss)."""
-    options = OrientationOptions(axis, rest_s, instability_dps, standstill)
-    return await while_connected(request, service, orientation_of_recording, recording, version, options)
+    at standstill; of a record at rest, the drift between declared stops (Weiss)."""
+    return await while_connected(request, service, orientation_of_recording, recording, asked.version, asked)
 
 
 @router.get("/{recording}/file", summary="Download the recording", response_class=StreamingResponse)

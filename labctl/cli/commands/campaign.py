@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from labctl.cli.error_reporting import one_clear_line
-from labctl.cli.options import BenchName, CampaignId, Database, Json
+from labctl.cli.options import BenchName, CampaignId, Database, Json, SimulatedStart, simulated_start
 from labctl.cli.output import console, print_json, table
 from labctl.cli.printing.campaigns import print_campaign, print_plan, print_started
 
@@ -82,7 +82,8 @@ Hide = Annotated[
     typer.Option(
         "--hide",
         metavar="EFFECT[=SIZE]",
-        help="Hide an effect in the units of a simulated bench; may be repeated; SIZE in the unit of the effect.",
+        help="Hide an effect in the units of a simulated bench; may be repeated; SIZE in the unit of the effect, or "
+        "z10 for a signal of ten standard deviations of the noise on this plan.",
     ),
 ]
 NoFit = Annotated[
@@ -134,6 +135,7 @@ def start(
     late_limit_s: LateLimit = None,
     clear_confirmed_by: ClearConfirmedBy = None,
     hide: Hide = None,
+    simulated_from: SimulatedStart = None,
     no_fit: NoFit = False,
     as_json: Json = False,
     database: Database = None,
@@ -162,7 +164,8 @@ def start(
         if no_fit:
             given["fit"] = False
         request = CampaignRequest.model_validate({"recipe": own_text(recipe), "clip": clip, **given})
-        asked = CampaignStart(request, bench=bench, speed=speed, seed=seed)
+        start_at = simulated_start(simulated_from)
+        asked = CampaignStart(request, bench=bench, speed=speed, seed=seed, simulated_start=start_at)
         with open_commands(database, campaign_terminal(quiet=as_json)) as commands:
             answer = commands.execute(START_CAMPAIGN, asked)
     print_started(answer, as_json=as_json)

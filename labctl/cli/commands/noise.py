@@ -13,7 +13,7 @@ from labctl.cli.output import console, format_number, print_json, stderr
 from labctl.cli.printing.noise import print_allan
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.recordings import OrientationResponse
+    from labctl.services.schemas.reports.orientation import OrientationResponse
 
 
 WarmUp = Annotated[
@@ -26,6 +26,15 @@ StopEvery = Annotated[
         metavar="S",
         help="For a recording at rest: treat 10 s in every S seconds as a stop and the rest as motion, and "
         "print the drift.",
+    ),
+]
+Rest = Annotated[
+    float,
+    typer.Option(
+        "--rest-s",
+        metavar="S",
+        min=0,
+        help="The unit is at rest for the first S seconds: subtract the mean rate of that time (static bias).",
     ),
 ]
 
@@ -75,15 +84,7 @@ def orientation(
     axis: Annotated[
         str | None, typer.Option("--axis", help="Axis x, y or z; default: the only axis of the data.")
     ] = None,
-    rest_s: Annotated[
-        float,
-        typer.Option(
-            "--rest-s",
-            metavar="S",
-            min=0,
-            help="The unit is at rest for the first S seconds: subtract the mean rate of that time (static bias).",
-        ),
-    ] = 0.0,
+    rest_s: Rest = 0.0,
     instability_dps: Annotated[
         float,
         typer.Option(
@@ -125,11 +126,15 @@ def orientation(
 ) -> None:
     """Follow the angle of one axis: static bias off (Ojeda 2000, eqs. 15-16), offset renewed at standstill (Weiss)."""
     from labctl.errors import BadInput
-    from labctl.services.calibrations.orientation import OrientationOptions, orientation_of_file, orientation_of_unit
+    from labctl.services.calibrations.orientation import orientation_of_file, orientation_of_unit
     from labctl.services.commands.open import open_readonly
+    from labctl.services.schemas.reports.orientation import OrientationOptions
 
-    options = OrientationOptions(axis, rest_s, instability_dps, standstill, warm_up_s, stop_every_s)
     with one_clear_line():
+        options = OrientationOptions(
+            axis=axis, rest_s=rest_s, instability_dps=instability_dps, standstill=standstill, warm_up_s=warm_up_s,
+            stop_every_s=stop_every_s,
+        )  # fmt: skip
         if Path(source).is_file():
             answer = orientation_of_file(Path(source), calibration, out, options)
         elif calibration is not None or out is not None:

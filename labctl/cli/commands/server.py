@@ -10,8 +10,12 @@ import typer
 
 from labctl.cli.command_log import log_of_command
 from labctl.cli.error_reporting import one_clear_line
-from labctl.cli.options import BenchName, Database, Json
+from labctl.cli.options import BenchName, Database, Json, SimulatedStart, simulated_start
 from labctl.cli.output import console, print_json, stderr
+
+MaxUpload = Annotated[
+    int, typer.Option("--max-upload-mib", metavar="N", help="Largest recording that may be sent, in MiB.")
+]
 
 
 def serve(
@@ -25,6 +29,7 @@ def serve(
             "--speed", metavar="X", help="Speed of a simulated bench: X times real time; 0: as fast as possible."
         ),
     ] = 1.0,
+    simulated_from: SimulatedStart = None,
     host: Annotated[str, typer.Option("--host", metavar="ADDRESS", help="Address to listen on.")] = "127.0.0.1",
     port: Annotated[int, typer.Option("--port", metavar="N", help="TCP port; 0 chooses a free port.")] = 8420,
     require_keys: Annotated[
@@ -34,9 +39,7 @@ def serve(
             help="Require an API key on loopback (127.0.0.1) too; on other addresses a key is always required.",
         ),
     ] = False,
-    max_upload_mib: Annotated[
-        int, typer.Option("--max-upload-mib", metavar="N", help="Largest recording that may be sent, in MiB.")
-    ] = 2048,
+    max_upload_mib: MaxUpload = 2048,
     as_json: Json = False,
     database: Database = None,
 ) -> None:
@@ -46,8 +49,10 @@ def serve(
     from labctl.processes.supervisor import Ready, serve_forever
     from labctl.services.schemas.service import ServiceReady
 
+    with one_clear_line():
+        start_at = simulated_start(simulated_from)
     request = ServeRequest(
-        bench=bench, simulate=simulate, speed=speed, host=host, port=port, database=database,
+        bench=bench, simulate=simulate, speed=speed, simulated_start=start_at, host=host, port=port, database=database,
         require_keys=require_keys, max_upload_mib=max_upload_mib,
     )  # fmt: skip
 
@@ -59,6 +64,8 @@ def serve(
             print_json(said, one_line=True)
             return
         console.print(f"labctl listens on {service.url}  (HTTP interface: {service.url}/api-docs)", markup=False)
+        if start_at is not None:
+            console.print(f"the date of this service is simulated: {start_at:%Y-%m-%d %H:%M} UTC", markup=False)
         for text in filter(None, (unconfirmed, cut_short)):
             console.print(text, style="yellow", markup=False, soft_wrap=True)
 

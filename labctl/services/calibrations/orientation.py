@@ -25,26 +25,17 @@ from labctl.recording.info import Axis
 from labctl.recording.recording import Columns
 from labctl.services.calibrations.served import calibration_file
 from labctl.services.recordings.loading import newest_row
-from labctl.services.schemas.recordings import OrientationResponse, StaticBiasResponse
+from labctl.services.schemas.reports.orientation import (
+    STOP_S,
+    OrientationOptions,
+    OrientationResponse,
+    StaticBiasResponse,
+)
 from labctl.store import Store
 
 #: Points of a course that is sent.
 MOST_POINTS = 2000
 TABLES = frozenset({".csv", ".parquet"})
-#: A declared stop lasts so long, s: 2 s until the offset is learned, and as many readings as make its noise small.
-STOP_S = 10.0
-
-
-@dataclass(frozen=True)
-class OrientationOptions:
-    """How the angle is followed."""
-
-    axis: str | None = None  #: None: the only one
-    rest_s: float = 0.0  #: the unit is at rest for so long from the first reading on: its static bias is taken off
-    instability_dps: float = 0.0  #: of the bias, deg/s: what a mean does not remove
-    standstill: bool = True  #: hold the angle, and learn the offset, at standstill
-    warm_up_s: float = 0.0  #: readings of the first so long are left out
-    stop_every_s: float | None = None  #: a record at rest is taken as a journey with a declared stop so often
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,14 @@ from labctl.services.benches.lease import holding, open_for
 from labctl.services.benches.standards import overdue_events
 from labctl.services.benches.start_confirmation import confirmation_text, start_questions
 from labctl.services.campaigns.bench_lending import BenchLending, lending_journal
-from labctl.services.campaigns.preparation import Prepared, clock_for, prepare, refuse_unconfirmed, seeded
+from labctl.services.campaigns.preparation import (
+    Prepared,
+    clock_for,
+    on_date,
+    prepare,
+    refuse_unconfirmed,
+    seeded,
+)
 from labctl.services.campaigns.status import answer_of, describe_interrupted, from_rows
 from labctl.services.planning.loading import bench_for, load_bench, load_recipe
 from labctl.services.schemas.campaigns import BENCH_CHECKS, CampaignResponse, StartRequest
@@ -146,9 +153,9 @@ def run_here(
     bench, StartNotConfirmed where no person has confirmed that it is clear.
     """
     bench_file = seeded(load_bench(request.bench or bench_for(load_recipe(request.recipe))), request.seed)
-    bench_file = with_hidden_effects(bench_file, request.hide)
+    bench_file = with_hidden_effects(on_date(bench_file, request.simulated_start), request.hide)
     with open_for(bench_file, database or default_database()) as store, holding(store, bench_file) as control:
-        clock = clock_for(bench_file, request.speed)
+        clock = clock_for(bench_file, request.speed, request.simulated_start)
         SafeStateRetry(store, bench_file, lambda: clock).attempt()
         for text in _left_on(store, bench_file):
             if not bench_file.is_simulated:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from datetime import datetime
 
 from instruments.bench import Bench, open_bench
 from instruments.bench_config import BenchFile, SimulationSettings
-from instruments.clock import Clock, ScaledClock, SystemClock, VirtualClock
+from instruments.clock import VIRTUAL_START, Clock, ScaledClock, SystemClock, VirtualClock
 from instruments.drivers.unit_handlers import ManualUnitHandler
 from instruments.errors import InstrumentError
 from instruments.interfaces.gyro import Gyro, GyroIdentity
@@ -101,17 +102,35 @@ def seeded(bench: BenchFile, seed: int | None) -> BenchFile:
     return bench.model_copy(update={"simulation": simulation})
 
 
-def clock_for(bench: BenchFile, speed: float | None) -> Clock:
+def on_date(bench: BenchFile, start: datetime | None) -> BenchFile:
+    """Return a simulated bench as it is on the day of an instant, None for the usual one: the same units, other noise.
+
+    The same day is the same noise.
+    """
+    if start is None:
+        return bench
+    simulation = bench.simulation or SimulationSettings()
+    dated = simulation.model_copy(update={"noise_seed": simulation.noise_seed + start.date().toordinal()})
+    return bench.model_copy(update={"simulation": dated})
+
+
+def clock_for(bench: BenchFile, speed: float | None, start: datetime | None = None) -> Clock:
     """Return the system's clock for real instruments; for simulated ones a scaled or a virtual clock.
 
-    Simulators in another process set the pace themselves. Raises BadInput for a speed on a bench that has its own.
+    Simulators in another process set the pace themselves. `start` is the aware instant at which simulated time begins.
+    Raises BadInput for a speed or a start on a bench that has its own.
     """
     if not bench.is_simulated:
+        if start is not None:
+            raise BadInput(
+                f"--simulated-start {start.isoformat()}: bench {bench.name} has instruments outside this process, "
+                "which have the time of this computer; leave the option out"
+            )
         if speed is not None:
             raise BadInput(f"--speed {speed:g}: bench {bench.name} runs in real time; leave the option out")
         simulation = bench.simulation
         return ScaledClock(simulation.speed) if simulation is not None and simulation.control else SystemClock()
-    return VirtualClock() if speed is None else ScaledClock(speed)
+    return VirtualClock(start or VIRTUAL_START) if speed is None else ScaledClock(speed, start=start)
 
 
 def load_libraries() -> None:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from datetime import datetime
 
 from pydantic import ValidationError
 
 from instruments.bench import Bench, open_bench
 from instruments.bench_config import BenchFile, SimulationSettings
-from instruments.clock import Clock, VirtualClock
+from instruments.clock import Clock, SystemClock
 from labctl.config import default_database
 from labctl.errors import Conflict
 from labctl.log import get_logger
@@ -167,12 +168,18 @@ def resume_here(
     with open_for(bench_file, location) as store, holding(store, bench_file) as control:
 
         def make_clock(standing: ResumePoint) -> Clock:
-            clock = clock_for(bench_file, speed)
-            return VirtualClock(standing.last_at) if isinstance(clock, VirtualClock) else clock
+            return clock_for(bench_file, speed, _simulated_start(bench_file, speed, standing.last_at))
 
         SafeStateRetry(store, bench_file, lambda: clock_for(bench_file, speed)).attempt()
         prepared = prepare_resume(store, row.id, bench_file, make_clock, request)
         return run_attended(store, prepared, control, observe, attend)
+
+
+def _simulated_start(bench_file: BenchFile, speed: float | None, last_at: datetime) -> datetime | None:
+    """Return when simulated time goes on: where it stood, unless it follows this computer's, which is later."""
+    if not bench_file.is_simulated:
+        return None
+    return last_at if speed is None or last_at > SystemClock().utc() else None
 
 
 def _newest_unfinished(store: Store) -> CampaignRow:

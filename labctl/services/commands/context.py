@@ -7,6 +7,7 @@ from datetime import datetime
 from functools import cached_property
 from typing import Protocol
 
+from instruments.bench_config import BenchFile
 from instruments.clock import Clock
 from labctl.services.commands.requests import CampaignResume, CampaignStart, ToBench, ToCampaign
 from labctl.services.schemas.benches import BenchCheckResponse, CheckRequest
@@ -35,6 +36,10 @@ class CommandContext:
 
 class CampaignControl(Protocol):
     """Control over campaigns, by the process that executes the command."""
+
+    def bench_of(self, asked: CampaignStart, /) -> BenchFile:
+        """Return the bench that a start is for. Raises Conflict where the service has none."""
+        ...
 
     def start(self, context: CommandContext, asked: CampaignStart, /) -> CampaignResponse:
         """Start a campaign now."""

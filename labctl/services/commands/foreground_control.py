@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 
+from instruments.bench_config import BenchFile
 from instruments.clock import SystemClock
 from labctl.errors import BadInput
 from labctl.services.benches.check import check_bench
@@ -52,11 +53,15 @@ class ForegroundControl:
         self._database = database
         self._open_terminal = open_terminal
 
+    def bench_of(self, asked: CampaignStart) -> BenchFile:
+        """Return the bench that a start names, or the shipped one that fits its recipe."""
+        return load_bench(asked.bench or bench_for(load_recipe(asked.body.recipe)))
+
     def start(self, _: CommandContext, asked: CampaignStart) -> CampaignResponse:
         """Run a campaign in this process until it is over."""
         request = StartRequest(
             recipe=asked.body.recipe, bench=asked.bench, clip=asked.body.clip, hide=asked.body.hide, fit=asked.body.fit,
-            speed=asked.speed, seed=asked.seed,
+            speed=asked.speed, seed=asked.seed, simulated_start=asked.simulated_start,
             confirmed_by=asked.body.confirmed_by, checks=asked.body.checks,
         )  # fmt: skip
         with self._open_terminal() as terminal:
@@ -74,18 +79,21 @@ class ForegroundControl:
                 return answer
             from labctl.services.drafts.make import make_drafts  # noqa: PLC0415  it loads the libraries of the fit
 
-            make_drafts(store, answer.id, DraftsRequest(), SystemClock().utc())
+            now = SystemClock().utc()
+            at = max(now, answer.ended_at or now)  # a simulated campaign may end in another year
+            make_drafts(store, answer.id, DraftsRequest(), at)
             return with_drafts(store, answer)
 
     def schedule(self, context: CommandContext, asked: CampaignStart) -> ScheduledResponse:
         """Enter a campaign into the schedule of a bench; a service that holds this bench and database starts it."""
-        for option, value in (("--speed", asked.speed), ("--seed", asked.seed)):
+        options = {"--speed": asked.speed, "--seed": asked.seed, "--simulated-start": asked.simulated_start}
+        for option, value in options.items():
             if value is not None:
                 raise BadInput(
                     f"{option} {value}: only the service that runs scheduled starts sets this option; leave the "
                     "option out"
                 )
-        bench = load_bench(asked.bench or bench_for(load_recipe(asked.body.recipe)))
+        bench = self.bench_of(asked)
         answer = queue.add_start(context.store, asked.body, bench, context.now())
         note = "; ".join(filter(None, (queue.NO_SERVICE.format(bench=bench.name), answer.note)))
         return answer.model_copy(update={"note": note})

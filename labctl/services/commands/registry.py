@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from labctl.services.admin import api_keys
@@ -43,6 +44,7 @@ from labctl.services.schemas.recordings import (
 )
 from labctl.services.schemas.reports.drafts import DraftsRequest, DraftsResponse
 from labctl.services.schemas.schedule import ScheduledResponse
+from labctl.services.simulation.effect_sizes import with_sizes
 
 
 def _import_recording(context: CommandContext, asked: RecordingFolder) -> ImportResponse:
@@ -87,6 +89,8 @@ def _start_campaign(context: CommandContext, asked: CampaignStart) -> CampaignRe
     """Start a campaign now, or enter it into the schedule: the only place where that is decided."""
     if asked.body.fit:
         check_fit(load_recipe(asked.body.recipe))
+    if asked.body.hide:
+        asked = replace(asked, body=with_sizes(asked.body, context.control.bench_of(asked)))
     if queue.is_scheduled(asked.body):
         return context.control.schedule(context, asked)
     return context.control.start(context, asked)

@@ -40,9 +40,9 @@ class HttpExecutor:
         for name in request.local_only:
             if address[name] is not None:
                 raise Conflict(
-                    f"--{name} {address[name]}: the service at {self._connection.url} holds this database and runs "
-                    "campaigns on its own bench at its own speed; leave the option out, stop the service, or name "
-                    "another --database"
+                    f"--{name.replace('_', '-')} {address[name]}: the service at {self._connection.url} holds this "
+                    "database and runs campaigns on its own bench at its own speed and date; leave the option out, "
+                    "stop the service, or name another --database"
                 )
         newest = command.newest
         if newest is not None and address[newest.parameter] is None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
+from datetime import datetime
 from pathlib import Path
 from typing import ClassVar, Generic, TypeVar
 
@@ -86,12 +87,13 @@ class ToStart(Addressed):
 class CampaignStart(Addressed):
     """A campaign to start, now or later, with options of the process that would run it in its foreground."""
 
-    local_only: ClassVar[tuple[str, ...]] = ("bench", "speed", "seed")
+    local_only: ClassVar[tuple[str, ...]] = ("bench", "speed", "seed", "simulated_start")
 
     body: CampaignRequest
     bench: str | None = None
     speed: float | None = None
     seed: int | None = None
+    simulated_start: datetime | None = None  #: aware
 
 
 @dataclass(frozen=True)

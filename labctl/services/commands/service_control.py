@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from contextvars import copy_context
 
+from instruments.bench_config import BenchFile
 from labctl.acting_user import actor
 from labctl.errors import Conflict, NotFound, StoreError
 from labctl.log import get_logger
@@ -33,6 +34,10 @@ class ServiceControl:
         if self._runner is None:
             raise Conflict(NO_BENCH)
         return self._runner
+
+    def bench_of(self, _: CampaignStart) -> BenchFile:
+        """Return this service's bench. Raises Conflict without one."""
+        return self._bench_runner().bench
 
     def start(self, _: CommandContext, asked: CampaignStart) -> CampaignResponse:
         """Start a campaign on this service's bench. Raises Conflict without one, BenchBusy while another runs."""

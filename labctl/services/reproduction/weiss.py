@@ -12,10 +12,10 @@ from labctl.json_types.reproduction import PaperFigure
 from labctl.papers import weiss1995 as paper
 from labctl.progress import report_stage
 from labctl.recording import OutputUnit, Recording
-from labctl.services.calibrations.orientation import OrientationOptions, orientation_of_readings
+from labctl.services.calibrations.orientation import orientation_of_readings
 from labctl.services.reproduction.findings import Findings, Missing, Value, panel, trace
 from labctl.services.reproduction.sources import Measured, measured_from, shipped, simulated_readings
-from labctl.services.schemas.recordings import OrientationResponse
+from labctl.services.schemas.reports.orientation import OrientationOptions, OrientationResponse
 
 BENCH = "gyrostar-sim"
 TABLE = (
@@ -155,7 +155,7 @@ def _drift_in(columns: dict[str, Array], name: str, axis: str) -> Findings:
             "record for longer"
         )
     once = orientation_of_readings(
-        name, columns, OrientationOptions(axis, rest_s=20.0, standstill=False, warm_up_s=paper.WARM_UP_S)
+        name, columns, OrientationOptions(axis=axis, rest_s=20.0, standstill=False, warm_up_s=paper.WARM_UP_S)
     )
     worst = max(legs, key=abs)
     return Findings(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Literal, get_args
 
-from pydantic import Field
+from pydantic import AwareDatetime, Field
 
 from labctl.services.schemas.base import Request, ResponseModel
 from labctl.services.schemas.plans import RecipeSource
@@ -26,7 +26,7 @@ class CampaignRequest(Request):
         default_factory=list,
         max_length=20,
         description="Effects to hide in the units of a simulated bench, each as EFFECT or EFFECT=SIZE, SIZE in the "
-        "unit of the effect.",
+        "unit of the effect, or z10 for a signal of ten standard deviations of the noise on this plan.",
     )
     fit: bool = Field(
         default=True,
@@ -94,6 +94,9 @@ class StartRequest(Request):
         description="Speed of a simulated bench, as a multiple of real time; default: as fast as possible.",
     )
     seed: int | None = Field(default=None, ge=0, description="Seed of the random numbers of a simulated bench.")
+    simulated_start: AwareDatetime | None = Field(
+        default=None, description="Date and time at which the time of a simulated bench begins."
+    )
     confirmed_by: str = Field(
         default="", max_length=200, description="Has the same meaning as in `POST /api/campaigns`."
     )

@@ -210,53 +210,6 @@ class AllanResponse(ResponseModel):
     )
 
 
-class StaticBiasResponse(ResponseModel):
-    """The mean output at rest before a mission (Ojeda et al. 2000, eqs. 1, 15 and 16); it contains the Earth's rate."""
-
-    bias_dps: float
-    u_dps: float = Field(
-        description="Standard uncertainty of the static bias, deg/s, from the white noise of "
-        "the mean and the bias instability."
-    )
-    readings: int
-    seconds: float
-
-
-class OrientationResponse(ResponseModel):
-    """The angle of one axis, positive counter-clockwise and never wrapped, from its rate."""
-
-    axis: str
-    version: int | None = Field(
-        description="Version of the calibration by which the rates were corrected; null: no correction."
-    )
-    readings: int
-    left_out: int = Field(
-        description="Number of readings left out because they were marked invalid or were not numbers."
-    )
-    seconds: float
-    static_bias: StaticBiasResponse | None = Field(
-        description="Static bias that was subtracted; null: no rest at the beginning was given."
-    )
-    angle_deg: float = Field(
-        description="Angle at the end, deg; the angle is 0 at the end of the rest at the beginning."
-    )
-    drift_between_stops_deg_per_min: list[float] = Field(default_factory=list)  #: with declared stops, of each leg
-    drift_deg_per_min: float | None = Field(
-        description="Angle divided by the time, deg/min: the drift if the unit was at rest; null: the time is 0."
-    )
-    offset_dps: float = Field(
-        description="Offset that is subtracted at the end, deg/s: the static bias, or the "
-        "offset estimated during the last standstill."
-    )
-    standing_s: float = Field(description="Time for which the unit was taken to stand still and its angle was held, s.")
-    gap_s: float = Field(description="Time without readings, s; the angle is interpolated linearly over it.")
-    t_s: list[float] = Field(description="Times of the values in `course_deg`, s.")
-    course_deg: list[float] = Field(description="The angle at these times, deg; at most 2000 points.")
-    warning: str = Field(
-        default="", description="Warning that the calibration is overdue or was revoked; empty: neither."
-    )
-
-
 class LogColumn(ResponseModel):
     """One column of a log."""
 

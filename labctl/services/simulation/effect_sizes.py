@@ -1,15 +1,20 @@
-"""Size of a hidden effect on a plan, from its size in noise units."""
+"""Sizes of hidden effects on a plan: EFFECT, EFFECT=SIZE, and EFFECT=zN in noise units."""
 
 from __future__ import annotations
 
 from instruments.bench_config import BenchFile, GyroSettings
 from labctl.errors import BadInput
 from labctl.fitting.criticism import size_for_z, size_in_noise_units, size_reference
+from labctl.services.planning.loading import limits_of, load_recipe
+from labctl.services.schemas.campaigns import CampaignRequest
+from labctl.services.simulation.hidden_effects import hidden_sizes, is_in_noise_units, refuse_unless_simulated
 from labctl.services.simulation.plan_simulation import hidden_recording
-from procedures.planning.plan import Plan
+from procedures.planning.plan import Plan, make_plan
 
 #: Seed of the unit that sizes are computed on.
 SEED = 424_242
+#: Readings per second of a simulated recording where none are stated, also of those that sizes are computed on.
+USUAL_RATE_HZ = 10.0
 
 
 class Sizing:
@@ -37,3 +42,27 @@ class Sizing:
                 "give a size in the unit of the effect"
             )
         return size
+
+
+def sizes_on_plan(texts: list[str], plan: Plan, bench: BenchFile, gyro: GyroSettings) -> dict[str, float]:
+    """Return effect id -> size in its coefficient unit of what is to be hidden in a unit on a plan. Raises BadInput."""
+    sizes = hidden_sizes([text for text in texts if not is_in_noise_units(text)])
+    if wanted := [text.partition("=z") for text in texts if is_in_noise_units(text)]:
+        usual = hidden_sizes([name for name, _, _ in wanted])
+        sizing = Sizing(plan, bench, gyro)
+        sizes |= {name: sizing.size_of(name, float(z), usual[name]) for name, _, z in wanted}
+    return sizes
+
+
+def with_sizes(asked: CampaignRequest, bench: BenchFile) -> CampaignRequest:
+    """Return a start whose sizes in noise units are in those of their effects, as on the first unit of its bench.
+
+    Raises BadInput, RecipeError, PlanRefused.
+    """
+    if not any(map(is_in_noise_units, asked.hide)):
+        return asked
+    refuse_unless_simulated(bench, asked.hide)
+    plan = make_plan(load_recipe(asked.recipe), limits_of(bench), clip=asked.clip)
+    gyro = bench.gyros[0].model_copy(update={"sample_rate_hz": USUAL_RATE_HZ})
+    hide = [f"{name}={size!r}" for name, size in sizes_on_plan(asked.hide, plan, bench, gyro).items()]
+    return asked.model_copy(update={"hide": hide})

@@ -16,7 +16,10 @@ def is_in_noise_units(text: str) -> bool:
 
 
 def hidden_sizes(texts: list[str]) -> dict[str, float]:
-    """Return effect id -> size in its coefficient unit; without a size, the simulator's default. Raises BadInput."""
+    """Return effect id -> size in its coefficient unit; without a size, the simulator's default. Raises BadInput.
+
+    Sizes in noise units hold for a plan: `effect_sizes.sizes_on_plan` reads them too.
+    """
     known = hidden_defaults()
     sizes: dict[str, float] = {}
     for text in texts:
@@ -35,15 +38,20 @@ def hidden_sizes(texts: list[str]) -> dict[str, float]:
     return sizes
 
 
-def with_hidden_effects(bench: BenchFile, texts: list[str]) -> BenchFile:
-    """Return a simulated bench with effects hidden in its units, `EFFECT` or `EFFECT=SIZE`. Raises BadInput."""
-    if not texts:
-        return bench
+def refuse_unless_simulated(bench: BenchFile, texts: list[str]) -> None:
+    """Raise BadInput where effects are to be hidden in units that are not simulated in this process."""
     if not bench.is_simulated:
         raise BadInput(
             f"hide {', '.join(texts)}: bench {bench.name} is not simulated, and effects can be hidden only in "
             "simulated units; leave the key `hide` out"
         )
+
+
+def with_hidden_effects(bench: BenchFile, texts: list[str]) -> BenchFile:
+    """Return a simulated bench with effects hidden in its units, `EFFECT` or `EFFECT=SIZE`. Raises BadInput."""
+    if not texts:
+        return bench
+    refuse_unless_simulated(bench, texts)
     simulation = bench.simulation or SimulationSettings()
     hidden = {**simulation.hidden, **hidden_sizes(texts)}
     return bench.model_copy(update={"simulation": simulation.model_copy(update={"hidden": hidden})})

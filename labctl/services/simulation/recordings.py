@@ -15,12 +15,9 @@ from labctl.errors import BadInput
 from labctl.recording import Recording, write_recording
 from labctl.services.planning.loading import bench_for, limits_of, load_bench, load_recipe
 from labctl.services.schemas.base import Request, ResponseModel
-from labctl.services.simulation.effect_sizes import Sizing
-from labctl.services.simulation.hidden_effects import hidden_sizes, is_in_noise_units
+from labctl.services.simulation.effect_sizes import USUAL_RATE_HZ, sizes_on_plan
 from labctl.services.simulation.plan_simulation import simulate
 from procedures.planning.plan import Plan, make_plan
-
-DEFAULT_RATE_HZ = 10.0
 
 
 class SimulateRequest(Request):
@@ -74,19 +71,13 @@ def make_recording(request: SimulateRequest, serial: str | None = None) -> Made:
     recipe = load_recipe(request.recipe)
     bench = load_bench(request.bench or bench_for(recipe))
     gyro = _gyro(bench, request.gyro)
-    hidden = hidden_sizes([text for text in request.hide if not is_in_noise_units(text)])
-    rate_hz = request.sample_rate_hz or DEFAULT_RATE_HZ
+    rate_hz = request.sample_rate_hz or USUAL_RATE_HZ
     gyro = gyro.model_copy(update={"sample_rate_hz": rate_hz, "serial": serial or gyro.serial})
-    simulation = (bench.simulation or SimulationSettings()).model_copy(update={"seed": request.seed, "hidden": hidden})
-    bench = bench.model_copy(update={"gyros": (gyro,), "simulation": simulation})
+    bench = bench.model_copy(update={"gyros": (gyro,)})
     plan = make_plan(recipe, limits_of(bench), clip=request.clip)
-    if wanted := [text for text in request.hide if is_in_noise_units(text)]:
-        sizing, known = Sizing(plan, bench, gyro), hidden_sizes([text.partition("=")[0] for text in wanted])
-        for text in wanted:
-            name, _, z = text.partition("=z")
-            hidden[name] = sizing.size_of(name, float(z), known[name])
-        simulation = simulation.model_copy(update={"hidden": hidden})
-        bench = bench.model_copy(update={"simulation": simulation})
+    hidden = sizes_on_plan(request.hide, plan, bench, gyro)
+    simulation = (bench.simulation or SimulationSettings()).model_copy(update={"seed": request.seed, "hidden": hidden})
+    bench = bench.model_copy(update={"simulation": simulation})
     return Made(simulate(plan, bench, gyro), plan, bench, hidden)
 
 

@@ -17,11 +17,13 @@ from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
 from labctl.services.recordings.examples import examples
 from labctl.services.simulation.hidden_effects import with_hidden_effects
+from labctl.services.simulation.recordings import SimulateRequest, make_recording
 from labctl.store import Store
 from labctl.store.connection.database import Database
 from tests.helpers.service import service_of
 
 HIDE = ["scale_factor_asymmetry=0.02"]
+NOISE_UNITS = ["scale_factor_asymmetry=z30"]
 
 
 def test_examples_come_with_the_package(client: TestClient) -> None:
@@ -107,6 +109,12 @@ def test_a_simulated_campaign_can_hide_an_effect(client: TestClient) -> None:
     assert [detail.get("hidden") for detail in starts] == [None, {"scale_factor_asymmetry": 0.02}]
     later = client.post("/api/campaigns", json={"recipe": "short", "hide": HIDE, "at": "2199-01-01T00:00Z"})
     assert (later.status_code, later.json()["hide"]) == (202, HIDE)
+    sized = client.post("/api/campaigns", json={"recipe": "short", "hide": NOISE_UNITS, "at": "2199-01-01T00:00Z"})
+    asked = SimulateRequest(recipe="short", bench="single-axis-sim", hide=NOISE_UNITS)
+    name, size = next(iter(make_recording(asked).hidden.items()))
+    assert (sized.status_code, sized.json()["hide"]) == (202, [f"{name}={size!r}"])  # as `labctl simulate` reads it
+    wrong = client.post("/api/campaigns", json={"recipe": "short", "hide": ["gremlins=z3"]})
+    assert (wrong.status_code, "cannot be hidden" in wrong.json()["detail"]) == (400, True)
     wrong = client.post("/api/campaigns", json={"recipe": "short", "hide": ["gremlins"]})
     assert (wrong.status_code, "cannot be hidden" in wrong.json()["detail"]) == (400, True)
 
@@ -115,9 +123,10 @@ def test_nothing_is_hidden_in_a_real_unit(tmp_path: Path) -> None:
     store = Store(Database(str(tmp_path / "lab.sqlite"), write=True))
     runner = BenchRunner(store, load_bench("example-real"), VirtualClock)
     with TestClient(create_app(LabService(store, SystemClock(), runner))) as real:
-        answer = real.post("/api/campaigns", json={"recipe": "short", "hide": HIDE})
-        assert answer.status_code == 400
-        assert "is not simulated here" in answer.json()["detail"]
+        for hide in (HIDE, NOISE_UNITS):
+            answer = real.post("/api/campaigns", json={"recipe": "short", "hide": hide})
+            assert answer.status_code == 400
+            assert "is not simulated here" in answer.json()["detail"]
         assert real.get("/api/campaigns").json() == []
 
 

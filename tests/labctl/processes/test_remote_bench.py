@@ -39,7 +39,7 @@ def folder(tmp_path: Path) -> Iterator[Path]:
     with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
         settings = BenchSettings(store.location, BENCH.name, simulate=True, speed=0.0, folder=tmp_path, url="")
         local = LocalBench(store, WallClock(), BenchRunner(store, BENCH, VirtualClock))
-        calls = BenchCalls(store, local, Supervision(settings, store, waker, lambda: False))
+        calls = BenchCalls(store, local, Supervision(settings, store, waker, lambda: False), WallClock())
         servers = CallServer(tmp_path / STOP, calls.stop, in_turn=True), CallServer(tmp_path / CALLS, calls.answer)
         for server in servers:
             server.start()

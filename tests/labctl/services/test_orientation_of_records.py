@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
@@ -11,13 +12,16 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
+from labctl.api import create_app
 from labctl.calibration import Calibration
+from labctl.cli.commands import noise
 from labctl.compensator import Compensator
 from labctl.error_per_turn import static_bias
 from labctl.errors import BadInput, BadRecording, NotEnoughData
 from labctl.recording import Recording, RecordingInfo
 from labctl.recording.data_files import read_table
-from labctl.services.calibrations.orientation import OrientationOptions, orientation_of_file
+from labctl.services.calibrations.orientation import orientation_of_file
+from labctl.services.schemas.reports.orientation import OrientationOptions, OrientationQuery
 from tests.helpers.lab import Lab
 from tests.helpers.service import add_recording, open_client, service_of
 
@@ -125,6 +129,24 @@ def test_a_recording_is_followed_over_http_as_on_the_command_line(
     assert client.get(f"/api/recordings/{number}/orientation").json()["version"] is None  # none is in force
     refused = client.get(f"/api/recordings/{number}/orientation", params={"axis": "x"})
     assert (refused.status_code, refused.json()["type"]) == (400, "urn:labctl:problem:bad-input")
+    wanted = {"warm_up_s": 10, "stop_every_s": 25, "version": 0}
+    with_stops = client.get(f"/api/recordings/{number}/orientation", params=wanted).json()
+    assert len(with_stops["drift_between_stops_deg_per_min"]) == 3  # of 100 s; the fourth is broken off
+    assert with_stops["readings"] == n - 1 - 100
+    for name, value in (("warm_up_s", "-1"), ("stop_every_s", "19"), ("rest_s", "nan"), ("version", "-1")):
+        bad = client.get(f"/api/recordings/{number}/orientation", params={name: value})
+        assert 400 <= bad.status_code < 500, name
     client.close()
     service_of(client).close()
-    assert Lab(tmp_path).json("orientation", "T-1", "--rest-s", "20") == found
+    lab = Lab(tmp_path)
+    assert lab.json("orientation", "T-1", "--rest-s", "20") == found
+    options = [word for name, value in wanted.items() for word in (f"--{name.replace('_', '-')}", str(value))]
+    assert lab.json("orientation", "T-1", *options) == with_stops
+
+
+def test_http_and_the_command_line_take_the_same_options() -> None:
+    taken = set(inspect.signature(noise.orientation).parameters)
+    assert set(OrientationQuery.model_fields) <= taken
+    described: Any = create_app(None).openapi()["paths"]  # type: ignore[arg-type]  # the description needs no service
+    parameters = described["/api/recordings/{recording}/orientation"]["get"]["parameters"]
+    assert {each["name"] for each in parameters} == {"recording", *OrientationQuery.model_fields}

@@ -19,7 +19,8 @@ export function dialog(title, fields, { text, body, confirm = "Continue", kind =
       h("input", {
         name: f.name,
         type: f.type ?? "text",
-        value: f.value ?? (f.type === "checkbox" ? "on" : ""),
+        value: f.type === "checkbox" ? "on" : (f.value ?? ""),
+        checked: f.type === "checkbox" && f.value === "on",
         minlength: f.minlength ?? null,
         required: f.required !== false,
         autocomplete: "off",

@@ -2,8 +2,9 @@
 
 import { download, post } from "../core/http/api.js";
 import { h } from "../core/elements.js";
-import { button } from "../core/components.js";
+import { button, notice } from "../core/components.js";
 import { dialog } from "../core/dialog.js";
+import { Problem } from "../core/http/errors.js";
 import { show } from "../core/router.js";
 
 /** @import { Certificate } from "../../../types/api.js" */
@@ -73,21 +74,33 @@ export function certificateFiles(serial, version, issued) {
 }
 
 /**
- * Ask for the facts of the order; what the service finds missing beside them it names.
+ * Ask for the facts of the order, until a certificate is issued; a refusal is shown above what was filled in.
  * @param {string} serial
  * @param {number} version
  * @param {Certificate} [replaced]
  */
 async function askCertificate(serial, version, replaced) {
   const why = replaced ? [{ name: "amend", label: `Why certificate ${replaced.number} is replaced` }] : [];
-  const answers = await dialog(`Certificate of version ${version}`, [...why, ...FIELDS], {
-    text: "Laboratory and reference standards come from the bench file of the campaign. The certificate is written to the audit trail.",
-    confirm: "Issue",
-  });
-  if (!answers) return;
-  const body = { by: answers.by, order: orderOf(answers), ...(replaced ? { amend: answers.amend } : {}) };
-  await post("/api/units/{serial}/calibrations/{version}/certificate", { path: { serial, version }, body });
-  await show();
+  /** @type {Answers} */
+  let given = {};
+  let refusal = "";
+  for (;;) {
+    const fields = [...why, ...FIELDS].map((field) => ({ ...field, value: given[field.name] }));
+    const answers = await dialog(`Certificate of version ${version}`, fields, {
+      text: "Laboratory and reference standards come from the bench file of the campaign. The certificate is written to the audit trail.",
+      body: refusal ? notice("bad", h("p", {}, refusal)) : null,
+      confirm: "Issue",
+    });
+    if (!answers) return;
+    const body = { by: answers.by, order: orderOf(answers), ...(replaced ? { amend: answers.amend } : {}) };
+    try {
+      await post("/api/units/{serial}/calibrations/{version}/certificate", { path: { serial, version }, body });
+      return await show();
+    } catch (error) {
+      if (!(error instanceof Problem)) throw error;
+      [given, refusal] = [answers, error.message];
+    }
+  }
 }
 
 /** @param {Answers} given */

@@ -1,0 +1,129 @@
+"""The certificate on the page of a unit: its dialog is filled in, what is missing is named, the files are issued."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from instruments.bench_config import shipped_benches
+from tests.helpers.browser import Faults, Service
+from tests.helpers.certificates import ORDER
+from tests.helpers.certifying import OVERRIDE
+from tests.helpers.drafted_recipe import DRAFTED
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Locator, Page
+
+pytestmark = pytest.mark.timeout(400)
+UNIT = "FOG-0001"
+LABORATORY = ORDER["laboratory"]
+#: Data sets so near to each other that the uncertainty of the model is known.
+DENSE = DRAFTED.replace("[25]", "[15, 25, 35]").replace(
+    "[-20, -10, 0, 10, 20]", "[-60, -30, -20, -10, -5, 0, 5, 10, 20, 30, 60]"
+)
+ANSWERS = {
+    "Issued by": "I. Issuer",
+    "Customer": "Vehicle Works",
+    "Street and number": "Track 1",
+    "Post code": "ME1 1AA",
+    "City": "Rochester",
+    "Country": "GB",
+    "E-mail": "r.driver@example.org",
+    "Manufacturer of the item": "KVH",
+    "Condition of the item on receipt": "No visible damage.",
+    "Conformity to the specification": "VW-77, 3.2",
+    "Its limit of the error, deg/s": "3",
+}
+
+
+@pytest.fixture
+def laboratory() -> str:
+    """Return the laboratory of the bench file."""
+    return "\n".join(["", "[laboratory]", *(f"{name} = {json.dumps(value)}" for name, value in LABORATORY.items())])
+
+
+@pytest.fixture
+def recipe() -> str:
+    return DENSE
+
+
+@pytest.fixture
+def service(tmp_path: Path, laboratory: str, recipe: str) -> Iterator[Service]:
+    """Serve a bench of a laboratory, with a certified version that a campaign ended in."""
+    bench = tmp_path / "bench.toml"
+    bench.write_text(shipped_benches()["single-axis-sim"].read_text(encoding="utf-8") + laboratory)
+    serving = Service(tmp_path, bench=str(bench))
+    serving.start()
+    serving.post("/api/campaigns", {"recipe": recipe})
+    serving.until("/api/campaigns/1", lambda found: found["state"] == "done")
+    serving.post("/api/campaigns/1/drafts", {})
+    serving.post(f"/api/units/{UNIT}/calibrations/1/certify", {"by": "Ada Authoriser", **OVERRIDE})
+    yield serving
+    serving.stop()
+
+
+def filled(page: Page, **changed: str) -> Locator:
+    """Open the dialog, fill it in, and ask for the certificate; returns the dialog."""
+    page.get_by_role("button", name="Issue certificate").click()
+    dialog = page.get_by_role("dialog")
+    for label, value in {**ANSWERS, **changed}.items():
+        dialog.get_by_label(label, exact=True).fill(value)
+    dialog.get_by_role("button", name="Issue").click()
+    return dialog
+
+
+def test_the_dialog_asks_for_every_fact_names_what_is_missing_and_gives_the_certificate(
+    service: Service, visit: Callable[..., Page], faults: Faults
+) -> None:
+    from playwright.sync_api import expect
+
+    page = visit(f"/units/{UNIT}")
+    dialog = filled(page, City="")
+    expect(dialog).to_be_visible()  # the browser asks for the city first
+    dialog.get_by_label("City").fill("Rochester")
+    dialog.get_by_label("With a guard band").check()
+    dialog.get_by_label("Condition of the item").fill(" ")
+    dialog.get_by_role("button", name="Issue").click()
+    refused = dialog.get_by_text(f"no certificate of {UNIT} version 1: 1 fact is missing.")
+    expect(refused).to_contain_text("item's condition: [item] of the order")
+    assert service.get(f"/api/units/{UNIT}/certificates") == []  # nothing was written
+    faults.clear()  # the browser complains of the answer 400
+    expect(dialog.get_by_label("Customer", exact=True)).to_have_value("Vehicle Works")  # nothing is typed twice
+    expect(dialog.get_by_label("With a guard band")).to_be_checked()
+
+    dialog.get_by_label("Condition of the item").fill("No visible damage.")
+    dialog.get_by_role("button", name="Issue").click()
+    files = page.get_by_role("group", name="Certificate ICL-")
+    expect(files).to_be_visible()
+    (issued,) = service.get(f"/api/units/{UNIT}/certificates")
+    expect(files).to_contain_text(issued["number"])
+    with page.expect_download() as download:
+        files.get_by_role("button", name="JSON").click()
+    document = json.loads(download.value.path().read_text(encoding="utf-8"))
+    assert document["laboratory"]["name"] == LABORATORY["name"]
+    assert (document["customer"]["name"], document["item"]["condition"]) == ("Vehicle Works", "No visible damage.")
+    assert document["conformity"]["rule"] == "guard-band"
+    with page.expect_download() as download:
+        files.get_by_role("button", name="PDF/A-3").click()
+    assert download.value.path().read_bytes().startswith(b"%PDF")
+
+
+@pytest.mark.parametrize(("laboratory", "recipe"), [("", DRAFTED)])
+def test_a_laboratory_that_the_bench_file_does_not_name_is_asked_for_where_it_belongs(
+    service: Service, visit: Callable[..., Page], faults: Faults
+) -> None:
+    from playwright.sync_api import expect
+
+    page = visit(f"/units/{UNIT}")
+    dialog = filled(page)
+    refused = dialog.get_by_text("facts are missing")
+    expect(refused).to_contain_text("laboratory's name, laboratory's street")
+    expect(refused).to_contain_text("[laboratory] of the bench file of the campaign")
+    dialog.get_by_role("button", name="Cancel").click()
+    expect(page.get_by_role("button", name="Issue certificate")).to_be_visible()
+    assert service.get(f"/api/units/{UNIT}/certificates") == []
+    faults.clear()  # the browser complains of the answer 400
