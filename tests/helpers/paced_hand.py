@@ -15,7 +15,7 @@ REST_S, WAIT_S = 0.005, 0.5
 
 
 class PacedClock(VirtualClock):
-    """Virtual time that leaves the processor to the page: else a long campaign runs, and is drawn, as fast as it can."""
+    """Virtual time that leaves the processor to the page: else a campaign runs, and is drawn, as fast as it can."""
 
     def __init__(self) -> None:
         super().__init__()
