@@ -21,21 +21,18 @@ def plan_on(recipe: str, bench_name: str) -> Any:
 
 @lru_cache(maxsize=32)
 def _made(recipe: str, bench_name: str, rate_hz: float, seed: int, hidden: tuple[tuple[str, float], ...]) -> Recording:
-    """Return what many tests begin with, made once in a process; no test can change it for the next one."""
     plan, bench = plan_on(recipe, bench_name)
     gyro = bench.gyros[0].model_copy(update={"sample_rate_hz": rate_hz})
-    recording = hidden_recording(plan, bench, gyro, seed, dict(hidden))
-    for values in (*recording.columns.values(), *(recording.environment or {}).values()):
-        values.flags.writeable = False
-    return recording
+    return hidden_recording(plan, bench, gyro, seed, dict(hidden))
 
 
 def _copied(recording: Recording) -> Recording:
-    return replace(
-        recording,
-        columns=dict(recording.columns),
-        environment=None if recording.environment is None else dict(recording.environment),
-    )
+    """Return a copy of what many tests begin with and is made once in a process: each may change its own."""
+    copied = [
+        None if columns is None else {name: values.copy() for name, values in columns.items()}
+        for columns in (recording.columns, recording.environment)
+    ]
+    return replace(recording, columns=copied[0] or {}, environment=copied[1])
 
 
 def single_axis(seed: int = 1, **hidden: float) -> Recording:
