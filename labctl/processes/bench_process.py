@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import sys
 import threading
+from importlib.metadata import version
 from logging import ERROR, INFO
 from multiprocessing.connection import Connection
 
@@ -27,7 +28,6 @@ from labctl.services.benches.bench_left import BenchLeft
 from labctl.services.benches.lease import hold_bench
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.preparation import clock_for, on_date
-from labctl.services.lab_service import VERSION
 from labctl.services.local_bench import LocalBench
 from labctl.services.planning.loading import load_bench
 from labctl.store import ServiceAddress, Store
@@ -143,7 +143,7 @@ def main() -> int:
         tell(line, error)
         return 2
     log.info(
-        "process.started", version=VERSION, bench=settings.bench, speed=settings.speed, database=store.location,
+        "process.started", version=version("labctl"), bench=settings.bench, speed=settings.speed, database=store.location,
         simulated_start=None if settings.simulated_start is None else settings.simulated_start.isoformat(),
     )  # fmt: skip
     BenchProcess(settings, store, local).run(line)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import httpx
 import uvicorn
 
-from instruments.clock import SystemClock, VirtualClock
+from instruments.clock import Clock, SystemClock, VirtualClock
 from labctl.api import create_app
 from labctl.api.middleware import AccessPolicy
 from labctl.processes.web_process import WORKER_MODULES
@@ -74,13 +74,14 @@ class Service:
     keys: bool = False
     port: int = 0
     url: str = ""
+    clock: Callable[[], Clock] = VirtualClock  #: of the bench
     limits: Limits | None = None  #: of worker processes; without, it computes in threads
     lab_service: LabService = field(init=False)
 
     def start(self) -> None:
         """Begin to answer."""
         store = Store(Database(str(self.folder / "lab.sqlite"), write=True))
-        runner = BenchRunner(store, load_bench(self.bench), VirtualClock) if self.bench else None
+        runner = BenchRunner(store, load_bench(self.bench), self.clock) if self.bench else None
         computation = InWorkers(store, self.limits, preload=WORKER_MODULES) if self.limits else None
         self.lab_service = LabService(store, SystemClock(), runner, computation)
         listener = socket.socket()

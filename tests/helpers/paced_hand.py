@@ -4,11 +4,27 @@ from __future__ import annotations
 
 import threading
 
+from instruments.clock import VirtualClock
 from instruments.interfaces.unit_handler import UnitHandler
 from procedures.contracts.operator import Answer, HumanOperator, Prompt, UnitHandlerOperator
 
 #: How long the bench's virtual time stands still, s of wall time, between two looks for an answer.
 PACE_S = 0.1
+#: What a paced clock takes for a wait of at least `WAIT_S` of its own time, s of wall time.
+REST_S, WAIT_S = 0.005, 0.5
+
+
+class PacedClock(VirtualClock):
+    """Virtual time that leaves the processor to the page: else a campaign runs, and is drawn, as fast as it can."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._never = threading.Event()
+
+    def sleep(self, duration_s: float) -> None:
+        super().sleep(duration_s)
+        if duration_s >= WAIT_S:
+            self._never.wait(REST_S)
 
 
 class PacedPerson(HumanOperator):

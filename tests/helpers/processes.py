@@ -18,6 +18,7 @@ import httpx
 from labctl.store import holder_of, is_url, open_store
 from tests.helpers.forked_commands import run_labctl
 from tests.helpers.signal_defaults import default_signals
+from tests.helpers.waiting import before_next_request
 
 #: For what a process does on a busy machine.
 WAIT_S = 100.0
@@ -104,6 +105,7 @@ class ServiceProcess:
                 found: dict[str, Any] = self.http.get(f"/api/campaigns/{campaign}").json()
                 if found.get("state") in {"done", "failed", "aborted"}:
                     return found
+            before_next_request()
 
     def close(self) -> None:
         """End all processes of the service at once, as a power cut would."""

@@ -10,6 +10,7 @@ from typing import Any
 WAIT_S = 60.0  #: for the next event
 QUIET_S = 0.2  #: without an event: time to check
 LOOK_S = 0.002  #: between two checks of what reports nothing
+ASK_S = 0.05  #: between two requests to another process
 
 
 def wait_until(
@@ -44,3 +45,8 @@ def eventually(holds: Callable[[], Any]) -> None:
             return
         never.wait(LOOK_S)
     raise AssertionError(f"not in {WAIT_S:g} s")
+
+
+def before_next_request() -> None:
+    """Leave the processor to the process that is asked: it needs it for what is waited for."""
+    threading.Event().wait(ASK_S)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -12,11 +12,19 @@ import pytest
 from labctl.calibration import Calibration
 from labctl.recording import Recording
 from tests.helpers.calibrations import calibrated
+from tests.helpers.migrated_databases import migrated_once
 from tests.helpers.recordings import Triaxial, points
 from tests.helpers.simulated_recordings import single_axis
 from tests.helpers.static_recordings import resting
 
 Grid = tuple[np.ndarray, np.ndarray]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def databases() -> Iterator[None]:
+    """Take new databases from one that was migrated."""
+    with migrated_once():
+        yield
 
 
 @pytest.fixture

@@ -3,6 +3,7 @@ resumed."""
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import signal
@@ -16,6 +17,7 @@ import pytest
 
 from labctl.store import holder_of
 from tests.helpers.processes import WAIT_S, ServiceProcess, begin, first_line, labctl, running
+from tests.helpers.waiting import before_next_request
 
 pytestmark = pytest.mark.timeout(400)  # processes that start on a busy machine
 
@@ -45,12 +47,12 @@ def holder(service: ServiceProcess) -> int:
 def asked_until(service: ServiceProcess, path: str, holds: Callable[[Any], bool]) -> Any:
     """Ask until the answer is as expected; requests that find no process wait for the next one."""
     while True:  # the test has a time-out
-        try:
+        answer = None
+        with contextlib.suppress(httpx.TransportError, ValueError):
             answer = service.http.get(path).json()
-        except (httpx.TransportError, ValueError):
-            continue
-        if holds(answer):
+        if answer is not None and holds(answer):
             return answer
+        before_next_request()
 
 
 def test_a_campaign_does_not_notice_that_the_web_process_is_killed(service: ServiceProcess) -> None:

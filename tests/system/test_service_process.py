@@ -20,6 +20,7 @@ from labctl.services.schemas.admin import KeyRequest, Role
 from labctl.store import check, holder_of, open_store
 from tests.helpers.paths import EXAMPLES
 from tests.helpers.processes import WAIT_S, ServiceProcess, end_of, labctl, running
+from tests.helpers.waiting import before_next_request
 
 pytestmark = pytest.mark.timeout(400)  # processes that start on a busy machine
 
@@ -100,6 +101,7 @@ def begun(service: ServiceProcess, start: int) -> Any:
         if history and history[0]["outcome"] != "claimed":
             assert history[0]["outcome"] == "started", history
             return history[0]
+        before_next_request()
 
 
 def test_sigterm_ends_the_campaign_in_the_safe_state(service: ServiceProcess) -> None:

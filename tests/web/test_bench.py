@@ -11,7 +11,7 @@ import pytest
 from instruments.clock import SystemClock
 from labctl.services.campaigns import preparation
 from tests.helpers.browser import Faults, Service
-from tests.helpers.paced_hand import PacedPerson
+from tests.helpers.paced_hand import PacedClock, PacedPerson
 from tests.helpers.paths import RECIPES
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ pytestmark = pytest.mark.timeout(300)
 def service(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Service]:
     """A bench on which a person turns and switches the units."""
     monkeypatch.setattr(preparation, "operator_of", lambda _: PacedPerson())
-    serving = Service(tmp_path)
+    serving = Service(tmp_path, clock=PacedClock)
     serving.start()
     yield serving
     serving.stop()

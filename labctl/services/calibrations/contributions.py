@@ -11,7 +11,6 @@ import numpy as np
 from labctl.errors import BadInput
 from labctl.fitting.uncertainty import Budget, RateUncertainty
 from labctl.json_types.budget import ContributionsOverJson
-from labctl.plots.contributions import contributions_html
 from labctl.services.schemas.uncertainty import ContributionLines, ContributionsOver, UncertaintyResponse
 
 #: Points of a line.
@@ -67,6 +66,8 @@ def write_figure(answer: UncertaintyResponse, target: Path) -> None:
     """Write the contributions over rate and over temperature, one panel for each axis. Raises BadInput."""
     if target.suffix != ".html":
         raise BadInput(f"{target}: the figure is an HTML page; name a file that ends in .html")
+    from labctl.plots.contributions import contributions_html  # noqa: PLC0415  0.2 s that no other command needs
+
     grid = answer.grid
     if grid is None:
         raise BadInput(

@@ -8,9 +8,6 @@ from pathlib import Path
 from typing import get_args
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.csv as pacsv
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from labctl.calibration import Calibration, CalibrationWarning, read_calibration
@@ -20,7 +17,6 @@ from labctl.errors import BadInput, BadRecording, NotCertified, NotEnoughData
 from labctl.fitting.numeric.arrays import Array
 from labctl.orientation import Orientation
 from labctl.recording import OutputUnit, RecordingInfo
-from labctl.recording.data_files import read_table
 from labctl.recording.info import Axis
 from labctl.recording.recording import Columns
 from labctl.services.calibrations.served import calibration_file
@@ -85,6 +81,13 @@ def orientation_of_file(
     With `target` the rows are written there with `angle_z_deg`. Raises BadInput, BadRecording, BadCalibrationFile,
     NotEnoughData.
     """
+    # PyArrow takes 0.2 s to load, and a service follows stored recordings only
+    import pyarrow as pa  # noqa: PLC0415
+    import pyarrow.csv as pacsv  # noqa: PLC0415
+    import pyarrow.parquet as pq  # noqa: PLC0415
+
+    from labctl.recording.data_files import read_table  # noqa: PLC0415
+
     if target is not None and (target.suffix not in TABLES or target.resolve() == source.resolve()):
         raise BadInput(f"{target}: name a result file other than the input, ending in .csv or .parquet")
     if source.suffix not in TABLES:

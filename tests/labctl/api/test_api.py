@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from labctl.store import Store
 from labctl.store.connection.database import Database
 from tests.helpers.paths import EXAMPLES
 from tests.helpers.plugins import register
+from tests.helpers.service import open_client
 
 
 def upload(client: TestClient, folder: Path, **changed: bytes) -> object:
@@ -28,11 +30,22 @@ def upload(client: TestClient, folder: Path, **changed: bytes) -> object:
     return client.post("/api/recordings", files=[("files", (name, data)) for name, data in content.items()])
 
 
-@pytest.fixture
-def fog(client: TestClient) -> TestClient:
+def with_fog(client: TestClient) -> TestClient:
     assert upload(client, EXAMPLES / "osu-fog").status_code == 201  # type: ignore[attr-defined]
     assert client.post("/api/units/OSU-FOG-2024/calibrations", json={"model": "ojeda2000"}).status_code == 201
     return client
+
+
+@pytest.fixture
+def fog(client: TestClient, shared_answers: Path) -> TestClient:
+    return with_fog(client)
+
+
+@pytest.fixture(scope="module")
+def unchanged_fog(tmp_path_factory: pytest.TempPathFactory) -> Iterator[TestClient]:
+    """The same service for all requests that are refused: none of them changes it."""
+    with open_client(tmp_path_factory.mktemp("fog") / "lab.sqlite") as client:
+        yield with_fog(client)
 
 
 def test_it_is_well(client: TestClient) -> None:
@@ -187,9 +200,9 @@ def test_the_fit_is_the_command_lines(fog: TestClient) -> None:
     ],
 )
 def test_errors_are_problem_documents(
-    fog: TestClient, method: str, path: str, body: object, status: int, slug: str
+    unchanged_fog: TestClient, method: str, path: str, body: object, status: int, slug: str
 ) -> None:
-    answer = fog.request(method, path, json=body)
+    answer = unchanged_fog.request(method, path, json=body)
     assert answer.status_code == status, answer.text
     assert answer.headers["content-type"] == "application/problem+json"
     problem = answer.json()

@@ -3,7 +3,7 @@ refitted."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -16,18 +16,21 @@ from labctl.error_per_turn import LEAST_RATE_DPS
 from labctl.fitting.data.channels import Channels, body_rates
 from labctl.recording import Recording
 from tests.helpers.paths import EXAMPLES
-from tests.helpers.service import add_recording
+from tests.helpers.recordings import Triaxial
+from tests.helpers.service import add_recording, open_client
 from tests.helpers.simulated_recordings import single_axis
 
 PATH = "/api/units/SIM-3/calibrations"
 
 
-@pytest.fixture
-def three(client: TestClient, triaxial: Callable[[int], Any]) -> tuple[TestClient, Recording]:
-    recording = triaxial(3).campaign(3)
-    add_recording(client, recording)
-    assert client.post(PATH, json={"model": "yang2018"}).status_code == 201
-    return client, recording
+@pytest.fixture(scope="module")
+def three(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[TestClient, Recording]]:
+    """A service with a version of a tri-axial unit and its recording; its tests only read."""
+    recording = Triaxial(3).campaign(3)
+    with open_client(tmp_path_factory.mktemp("three") / "lab.sqlite") as client:
+        add_recording(client, recording)
+        assert client.post(PATH, json={"model": "yang2018"}).status_code == 201
+        yield client, recording
 
 
 def compared(client: TestClient, path: str = PATH, **query: Any) -> dict[str, Any]:

@@ -23,6 +23,8 @@ from tests.helpers.spoilt import scaled, spoilt
 FOG, TABLE, SIMULATED = "OSU-FOG-2024", "WEISS-ENV05S", "FOG-0001"
 BY = ("--by", "A. Person")
 
+pytestmark = pytest.mark.usefixtures("shared_answers")
+
 
 @pytest.fixture
 def lab(tmp_path: Path) -> Lab:

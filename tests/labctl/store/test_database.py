@@ -23,6 +23,7 @@ from labctl.recording import Recording, RecordingInfo, to_points
 from labctl.store import Judgement, NewCalibration, ServiceAddress, Store, holder_of, migrate, open_store
 from labctl.store.connection.database import Database
 from labctl.store.schema import tables
+from tests.helpers import migrated_databases
 
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
 
@@ -59,6 +60,19 @@ def test_migrations_make_todays_tables(location: str) -> None:
         context = MigrationContext.configure(connection, opts={"compare_type": False})
         assert compare_metadata(context, tables.metadata) == []
     engine.dispose()
+
+
+def test_databases_of_tests_are_what_the_migrations_make(tmp_path: Path) -> None:
+    made: list[list[str]] = []
+    for name, upgrade in (("migrated", migrated_databases.run_migrations), ("copied", migrated_databases.upgrade)):
+        engine = sa.create_engine(f"sqlite:///{tmp_path / name}")
+        with engine.begin() as connection:
+            upgrade(connection)
+            driver = connection.connection.driver_connection
+            assert driver is not None
+            made.append(list(driver.iterdump()))
+        engine.dispose()
+    assert made[0] == made[1]
 
 
 def test_the_steps_are_those_that_alembic_finds(location: str) -> None:

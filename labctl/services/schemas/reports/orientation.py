@@ -24,8 +24,8 @@ class OrientationOptions(BaseModel):
     )
     rest_s: Seconds = Field(
         default=0.0,
-        description="Time for which the unit is at rest at the beginning, s; the mean rate of that time (static bias) is "
-        "subtracted.",
+        description="Time for which the unit is at rest at the beginning, s; the mean rate of that time (static "
+        "bias) is subtracted.",
     )
     instability_dps: Annotated[float, Field(ge=0, le=1e6, allow_inf_nan=False)] = Field(
         default=0.0,
@@ -39,8 +39,8 @@ class OrientationOptions(BaseModel):
         default=None,
         le=1e6,
         allow_inf_nan=False,
-        description=f"For a recording at rest: time from one stop to the next, s; {STOP_S:g} s of it count as a stop and "
-        "the rest as motion, and the drift between stops is returned.",
+        description=f"For a recording at rest: time from one stop to the next, s; {STOP_S:g} s of it count as a stop "
+        "and the rest as motion, and the drift between stops is returned.",
     )
 
 

@@ -30,7 +30,7 @@ temperatures_c = [10, 25, 40]
 rates_dps = [-300, -40, 0, 40, 300]
 positions = ["x", "y", "z"]
 [soak]
-hold_s = 3600
+hold_s = 1800
 [acquire]
 duration_s = 10
 settle_s = 2
