@@ -1180,7 +1180,7 @@ export interface paths {
         /**
          * Static bias and angle of a recording
          * @description The angle of one axis from its rate: static bias taken off (Ojeda et al. 2000, eqs. 15 and 16), offset renewed
-         *     at standstill (Weiss).
+         *     at standstill; of a record at rest, the drift between declared stops (Weiss).
          */
         get: operations["orientation_api_recordings__recording__orientation_get"];
         put?: never;
@@ -2212,7 +2212,7 @@ export interface components {
             clip?: boolean;
             /**
              * Hide
-             * @description Effects to hide in the units of a simulated bench, each as EFFECT or EFFECT=SIZE, SIZE in the unit of the effect.
+             * @description Effects to hide in the units of a simulated bench, each as EFFECT or EFFECT=SIZE, SIZE in the unit of the effect, or z10 for a signal of ten standard deviations of the noise on this plan.
              */
             hide?: string[];
             /**
@@ -9172,14 +9172,18 @@ export interface operations {
             query?: {
                 /** @description Axis x, y or z; default: the only axis of the recording. */
                 axis?: string | null;
-                /** @description Version of the calibration that corrects the readings; 0: no correction; default: the certified version, if any. */
-                version?: number | null;
                 /** @description Time for which the unit is at rest at the beginning, s; the mean rate of that time (static bias) is subtracted. */
                 rest_s?: number;
                 /** @description Bias instability of the gyro, deg/s; it is part of the uncertainty of the static bias. */
                 instability_dps?: number;
                 /** @description While the unit stands still, hold the angle and estimate the offset again. */
                 standstill?: boolean;
+                /** @description Time from the beginning whose readings are left out, s. */
+                warm_up_s?: number;
+                /** @description For a recording at rest: time from one stop to the next, s; 10 s of it count as a stop and the rest as motion, and the drift between stops is returned. */
+                stop_every_s?: number | null;
+                /** @description Version of the calibration that corrects the readings; 0: no correction; default: the certified version, if any. */
+                version?: number | null;
             };
             header?: never;
             path: {
