@@ -142,10 +142,10 @@ def main() -> int:
         log.debug("process.refused", exc_info=error)
         tell(line, error)
         return 2
-    log.info(
-        "process.started", version=version("labctl"), bench=settings.bench, speed=settings.speed, database=store.location,
-        simulated_start=None if settings.simulated_start is None else settings.simulated_start.isoformat(),
-    )  # fmt: skip
+    start = settings.simulated_start
+    started = {"version": version("labctl"), "bench": settings.bench, "speed": settings.speed}
+    dated = {"simulated_start": None if start is None else start.isoformat()}
+    log.info("process.started", **started, **dated, database=store.location)
     BenchProcess(settings, store, local).run(line)
     return 0
 
