@@ -14,7 +14,8 @@ import threading
 from collections.abc import Callable
 from multiprocessing import Pipe, get_context, parent_process
 from multiprocessing.connection import Connection
-from typing import Generic, TypeVar
+from tempfile import TemporaryFile
+from typing import IO, Generic, TypeVar
 
 ResultT = TypeVar("ResultT")
 
@@ -33,8 +34,10 @@ class Forked(Generic[ResultT]):
         self._line: Connection | None = None
         if not can_fork():
             return
+        # a pipe would carry the result in pieces of 64 KiB
+        self._file = TemporaryFile()  # noqa: SIM115  closed with this
         self._line, theirs = Pipe(duplex=False)
-        self._process = get_context("fork").Process(target=_send, args=(theirs, work), daemon=True)
+        self._process = get_context("fork").Process(target=_save, args=(theirs, self._file, work), daemon=True)
         self._process.start()
         theirs.close()  # so that the end of the fork is the end of the line
 
@@ -47,7 +50,9 @@ class Forked(Generic[ResultT]):
         """Return what `work` returns; raises what it raises. A fork that fails is replaced by work in this process."""
         if self._line is not None:
             with contextlib.suppress(EOFError, OSError):
-                result: ResultT = pickle.loads(self._line.recv_bytes())  # noqa: S301  from a fork of this process
+                self._line.recv_bytes()
+                self._file.seek(0)
+                result: ResultT = pickle.load(self._file)  # noqa: S301  from a fork of this process
                 return result
         return self._work()
 
@@ -56,6 +61,7 @@ class Forked(Generic[ResultT]):
         if self._line is None:
             return
         self._line.close()
+        self._file.close()
         self._process.kill()
         self._process.join(END_S)
 
@@ -66,8 +72,10 @@ def can_fork() -> bool:
     return alone and hasattr(os, "sched_getaffinity") and len(os.sched_getaffinity(0)) > 1
 
 
-def _send(line: Connection, work: Callable[[], object]) -> None:
-    """Do the work and send its result; whatever goes wrong, the parent sees the end of the line and does it itself."""
+def _save(line: Connection, file: IO[bytes], work: Callable[[], object]) -> None:
+    """Do the work and save its result; whatever goes wrong, the parent sees the end of the line and does it itself."""
     with contextlib.suppress(Exception):
-        line.send_bytes(pickle.dumps(work(), pickle.HIGHEST_PROTOCOL))
+        pickle.dump(work(), file, pickle.HIGHEST_PROTOCOL)
+        file.flush()
+        line.send_bytes(b"saved")
     line.close()

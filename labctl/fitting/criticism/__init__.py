@@ -6,8 +6,10 @@ This is the public face: other packages import from here only, never from a subm
 from labctl.fitting.criticism.criticism import (
     LARGE_DRIFT,
     Criticism,
+    FittedMeans,
     best_shapes,
     criticise,
+    fit_means,
 )
 from labctl.fitting.criticism.diagnostics import residual_maps
 from labctl.fitting.criticism.effect_size import SizeReference, size_for_z, size_in_noise_units, size_reference
@@ -34,6 +36,7 @@ __all__ = [
     "SEPARATED_CHI2",
     "Criticism",
     "EffectVisibility",
+    "FittedMeans",
     "LeadingSignal",
     "ReducedRecording",
     "Residuals",
@@ -44,6 +47,7 @@ __all__ = [
     "best_shapes",
     "criticise",
     "effect_visibilities",
+    "fit_means",
     "has_one_rising_leg",
     "leading_signal",
     "residual_maps",

@@ -83,6 +83,22 @@ class Criticism:
         return max(noise.drift.drift_dps for noise in self.floor.axes.values()) / (stability / 2)
 
 
+@dataclass(frozen=True)
+class FittedMeans:
+    """The means of a recording, and the model fitted to them."""
+
+    data: FitData
+    base: FitResult
+
+
+@single_threaded
+def fit_means(points: Recording, model: ErrorModel) -> FittedMeans:
+    """Fit a model to the means of a recording. Raises NotEnoughData, NotConverged."""
+    report_stage("fitting the model")
+    data = fit_data_of(points)
+    return FittedMeans(data, fit_preset(data, changed(model)))
+
+
 @single_threaded
 def criticise(
     recording: Recording,
@@ -90,19 +106,22 @@ def criticise(
     catalogue: Mapping[str, Effect] = CATALOGUE,
     *,
     points: Recording | None = None,
+    fitted: FittedMeans | None = None,
     full: bool = True,
 ) -> Criticism:
     """Hold a model against a recording. Without `full` only the verdict is sought, as long studies do.
 
-    `points` are the recording's means, where they are already known. Raises NotEnoughData only where the model cannot
-    even be fitted; too little for a verdict is a verdict. Raises Cancelled at a stage that finds it cancelled.
+    `points` are the recording's means, and `fitted` the fit to them, where they are already known. Raises
+    NotEnoughData only where the model cannot even be fitted; too little for a verdict is a verdict. Raises Cancelled
+    at a stage that finds it cancelled.
     """
+    if fitted is None and full:
+        fitted = fit_means(points or recording, model)
+    fit_data = fitted.data if fitted is not None else fit_data_of(points or recording)
+    base = fitted.base if fitted is not None else None
     report_stage("reducing the recording")
     recording = with_temperature(recording)
     data = replace(reduce_recording(recording), static=static_record(recording, 0.0 if full else LONG_S))
-    fit_data = fit_data_of(points or recording)
-    report_stage("fitting the model")
-    base = fit_preset(fit_data, changed(model)) if full else None
     forward = _forward(fit_data, model, base)
     if (short := _too_little(data, forward)) is not None:
         return Criticism(Verdict("insufficient_data", reason=short), data, fit_data, base, None, None)

@@ -8,14 +8,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from labctl.errors import BadInput, LabctlError
-from labctl.fitting.criticism import Criticism, criticise
+from labctl.fitting.criticism import Criticism, criticise, fit_means
 from labctl.fitting.effects import Formula
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.inversion import NotConverged
 from labctl.json_types.criticism import Experiment
 from labctl.progress import report_stage
 from labctl.services.criticism.decimated_readings import Decimated
-from labctl.services.criticism.measurements import Measurements
+from labctl.services.criticism.measurements import Measurements, refuse_unmeasured
 from labctl.services.criticism.report_text import answer_of, with_warnings
 from labctl.services.criticism.residuals import residual_columns
 from labctl.services.criticism.verification.of_version import verify
@@ -39,8 +39,13 @@ def evaluate(
     catalogue, measured = catalogue_with(competing), Measurements(store, recordings, decimated)
     report_stage("inspecting the recording")
     warnings = measured.warnings
+    for row in recordings:
+        refuse_unmeasured(row, measured.of_each[row.id])
+    applied = _applied(store, calibration, measured)
     try:
-        found = criticise(measured.readings, model_of(calibration), catalogue, points=measured.points)
+        model = model_of(calibration)
+        fitted = fit_means(measured.points, model)  # while the readings are being read
+        found = criticise(measured.readings, model, catalogue, fitted=fitted)
     except NotConverged as error:
         what = f"criticism of version {calibration.version} on {measured.named}"
         refuse_wrong(warnings, what, accepted=False, insist=f"; without refitting, {error}")
@@ -50,7 +55,7 @@ def evaluate(
     experiments = _experiments(store, measured.row.campaign, found)
     criticism = answer_of(serial, version, measured.recordings, found, experiments)
     return (
-        with_warnings(criticism.model_copy(update={"applied": _applied(store, calibration, measured)}), warnings),
+        with_warnings(criticism.model_copy(update={"applied": applied}), warnings),
         ResidualsResponse(
             serial=serial,
             version=version,

@@ -114,12 +114,8 @@ def recordings_text(recordings: tuple[int, ...]) -> str:
     return f"recordings {', '.join(first)} and {last}" if first else f"recording {last}"
 
 
-def load_reduced_readings(store: Store, row: RecordingRow, points: Recording, decimated: Decimated | None) -> Recording:
-    """Return a recording's readings, decimated data set by data set; `points`, its means, where it has none.
-
-    `decimated` gives them where they are read already. Raises BadInput for a table of coefficients, which holds no
-    measurement.
-    """
+def refuse_unmeasured(row: RecordingRow, points: Recording) -> None:
+    """Raise BadInput for a table of coefficients, which holds no measurement, and for readings in poses."""
     if row.kind == "coefficients":
         raise BadInput(
             f"recording {row.id} is a table of coefficients, but a model is compared with measurements; name a "
@@ -127,6 +123,14 @@ def load_reduced_readings(store: Store, row: RecordingRow, points: Recording, de
         )
     if row.kind == "samples":
         refuse_poses(points.info)
+
+
+def load_reduced_readings(store: Store, row: RecordingRow, points: Recording, decimated: Decimated | None) -> Recording:
+    """Return a recording's readings, decimated data set by data set; `points`, its means, where it has none.
+
+    `decimated` gives them where they are read already. Raises BadInput for what `refuse_unmeasured` refuses.
+    """
+    refuse_unmeasured(row, points)
     if not is_decimated(row):
         return points
     columns = dict(decimated_columns_of(store, row) if decimated is None else decimated(row))

@@ -19,7 +19,7 @@ from tests.helpers.simulated_recordings import single_axis
 
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
 FIRST = [
-    "inspecting the recording", "reading the recording", "reducing the recording", "fitting the model",
+    "inspecting the recording", "fitting the model", "reading the recording", "reducing the recording",
     "preparing candidates",
 ]  # fmt: skip
 
