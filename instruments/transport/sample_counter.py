@@ -59,6 +59,7 @@ class SampleCounter:
         if self._standing >= MOST_STANDING:
             raise MalformedReply(
                 self._device,
-                f"the sample counter on {self._port} stands at {int(counts[-1])} in {self._standing} successive "
-                "readings; check that the field of the counter is the right one, and switch the unit off and on",
+                f"the sample counter on {self._port} does not advance: it is {int(counts[-1])} in {self._standing} "
+                "successive readings; check in the bench file which field of the frame is the counter, then switch "
+                "the unit off and on",
             )

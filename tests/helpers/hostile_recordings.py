@@ -145,10 +145,10 @@ HOSTILE: dict[str, tuple[Callable[[Path], None], str]] = {
     "doubled in the head": (head('serial = "G-2"'), r"recording.toml: not TOML: Cannot overwrite a value"),
     "long head": (head("#" * (1 << 20)), r"recording.toml: not TOML: larger than 1048576 bytes"),
     "long value": (head("axis = '" + "x" * 10_000 + "'"), r"recording.toml: axis: .{100,300}$"),
-    "long header": (data("samples.csv", b"x" * 100_000), r"samples.csv: the header is longer than 65536 bytes"),
+    "long header": (data("samples.csv", b"x" * 100_000), r"samples.csv: the first line is longer than 65536 bytes"),
     "many columns": (
         data("samples.csv", b",".join(b"c%d" % n for n in range(300)) + b"\n"),
-        r"300 columns; at most 256",
+        r"300 columns, but at most 256",
     ),
     "CSV not UTF-8": (data("samples.csv", _ROWS + b"\n1,0,10,25,\xff\n"), r"samples.csv: not UTF-8 text after row 0"),
     "long word": (

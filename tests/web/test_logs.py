@@ -52,7 +52,7 @@ def test_a_csv_is_dropped_its_map_corrected_and_imported(service: Service, visit
     page.get_by_role("group", name="Columns of chamber.csv").scroll_into_view_if_needed()
     page.locator(".plot .main-svg").first.wait_for()
     page.get_by_role("button", name="Import", exact=True).click()
-    expect(page.get_by_text("Recording 1 of CHAMBER-7: 1 data sets, 400 readings")).to_be_visible()
+    expect(page.get_by_text("Imported as recording 1 of unit CHAMBER-7: 1 data sets, 400 readings")).to_be_visible()
     (row,) = service.get("/api/recordings")
     assert row["serial"] == "CHAMBER-7"
     assert service.get("/api/recordings/1")["info"]["motion"] == "rest"
@@ -68,7 +68,7 @@ def test_a_ulog_is_dropped_and_imported_as_it_is_proposed(
     expect(page.get_by_text("cold_start.ulg: a PX4 ULog, 400 rows")).to_be_visible()
     expect(page.get_by_text("Unit 00ab12cd-0, motion rest, 1 data set")).to_be_visible()
     page.get_by_role("button", name="Import", exact=True).click()
-    expect(page.get_by_text("Recording 1 of 00ab12cd-0: 1 data sets, 400 readings")).to_be_visible()
+    expect(page.get_by_text("Imported as recording 1 of unit 00ab12cd-0: 1 data sets, 400 readings")).to_be_visible()
 
 
 def test_free_motion_is_refused_on_the_page_too(service: Service, visit: Callable[..., Page], faults: Faults) -> None:

@@ -41,7 +41,7 @@ def test_a_recording_is_dropped_and_opened(service: Service, visit: Callable[...
 
     page = visit("/recordings")
     dropped(page, FOG, ["recording.toml", "points.csv"])
-    expect(page.get_by_text("Recording 1 of OSU-FOG-2024: 695 data sets")).to_be_visible()
+    expect(page.get_by_text("Imported as recording 1 of unit OSU-FOG-2024: 695 data sets")).to_be_visible()
     page.get_by_role("link", name="Show it").click()
     expect(page.get_by_role("region", name="695 data sets").first).to_be_visible()
     page.get_by_role("button", name="7", exact=True).click()

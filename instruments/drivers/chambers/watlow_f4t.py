@@ -78,8 +78,9 @@ class WatlowF4T(Watlow):
             other = "big" if self.settings.word_order == "little" else "little"
             raise MalformedReply(
                 self.name,
-                f"its limits of the set point read {low:g} to {high:g} deg C, but the lower limit must be below "
-                f"the upper one; set word_order = '{other}' in the bench file, or correct the limits at its panel",
+                f"its set-point limits were read as {low:g} and {high:g} deg C, but the lower limit must be below the "
+                f"upper one; if its panel shows other limits, set word_order = '{other}' in the bench file, otherwise "
+                "correct the limits at its panel",
             )
         return low, high
 

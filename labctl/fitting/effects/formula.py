@@ -140,7 +140,9 @@ def _parsed(name: str, text: str) -> ast.Expression:
             tree = ast.parse(text.strip(), mode="eval")
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         said = error.args[0] if error.args else type(error).__name__
-        raise BadInput(f"formula {name!r}: {text!r} cannot be read ({said}); correct it") from None
+        raise BadInput(
+            f"formula {name!r}: {text!r} cannot be read ({said}); write a formula such as 0.02 * (temperature_c - 25)"
+        ) from None
     level: list[ast.AST] = [tree.body]
     depth = 0
     while level:

@@ -149,8 +149,9 @@ def _with_white_noise(design: AxisDesign, y: Array, scatter: Scatter) -> Scatter
     rank = rank_of(columns)
     if len(y) <= rank:
         raise NotEnoughData(
-            f"{len(y)} data sets are too few: {rank} coefficients (shifts between recordings included) leave "
-            "none to estimate the error of the fit; measure more data sets, or leave effects out"
+            f"{len(y)} data sets are too few to fit {rank} coefficients (including the shifts from recording to "
+            f"recording) and to estimate the error of the fit: at least {rank + 1} are needed; measure more data sets, "
+            "or leave effects out"
         )
     taken, *_ = np.linalg.lstsq(columns, y, rcond=1e-12)
     left = y - columns @ taken

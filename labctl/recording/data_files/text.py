@@ -55,7 +55,10 @@ def _header(path: Path) -> list[str]:
     with path.open("rb") as file:
         line = re.split(rb"[\r\n]", file.read(MOST_HEADER_BYTES + 1), maxsplit=1)[0]
     if len(line) > MOST_HEADER_BYTES:
-        raise BadRecording(f"{path}: the header is longer than {MOST_HEADER_BYTES} bytes; expected names of columns")
+        raise BadRecording(
+            f"{path}: the first line is longer than {MOST_HEADER_BYTES} bytes; expected a text file that begins with a "
+            "line of column names; check that this is the right file"
+        )
     try:
         header = line.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -54,7 +54,9 @@ def layout_of(path: Path, head: bytes, given: FileKeys) -> tuple[FileLayout, lis
     below = [row for line, row in zip(lines[data - 1 :], cells[data - 1 :], strict=True) if line.strip()]
     width = Counter(len(row) for row in below).most_common(1)[0][0] if below else 0
     if width == 0:
-        raise BadRecording(f"{path}: no row of readings below the header; expected at least one")
+        raise BadRecording(
+            f"{path}: no row of readings below the header; check that the file is complete, or give another file"
+        )
     decimal = given.decimal or _decimal(below, separator)
     if header > len(lines):
         raise BadRecording(

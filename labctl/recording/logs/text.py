@@ -73,7 +73,8 @@ def read_text(path: Path, options: TextOptions) -> RawTable:
 def _refuse_names(path: Path, names: list[str]) -> None:
     if len(names) > MOST_COLUMNS:
         raise BadRecording(
-            f"{path}: {len(names)} columns; at most {MOST_COLUMNS} are read; leave out what is not needed"
+            f"{path}: the file has {len(names)} columns, but at most {MOST_COLUMNS} are allowed; remove the "
+            "columns that are not needed"
         )
     doubled = sorted({name for name in names if names.count(name) > 1})
     if doubled:

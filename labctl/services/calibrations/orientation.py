@@ -170,7 +170,7 @@ def _rows(source: _Source, axis: str, t_s: Array, rate: Array, warm_up_s: float)
     if len(back := np.flatnonzero(np.diff(t_s[rows]) <= 0)):
         row = int(rows[back[0] + 1])
         raise BadRecording(
-            f"{source.what}: column 't_s', row {row + 1}: {t_s[row]:g} s is not after the reading before it; sort the "
+            f"{source.what}: column 't_s', row {row + 1}: {t_s[row]:g} s is not later than the row before; sort the "
             "rows by time"
         )
     warm = rows[t_s[rows] - t_s[rows[0]] >= warm_up_s]

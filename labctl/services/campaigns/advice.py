@@ -111,7 +111,7 @@ FAILURES: tuple[Failure, ...] = (
     ),
     Failure(
         r"readings lost or damaged|readings marked bad|not one of about|none of about|the (?:sample "
-        r")?counter on .* stands at",
+        r")?counter on .* (?:does not advance|stands at)",
         "The readings of a unit were missing, damaged or marked bad.",
         f"Check the unit's power, cable and baud rate, {RESUME}.",
     ),

@@ -112,7 +112,7 @@ class ServiceControl:
         if asked.bench != runner.bench.name:
             raise NotFound(
                 f"this service drives bench {runner.bench.name}, not {asked.bench!r}, and can check "
-                f"only its own bench; name bench {runner.bench.name}"
+                f"only its own bench; name bench {runner.bench.name}, or ask the service of the other bench"
             )
         found = runner.check()
         context.store.audit.record(context.now(), "bench check", f"bench {found.bench}", {"ok": found.ok})

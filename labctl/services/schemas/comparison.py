@@ -68,7 +68,8 @@ class ComparisonColumns(ResponseModel):
     turn_after_deg: list[float | None] = Field(
         default_factory=list,
         description="Error of the integrated angle "
-        "after a full turn with the calibration applied, deg; null as for `turn_before_deg`.",
+        "after a full turn with the calibration applied, deg; null: the rate is too low, another axis turns, or the "
+        "recording has no data set at rest.",
     )
 
 

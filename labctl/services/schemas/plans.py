@@ -155,11 +155,13 @@ class RunColumns(TimelineColumns):
     """The steps of a campaign, with what became of each."""
 
     state: list[StepState]
-    started_s: list[float | None] = Field(description="Start of the step, s of campaign time; null: not yet started.")
+    started_s: list[float | None] = Field(
+        description="Start of the step, s since the start of the campaign; null: not yet started."
+    )
     ended_s: list[float | None]
     forecast_s: list[float] = Field(
-        description="Start of the step, s of campaign time: measured, or for future steps computed from the "
-        "expected times."
+        description="Start of the step, s since the start of the campaign: measured, or for future steps computed "
+        "from the expected times."
     )
 
 

@@ -15,8 +15,8 @@ class BudgetLineResponse(ResponseModel):
     """One source of uncertainty; null is unknown, never 0."""
 
     source: str = Field(
-        description="Source of the uncertainty: coefficients, model, repeatability, or the "
-        "quantity of a reference standard."
+        description="Source of the uncertainty: `coefficients` of the fit, `model` (its form), `repeatability`, or the "
+        "quantity that a reference standard realises, such as `clock`."
     )
     name: str = Field(description="Name of the reference standard, with the number of its certificate.")
     type: Literal["A", "B"] = Field(description="Evaluated by statistics (A) or otherwise (B).")

@@ -18,7 +18,8 @@ class DataWarning(ResponseModel):
         "time_unit, worse ..."
     )
     severity: Severity = Field(
-        description="Certainty of the error: certain: labctl refuses to fit; likely: labctl fits and shows the warning."
+        description="How sure labctl is that the data are wrong. `certain`: labctl refuses to fit; `likely`: labctl "
+        "fits and shows the warning."
     )
     where: str = Field(description="The axis, position, data sets or column that the warning concerns.")
     said: str

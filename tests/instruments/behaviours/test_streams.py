@@ -197,8 +197,8 @@ SET_OTHERWISE = (
 STANDS = (
     MalformedReply,
     (
-        r"the sample counter on sim://\S+ stands at \d+ in \d+ successive readings; check that the "
-        r"field of the counter is the right"
+        r"the sample counter on sim://\S+ does not advance: it is \d+ in \d+ successive readings; check in "
+        r"the bench file which field of the frame is the counter"
     ),
 )
 SPECIAL = [

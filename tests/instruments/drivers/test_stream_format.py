@@ -99,7 +99,8 @@ def test_a_counter_that_stands_is_told(stand: Make, monkeypatch: pytest.MonkeyPa
     message = simulated.message
     monkeypatch.setattr(simulated, "message", lambda f, numbers: message(f, numbers | {"sequence": 7}))
     with pytest.raises(
-        MalformedReply, match=r"mems: the sample counter on sim://.* stands at 7 in \d+ successive readings; check"
+        MalformedReply,
+        match=r"mems: the sample counter on sim://.* does not advance: it is 7 in \d+ successive readings; check",
     ):
         s.gyro.read(2.0)
 

@@ -66,5 +66,8 @@ def _channels(compensator: Compensator, recording: Recording) -> dict[str, Array
     valid = np.asarray(columns["valid"]) != 0 if "valid" in columns else np.ones(len(recording), dtype=bool)
     absent = [name for name in compensator.needs if name not in columns]
     if absent:
-        raise BadInput(f"the model needs channel {absent[0]!r}, which the recording does not have; add it")
+        raise BadInput(
+            f"the model needs the channels {', '.join(absent)}, which the recording does not have; import the "
+            "recording again with these columns, or name another recording"
+        )
     return {name: np.asarray(columns[name], dtype=np.float64)[valid] for name in compensator.needs}

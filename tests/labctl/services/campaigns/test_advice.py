@@ -62,6 +62,7 @@ def test_every_guard_is_told_in_its_own_words(kind: str, change: dict[str, Any])
             "did not answer",
         ),
         (NoReply("imu", "the counter on /dev/ttyUSB0 stands at 7 in 50 readings in a row"), "readings"),
+        (BadData("imu", "the sample counter on /dev/ttyUSB0 does not advance: it is 7 in 50 readings"), "readings"),
         ("Ann declined: turn the units: no wrench", "cannot be done"),
         ("resumed 5 times without finishing a step; inspect the bench", "never finished a step"),
         (

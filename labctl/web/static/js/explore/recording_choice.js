@@ -41,7 +41,7 @@ export function recordingChoice(serial, version, own, now) {
       acts,
       version === undefined
         ? null
-        : button(`Compare version ${version} with ${recordingsText(of)}`, () =>
+        : button(`Check calibration version ${version} against ${recordingsText(of)}`, () =>
             navigate(`/explore?${changedQuery("", { unit: serial, version, view: query().view, ...inAddress(of) })}`),
           ),
       fitForm(serial, chosen, rows.find((row) => picked.has(row.id))?.motion, "Fit them together"),

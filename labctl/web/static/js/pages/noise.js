@@ -56,7 +56,9 @@ export async function page({ query, signal }) {
     pageHeader("Noise at rest", "Allan deviations of the longest section at rest of each recording, in one picture."),
     rows.length
       ? card("Recordings", h("p", { class: "muted" }, `At most ${MOST} at once.`), list)
-      : emptyState("No recording has single readings, which an Allan deviation needs."),
+      : emptyState(
+          "An Allan deviation needs every reading, but all recordings hold only means. Import a recording with all readings.",
+        ),
     card("Allan deviation", place),
   );
 }

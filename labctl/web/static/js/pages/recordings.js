@@ -105,7 +105,7 @@ function recordingTable(rows) {
 
 const noRecordings = () =>
   emptyState(
-    h("p", {}, "There is no recording yet."),
+    h("p", {}, "There is no recording yet. Import a file, or run a campaign."),
     h(
       "p",
       {},

@@ -146,7 +146,7 @@ function acceptedNotice(made, left) {
     h(
       "p",
       { class: "lead" },
-      `Recording ${made.recording} of ${made.serial}: ${count(made.datasets)} data sets, ${count(made.readings)} readings.`,
+      `Imported as recording ${made.recording} of unit ${made.serial}: ${count(made.datasets)} data sets, ${count(made.readings)} readings.`,
     ),
     warnings.map((warning) => h("p", {}, `${warning.severity === "certain" ? "Wrong" : "Check"}: ${warning.text}`)),
     left.length ? h("p", { class: "small" }, `Files not used: ${left.join(", ")}.`) : null,

@@ -70,5 +70,5 @@ export function errorComparison(state, signal) {
 /** @param {Comparison} comparison */
 function sourceText({ source, held, left_out: leftOut }) {
   const at = Object.entries(held).map(([name, value]) => `${name} ${Number(value.toPrecision(4))}`);
-  return `Model: ${source}.${at.length ? ` Lines are at ${at.join(", ")}.` : ""}${leftOut.length ? ` Without ${leftOut.map((line) => line.effect.replaceAll("_", " ")).join(", ")}, which ${leftOut.length > 1 ? "do" : "does"} not leave with the calibration.` : ""}`;
+  return `Error model from ${source}.${at.length ? ` Lines are at ${at.join(", ")}.` : ""}${leftOut.length ? ` Without ${leftOut.map((line) => line.effect.replaceAll("_", " ")).join(", ")}, which ${leftOut.length > 1 ? "do" : "does"} not leave with the calibration.` : ""}`;
 }
