@@ -19,7 +19,7 @@ from typing import IO, Generic, TypeVar
 
 ResultT = TypeVar("ResultT")
 
-#: A child that has been told to end is waited for so long, s.
+#: A child that was killed is waited for so long, s.
 END_S = 5.0
 
 
