@@ -45,7 +45,7 @@ def refuse_large_numbers(path: Path, columns: Columns) -> None:
         if wrong.any():
             row = int(np.argmax(wrong))
             raise BadRecording(
-                f"{path}: column {name!r}, row {row + 1}: {values[row]} is larger than {LARGEST_NUMBER} (2^31 - "
+                f"{path}: column {name!r}, row {row + 1}: {values[row]} is beyond +-{LARGEST_NUMBER} (2^31 - "
                 "1), the largest number that every database can store; count from 1"
             )
 

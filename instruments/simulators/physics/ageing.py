@@ -1,8 +1,7 @@
 """Ageing of a simulated unit: what its bias and its scale factors gain with the calendar, powered or not.
 
-A law has no size unless a bench file gives one. Sizes to give: a MEMS unit of the class of the ADIS16488A, whose data
-sheet projects a bias of 0.2 deg/s (1 sigma) over ten years, 0.02 deg/s per year, with 3e-4 per year of scale factor; a
-fibre-optic unit far less (Ojeda et al. 2000 found two that needed no other calibration after a year).
+A law has no size unless a bench file gives one. Fibre-optic units age little: Ojeda et al. (2000) found two that
+needed no other calibration after a year.
 """
 
 from __future__ import annotations

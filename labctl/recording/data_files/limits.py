@@ -60,7 +60,7 @@ def checked_names(path: Path, names: Sequence[str]) -> None:
     """Raise BadRecording for columns that are too many, or of one name."""
     if len(names) > MOST_COLUMNS:
         raise BadRecording(
-            f"{path}: {len(names)} columns; at most {MOST_COLUMNS} are read; remove the columns that are not needed"
+            f"{path}: {len(names)} columns, but at most {MOST_COLUMNS} are allowed; remove those that are not needed"
         )
     seen: set[str] = set()
     for name in names:

@@ -121,7 +121,7 @@ class ColumnValues:
             given = f"{values[row]:d}" if values.dtype.kind in "iu" else repr(float(values[row]))
             raise self._wrong(
                 row,
-                f"{given} is larger than {LARGEST_WHOLE} (2^53 - 1), the largest whole number that is stored "
+                f"{given} is beyond +-{LARGEST_WHOLE} (2^53 - 1), the largest whole number that is stored "
                 "exactly; count from 1",
             )
         return values.astype(np.int64)
