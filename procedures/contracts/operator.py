@@ -150,8 +150,9 @@ class HumanOperator:
     def _reply(self, answer: Answer) -> None:
         with self._lock:
             if self._pending is None or self._pending.id != answer.prompt_id or self._answer is not None:
-                now = f"{self._pending.id!r} is" if self._pending and self._answer is None else "no question is"
-                raise StalePrompt(
-                    f"question {answer.prompt_id!r} was already answered or withdrawn; {now} open now, answer that"
+                is_open = self._pending is not None and self._answer is None
+                now = (
+                    f"answer question {self._pending.id!r}, which is open now" if is_open else "no question is open now"
                 )
+                raise StalePrompt(f"question {answer.prompt_id!r} was already answered or withdrawn; {now}")
             self._answer = answer

@@ -87,7 +87,8 @@ class Guards:
                 excess.value,
                 excess.limit,
                 excess.unit,
-                f"{excess.device}: {excess.text}: {excess.value:.6g} {excess.unit}, limit {excess.limit:.6g}".rstrip(),
+                f"{excess.device}: {excess.text}: {excess.value:.6g} {excess.unit}".rstrip()
+                + f", limit {excess.limit:.6g}",
             )
             for kind, check in CHECKS.items()
             for excess in check(self, now)

@@ -140,7 +140,10 @@ HOSTILE: dict[str, tuple[Callable[[Path], None], str]] = {
         head("notes = " + "{a=" * DEEP + "1" + "}" * DEEP),
         r"line 6: brackets are nested more than 32 levels deep",
     ),
-    "dots in the head": (head("[" + "a." * DEEP + "a]"), r"recording.toml: not TOML: line 6: a dotted key is more than 32 levels deep"),
+    "dots in the head": (
+        head("[" + "a." * DEEP + "a]"),
+        r"recording.toml: not TOML: line 6: a dotted key is more than 32 levels deep",
+    ),
     "digits in the head": (head("power_on_s = " + "1" * 5000), r"recording.toml: not TOML: .*4300 digits"),
     "doubled in the head": (head('serial = "G-2"'), r"recording.toml: not TOML: Cannot overwrite a value"),
     "long head": (head("#" * (1 << 20)), r"recording.toml: not TOML: larger than 1048576 bytes"),

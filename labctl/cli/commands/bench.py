@@ -57,12 +57,15 @@ def ports(as_json: Json = False, database: Database = None) -> None:  # noqa: AR
         console.print("this computer has no serial port: plug in the USB adapters", markup=False)
 
 
+Name = Annotated[
+    str, typer.Option("--name", help="Name of the bench; default: the name of the file without its suffix.")
+]
+
+
 @app.command("new")
 def new(
     file: Annotated[Path, typer.Argument(metavar="FILE", help="Bench file to write.")],
-    name: Annotated[
-        str, typer.Option("--name", help="Name of the bench; default: the name of the file without its suffix.")
-    ] = "",
+    name: Name = "",
     latitude_deg: Annotated[
         float | None,
         typer.Option(

@@ -37,6 +37,37 @@ Rest = Annotated[
         help="The unit is at rest for the first S seconds: subtract the mean rate of that time (static bias).",
     ),
 ]
+Axis = Annotated[str | None, typer.Option("--axis", help="Axis x, y or z; default: the only axis of the data.")]
+Instability = Annotated[
+    float,
+    typer.Option(
+        "--instability-dps",
+        metavar="X",
+        min=0,
+        help="Bias instability of the gyro, deg/s; it is part of the uncertainty of the static bias.",
+    ),
+]
+Standstill = Annotated[
+    bool,
+    typer.Option(
+        "--standstill/--no-standstill",
+        help="While the unit stands still, hold the angle and estimate the offset again.",
+    ),
+]
+Correction = Annotated[
+    Path | None,
+    typer.Option("--calibration", metavar="FILE", help="Calibration file by which a table is corrected."),
+]
+CorrectingVersion = Annotated[
+    int | None,
+    typer.Option(
+        "--version",
+        metavar="N",
+        min=0,
+        help="Version of the calibration that corrects a unit's recording; "
+        "0: no correction; default: the certified version.",
+    ),
+]
 
 
 def allan(
@@ -81,46 +112,18 @@ def orientation(
             help="Serial number of a unit, or path of a table with columns t_s, gyro_z ... and temperature_c.",
         ),
     ],
-    axis: Annotated[
-        str | None, typer.Option("--axis", help="Axis x, y or z; default: the only axis of the data.")
-    ] = None,
+    axis: Axis = None,
     rest_s: Rest = 0.0,
-    instability_dps: Annotated[
-        float,
-        typer.Option(
-            "--instability-dps",
-            metavar="X",
-            min=0,
-            help="Bias instability of the gyro, deg/s; it is part of the uncertainty of the static bias.",
-        ),
-    ] = 0.0,
-    standstill: Annotated[
-        bool,
-        typer.Option(
-            "--standstill/--no-standstill",
-            help="While the unit stands still, hold the angle and estimate the offset again.",
-        ),
-    ] = True,
+    instability_dps: Instability = 0.0,
+    standstill: Standstill = True,
     warm_up_s: WarmUp = 0.0,
     stop_every_s: StopEvery = None,
-    calibration: Annotated[
-        Path | None,
-        typer.Option("--calibration", metavar="FILE", help="Calibration file by which a table is corrected."),
-    ] = None,
+    calibration: Correction = None,
     out: Annotated[
         Path | None, typer.Option("--out", metavar="FILE", help="Path of a file to write: the table and its angle.")
     ] = None,
     recording: RecordingId = None,
-    version: Annotated[
-        int | None,
-        typer.Option(
-            "--version",
-            metavar="N",
-            min=0,
-            help="Version of the calibration that corrects a unit's recording; "
-            "0: no correction; default: the certified version.",
-        ),
-    ] = None,
+    version: CorrectingVersion = None,
     as_json: Json = False,
     database: Database = None,
 ) -> None:

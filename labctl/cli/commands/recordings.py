@@ -127,6 +127,11 @@ def export_recording(
         console.print(f"recording {recording} -> {out}: {', '.join(written)}")
 
 
+SampleRate = Annotated[
+    float | None, typer.Option("--sample-rate", metavar="HZ", help="Readings per second; default: 10.")
+]
+
+
 def simulate(
     recipe: Annotated[str, typer.Argument(metavar="RECIPE", help="Recipe file, or the name of a shipped recipe.")],
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="New folder to write; it must not exist.")],
@@ -154,9 +159,7 @@ def simulate(
     seed: Annotated[
         int, typer.Option("--seed", help="Seed of the random numbers; the same seed gives the same recording.")
     ] = 1,
-    sample_rate_hz: Annotated[
-        float | None, typer.Option("--sample-rate", metavar="HZ", help="Readings per second; default: 10.")
-    ] = None,
+    sample_rate_hz: SampleRate = None,
     csv: Annotated[bool, typer.Option("--csv", help="Write CSV instead of Parquet.")] = False,
     as_json: Json = False,
     database: Database = None,  # noqa: ARG001  every command takes it

@@ -17,6 +17,14 @@ MaxUpload = Annotated[
     int, typer.Option("--max-upload-mib", metavar="N", help="Largest recording that may be sent, in MiB.")
 ]
 
+RequireKeys = Annotated[
+    bool,
+    typer.Option(
+        "--require-keys",
+        help="Require an API key on loopback (127.0.0.1) too; on other addresses a key is always required.",
+    ),
+]
+
 
 def serve(
     bench: BenchName = None,
@@ -32,13 +40,7 @@ def serve(
     simulated_from: SimulatedStart = None,
     host: Annotated[str, typer.Option("--host", metavar="ADDRESS", help="Address to listen on.")] = "127.0.0.1",
     port: Annotated[int, typer.Option("--port", metavar="N", help="TCP port; 0 chooses a free port.")] = 8420,
-    require_keys: Annotated[
-        bool,
-        typer.Option(
-            "--require-keys",
-            help="Require an API key on loopback (127.0.0.1) too; on other addresses a key is always required.",
-        ),
-    ] = False,
+    require_keys: RequireKeys = False,
     max_upload_mib: MaxUpload = 2048,
     as_json: Json = False,
     database: Database = None,

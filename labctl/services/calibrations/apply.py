@@ -18,7 +18,7 @@ from labctl.fitting.data.channels import BODY_AXES
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording.data_files import read_table
 from labctl.recording.recording import Column
-from labctl.services.schemas.calibrations import CompensationResponse
+from labctl.services.schemas.reports.compensation import CompensationResponse
 
 
 def compensate_file(calibration: Path, source: Path, target: Path, outside: str) -> CompensationResponse:

@@ -135,14 +135,10 @@ class BenchRunner:
 
     def _refuse_unless_free(self) -> None:
         if self._stops:
-            raise BenchBusy(
-                f"bench {self._bench.name}: {STOPS} and starts no more campaigns; start the service again first"
-            )
+            raise BenchBusy(f"bench {self._bench.name}: {STOPS} and starts no campaign; start the service again first")
         if self._job is not None:
-            raise BenchBusy(
-                f"bench {self._bench.name} runs campaign {self._job.row.id} now; wait for the end of that "
-                "campaign, or abort it"
-            )
+            number = self._job.row.id
+            raise BenchBusy(f"bench {self._bench.name} runs campaign {number} now; wait for its end, or abort it")
         self._recovery.record_end()
         if self._hold is not None:
             self._hold.check()
@@ -207,10 +203,7 @@ class BenchRunner:
         """Answer the open question. Raises StalePrompt for any other one, Conflict when nothing is asked here."""
         operator = self._running(campaign).prepared.operator
         if not isinstance(operator, HumanOperator):
-            raise StalePrompt(
-                f"question {request.prompt!r} does not exist: this bench turns its units without a person; send "
-                "no answer"
-            )
+            raise StalePrompt(f"question {request.prompt!r} does not exist: this bench asks no person; send no answer")
         operator.reply(Answer(request.prompt, request.confirmed, request.by, request.reason, request.again))
         return self.status(campaign) or campaign_status(self._store, campaign)
 

@@ -179,8 +179,9 @@ def _importer_and_options(name: str, options: Mapping[str, str]) -> tuple[Import
     except ValidationError as error:
         first = error.errors()[0]
         key = ".".join(map(str, first["loc"]))
-        known = ", ".join(key for key in importer.options.model_fields if key != "file") or "none"
-        raise BadInput(f"importer {name}: option {key}: {first['msg']} (the options are {known})") from error
+        names = [key for key in importer.options.model_fields if key != "file"]
+        known = f"its options are {', '.join(names)}" if names else "it has no options"
+        raise BadInput(f"importer {name}: option {key}: {first['msg']} ({known}); correct the option") from error
 
 
 def _confidence(name: str, importer: Importer[Any] | TableImporter[Any], path: Path) -> float:

@@ -2021,7 +2021,7 @@ export interface components {
         BudgetLineResponse: {
             /**
              * Source
-             * @description Source of the uncertainty: coefficients, model, repeatability, or the quantity of a reference standard.
+             * @description Source of the uncertainty: `coefficients` of the fit, `model` (its form), `repeatability`, or the quantity that a reference standard realises, such as `clock`.
              */
             source: string;
             /**
@@ -2979,7 +2979,7 @@ export interface components {
             turn_before_deg: (number | null)[];
             /**
              * Turn After Deg
-             * @description Error of the integrated angle after a full turn with the calibration applied, deg; null as for `turn_before_deg`.
+             * @description Error of the integrated angle after a full turn with the calibration applied, deg; null: the rate is too low, another axis turns, or the recording has no data set at rest.
              */
             turn_after_deg: (number | null)[];
         };
@@ -3384,7 +3384,7 @@ export interface components {
             what: string;
             /**
              * Severity
-             * @description Certainty of the error: certain: labctl refuses to fit; likely: labctl fits and shows the warning.
+             * @description How sure labctl is that the data are wrong. `certain`: labctl refuses to fit; `likely`: labctl fits and shows the warning.
              * @enum {string}
              */
             severity: "certain" | "likely";
@@ -6159,14 +6159,14 @@ export interface components {
             state: ("to come" | "running" | "done" | "failed" | "interrupted" | "skipped")[];
             /**
              * Started S
-             * @description Start of the step, s of campaign time; null: not yet started.
+             * @description Start of the step, s since the start of the campaign; null: not yet started.
              */
             started_s: (number | null)[];
             /** Ended S */
             ended_s: (number | null)[];
             /**
              * Forecast S
-             * @description Start of the step, s of campaign time: measured, or for future steps computed from the expected times.
+             * @description Start of the step, s since the start of the campaign: measured, or for future steps computed from the expected times.
              */
             forecast_s: number[];
         };

@@ -163,7 +163,7 @@ def test_silence(c4: Any) -> None:
 
 def test_the_wrong_instrument(c4: Any) -> None:
     c4.tap._device._device._execute = lambda command, t_s: c4.tap._device._device._reply("MX1 2.3\r\n", t_s)
-    with pytest.raises(WrongInstrument, match=r"answered 'MX1 2\.3', not a C4"):
+    with pytest.raises(WrongInstrument, match=r"answered 'MX1 2\.3', which is not the answer of a C4"):
         c4.table.identify()
 
 

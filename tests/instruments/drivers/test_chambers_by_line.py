@@ -216,7 +216,7 @@ def test_the_narrower_limits_count(chamber: Callable[..., Any], driver: str) -> 
     s = chamber(driver, min_c=-60, max_c=150)
     s.state.min_c, s.state.max_c = -55.0, 130.0
     assert (s.driver.limits.min_c, s.driver.limits.max_c) == (-55.0, 130.0)
-    with pytest.raises(LimitError, match=r"131 deg C lies outside -55 to 130 deg C"):
+    with pytest.raises(LimitError, match=r"131 deg C lies outside the limits, -55 to 130 deg C"):
         s.driver.set_temperature_c(131.0)
     assert s.state.writes == []
 

@@ -58,7 +58,7 @@ def test_codes_and_volts() -> None:
     assert [round(v / scaling.slope_v + scaling.centre) for v in (-10.0, 10.0)] == [1858, 65188]
     assert scaling.kink < 1e-6
     assert lj.t4_scaling([0.0, 0.0, 3.235e-4, -10.532965], 1).centre == pytest.approx(32559.4, abs=0.1)
-    with pytest.raises(ValueError, match="5 V is none of a T7's"):
+    with pytest.raises(ValueError, match="5 V is not a range of a T7"):
         lj.gain_index(5.0)
 
 

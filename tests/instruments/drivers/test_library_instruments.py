@@ -82,7 +82,7 @@ def test_what_the_library_refuses_is_one_line(thermotron: Callable[..., Any]) ->
     with pytest.raises(RequestRejected, match=r"cannot read temprature: .*; correct the name in the bench file"):
         other.driver.identify()
     text = thermotron(temperature="id")
-    with pytest.raises(MalformedReply, match="attribute id holds 'THERMOTRON 8800', not a number"):
+    with pytest.raises(MalformedReply, match="attribute id holds 'THERMOTRON 8800', which is not a number"):
         text.driver.identify()
     absent = thermotron(instrument="pymeasure.instruments.thermotrons:Oven")
     with pytest.raises(LinkError, match=r"Oven cannot be imported .* install pymeasure \(`pip install pymeasure`\)"):
@@ -195,7 +195,7 @@ def test_instruments_of_msl_equipment(monkeypatch: pytest.MonkeyPatch) -> None:
     [
         ({"instrument": "pymeasure.instruments.fluke:Fluke7341"}, "give either port"),
         ({"instrument": "Fluke7341", "port": "/dev/ttyUSB0"}, "String should match pattern"),
-        ({"library": "msl-equipment", "instrument": "OMEGA:iTHX-W3"}, "give address"),
+        ({"library": "msl-equipment", "instrument": "OMEGA:iTHX-W3"}, "key address is missing"),
     ],
 )
 def test_wrong_settings_are_refused(settings: dict[str, Any], text: str) -> None:

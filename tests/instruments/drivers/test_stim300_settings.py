@@ -58,7 +58,7 @@ def test_a_unit_that_is_set_otherwise_is_refused(stand: Make, device: dict[str, 
     with pytest.raises(WrongInstrument) as refused:
         s.gyro.identify()
     assert str(refused.value).startswith(
-        "mems: the unit on sim://stim300/mems is not configured as the bench file requires:  "
+        "mems: the unit on sim://stim300/mems is not configured as the bench file requires: "
     )
     assert says in str(refused.value)
     assert str(refused.value).endswith(

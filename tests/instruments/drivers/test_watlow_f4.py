@@ -33,7 +33,7 @@ def test_it_says_what_it_is(f4: Any) -> None:
     ("attribute", "value", "text"),
     [
         ("model", 9600, "model register reads 9600 instead of 5270"),
-        ("scale", 0, "works in Fahrenheit"),
+        ("scale", 0, "works in degrees Fahrenheit"),
         ("units", 1, "does not measure a temperature"),
     ],
 )

@@ -42,7 +42,7 @@ def test_the_narrower_limits_count(make_rig: Callable[..., Any]) -> None:
     rig = make_rig("f4t", min_c=-60, max_c=100)
     rig.simulated.min_c, rig.simulated.max_c = -55.0, 180.0
     assert rig.driver.limits == ChamberLimits(-55.0, 100.0, 0.1, 1.67)
-    with pytest.raises(LimitError, match=r"-55\.1 deg C lies outside -55 to 100 deg C"):
+    with pytest.raises(LimitError, match=r"-55\.1 deg C lies outside the limits, -55 to 100 deg C"):
         rig.driver.set_temperature_c(-55.1)
     assert rig.simulated.writes == []
 
@@ -78,7 +78,9 @@ def test_words_in_another_order_are_seen_at_once(make_rig: Callable[..., Any]) -
     rig.driver._registers._word_order = "little"
     for value_c in (25.0, 36.6, -40.0, 85.0, 100.0):  # round numbers are denormal floats in the other order
         rig.simulated.setpoint_c = value_c
-        with pytest.raises(MalformedReply, match=rf"exchanged it is {value_c:g}: set word_order = 'big' in the bench"):
+        with pytest.raises(
+            MalformedReply, match=rf"exchanged the value is {value_c:g}: set word_order = 'big' in the bench"
+        ):
             rig.driver._read_setpoint()
     with pytest.raises(MalformedReply, match="set word_order = 'big' in the bench file"):
         rig.driver.identify()
@@ -86,7 +88,9 @@ def test_words_in_another_order_are_seen_at_once(make_rig: Callable[..., Any]) -
 
 def test_limits_in_the_wrong_order_are_said(f4t: Any) -> None:
     f4t.simulated.min_c = f4t.simulated.max_c = 0.0
-    with pytest.raises(MalformedReply, match=r"limits read 0 to 0 deg C, .* set word_order = 'big' in the bench file"):
+    with pytest.raises(
+        MalformedReply, match=r"limits were read as 0 and 0 deg C, .* set word_order = 'big' in the bench file"
+    ):
         f4t.driver.identify()
 
 

@@ -42,7 +42,7 @@ def test_examples_come_with_the_package(client: TestClient) -> None:
     turned = client.post("/api/recordings/example", json={"name": "imucal-turns"}).json()
     assert turned.items() >= {"serial": "IMUCAL-FERRARIS", "suggested_model": "turns", "warnings": []}.items()
     refused = client.post("/api/recordings/example", json={"name": "../.."})
-    known = "there are freeimu-warmup, imucal-turns, osu-fog, weiss-gyrostar"
+    known = "choose one of freeimu-warmup, imucal-turns, osu-fog, weiss-gyrostar"
     assert (refused.status_code, known in refused.json()["detail"]) == (
         400,
         True,
@@ -126,7 +126,7 @@ def test_nothing_is_hidden_in_a_real_unit(tmp_path: Path) -> None:
         for hide in (HIDE, NOISE_UNITS):
             answer = real.post("/api/campaigns", json={"recipe": "short", "hide": hide})
             assert answer.status_code == 400
-            assert "is not simulated here" in answer.json()["detail"]
+            assert "is not simulated, and effects can be hidden only in simulated units" in answer.json()["detail"]
         assert real.get("/api/campaigns").json() == []
 
 

@@ -45,7 +45,7 @@ def test_the_stages_come_first_and_the_answer_is_that_of_a_plain_get(client: Tes
     *stages, (last, answer) = events_of(followed.text)
     names = [data["stage"] for kind, data in stages if kind == "stage"]
     assert len(names) == len(stages)
-    assert names.index("reducing the recording") < names.index("fitting the model")
+    assert names.index("fitting the model") < names.index("reducing the recording")
     assert any(name.startswith("comparing ") for name in names)
     assert (last, answer) == ("answer", client.get(path).json())
     assert [kind for kind, _ in events_of(client.get(f"{path}/events").text)] == ["answer"]

@@ -94,7 +94,7 @@ def test_readings_of_any_size_are_no_traceback(tmp_path: Path, size: float) -> N
         answer = client.post("/api/recordings", files=files)
         if size > 1e100:
             assert answer.status_code == 400
-            assert f"column 'gyro_z', row 1: {size:g} is beyond 1e+100" in answer.json()["detail"]
+            assert f"column 'gyro_z', row 1: {size:g} is larger than 1e+100" in answer.json()["detail"]
             return
         assert answer.status_code == 201, answer.text
         number = answer.json()["recording"]

@@ -66,7 +66,7 @@ def test_a_ulog_is_imported_with_an_option(client: TestClient, tmp_path: Path) -
     ("name", "content", "said"),
     [
         ("a.csv", b"", "the file is empty"),
-        ("../../etc/passwd", b"\0\1\2", "passwd: byte 1 is 0x00"),
+        ("../../etc/passwd", b"\0\1\2", "passwd: the file is binary (byte 1 is 0x00)"),
         ("a.csv", csv_text(moved()).encode(), "free motion without a reference"),
         (".", b"PK\x03\x04", "log: this is a zip archive"),
     ],

@@ -46,4 +46,4 @@ def test_what_cannot_be_tried_is_one_line() -> None:
     assert status == 2
     assert "bench 'single-axis-sim' has no gyro with driver 'stim300'; name a bench that has one" in text
     status, text = run("watlow-f4", "--bench", "example-real")
-    assert "CHAMBER1-if00-port0 on bench 'my-bench'; but a driver is checked on a simulated instrument only" in text
+    assert "CHAMBER1-if00-port0 on bench 'my-bench', but a driver is checked on a simulated instrument only" in text

@@ -71,10 +71,10 @@ def test_an_entry_is_kept_and_it_is_said_that_nobody_begins_it(lab: Lab) -> None
     [
         (["--at", "2020-01-01T00:00Z"], "is in the past"),
         (["--at", "soon"], "'soon' cannot be read"),
-        (["--at", "now", "--cron", "0 2 * * *"], "not both"),
+        (["--at", "now", "--cron", "0 2 * * *"], "either a time or a cron line"),
         (["--cron", "0 2 * *"], "4 fields"),
         (["--at", "now", "--time-zone", "Moon/Sea"], "'Moon/Sea' is not known"),
-        (["--priority", "3"], "only for a start with a time"),
+        (["--priority", "3"], "only a scheduled start has this option"),
         (["--at", "now", "--priority", "1000"], "--priority 1000"),
         (["--at", "now", "--late-limit-s", "-1"], "--late-limit-s -1"),
         (["--at", "now", "--speed", "5"], "--speed 5"),

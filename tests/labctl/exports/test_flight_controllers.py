@@ -131,7 +131,7 @@ def test_names_and_limits_of_the_parameters(mems: Calibration) -> None:
         (
             "ardupilot",
             {"tolerance_dps": "0.5"},
-            r"would be lost \(scale factor .* deg/s\), more than tolerance_dps = 0.5",
+            r"would be lost \(scale factor .* deg/s\), more than option tolerance_dps = 0.5 deg/s",
         ),
     ],
 )

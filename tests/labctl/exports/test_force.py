@@ -99,7 +99,9 @@ def test_q31_computes_the_consumers_formula_bit_by_bit(sensitive: Any, tmp_path:
     kept = ~outside
     assert kept.sum() > 150
     apart = found[:, 1:] * fixed.full_scale_dps / 2**31 - by_hand(plain, *coefficients, raw, warm, force)
-    assert np.abs(apart[kept]).max() <= stated(text, "Differs from the calibration in what it carries")
+    assert np.abs(apart[kept]).max() <= stated(
+        text, "Rates corrected by this file differ from those of the calibration"
+    )
 
 
 def test_the_python_module_alone_computes_the_consumers_formula(sensitive: Any) -> None:

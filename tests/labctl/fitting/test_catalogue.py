@@ -71,8 +71,8 @@ def test_an_effect_of_another_package_comes_last(monkeypatch: pytest.MonkeyPatch
         (Short, r"ValueError.*shape \(2,\) for 6 data sets"),
         (Failing, "KeyError.*angle"),
         (Silent, "TypeError.*does not define sentence"),
-        (Misnamed, "ValueError.*'Cable Torsion': small letters"),
-        (Term, "TypeError.*is no subclass of"),
+        (Misnamed, "ValueError.*'Cable Torsion' is not valid; use small letters"),
+        (Term, "TypeError.*is not a subclass of"),
         (7, "TypeError"),
     ],
 )

@@ -154,7 +154,7 @@ def test_a_wrong_or_missing_uncertainty_is_refused(tmp_path: Path) -> None:
     rows: list[list[object]] = [[20, 1, 0, 0.1, 0.1], [40, 1, 0, 0.1, -0.1]]
     with pytest.raises(BadRecording, match=r"'u_offset', row 2: -0.1; a standard uncertainty is at least 0"):
         read_recording(table(tmp_path / "t", 'axes = ["z"]\n', columns, rows))
-    with pytest.raises(BadRecording, match="'u_scale_factor' is missing, and 'u_offset' is there"):
+    with pytest.raises(BadRecording, match="'u_scale_factor' is missing, although column 'u_offset' is present"):
         read_recording(table(tmp_path / "u", 'axes = ["z"]\n', [*columns[:3], "u_offset"], [[*r[:3], 1] for r in rows]))
 
 

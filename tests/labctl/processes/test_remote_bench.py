@@ -71,7 +71,7 @@ def test_a_transaction_runs_in_the_bench_process_in_the_name_of_who_asked(store:
 def test_what_a_killed_web_process_was_importing_is_discarded_by_the_next_one(store: Store) -> None:
     left = store.imports.begin(RecordingInfo(serial="LEFT-1", axes=("z",), kind="samples", started_at=AT), AT)
     assert store.imports.discard_unfinished() == 1
-    with pytest.raises(Conflict, match="its import was discarded"):
+    with pytest.raises(Conflict, match="the import was discarded"):
         store.imports.claim(left)
     assert store.imports.discard_unfinished() == 0
 

@@ -80,7 +80,7 @@ def test_what_cannot_be_followed_is_named(tmp_path: Path, turned: dict[str, np.n
         follow({**turned, "valid": np.zeros(1100)})
     with pytest.raises(NotEnoughData, match="at least 10 finite readings"):
         follow(turned, rest_s=0.5)
-    with pytest.raises(BadRecording, match=r"column 't_s', row 2: 109\.9 s is not after"):
+    with pytest.raises(BadRecording, match=r"column 't_s', row 2: 109\.9 s is not later than"):
         follow({**turned, "t_s": turned["t_s"][::-1]})
     source = write(tmp_path / "in.csv", turned)
     with pytest.raises(BadInput, match="result file other than the input"):

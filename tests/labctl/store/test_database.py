@@ -130,7 +130,7 @@ def test_a_second_writer_is_told_who_holds_it(location: str) -> None:
         assert holder is not None
         assert holder.url == "http://127.0.0.1:1"
         with (
-            pytest.raises(Conflict, match=r"the service at http://127\.0\.0\.1:1 writes"),
+            pytest.raises(Conflict, match=r"the service at http://127\.0\.0\.1:1 is writing"),
             open_store(location, write=True),
         ):
             pass

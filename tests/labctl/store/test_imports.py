@@ -254,7 +254,7 @@ def test_an_import_that_was_discarded_cannot_write_into_the_next(store: Store) -
     assert store.imports.discard_unfinished() == 1
     new = begun(store, recording)
     assert new.recording == old.recording
-    with pytest.raises(Conflict, match=r"its import was discarded .* import it again"):
+    with pytest.raises(Conflict, match=r"the import was discarded .* import the recording again"):
         store.imports.add_part(old, part)
     with pytest.raises(Conflict):
         store.imports.finish(old, AT, "import", {})

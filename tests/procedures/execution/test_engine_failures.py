@@ -244,7 +244,7 @@ def test_a_unit_that_sends_nothing_is_bad_data(rig: Any) -> None:
     rig.when_step("acquire", lambda: setattr(rig.imu, "silent", True))
     outcome = rig.run()
     assert outcome.state == CampaignState.FAILED
-    assert "imu: not one of about 100 readings came" in outcome.reason
+    assert "imu: none of about 100 expected readings arrived" in outcome.reason
 
 
 def test_a_steady_part_that_is_too_short_is_refused(rig: Any) -> None:

@@ -117,7 +117,7 @@ def test_a_suspension_without_relief_fails_in_time(rig: Any) -> None:
     rules = {"actions": {"chamber_alarm": "suspend"}, "suspend_timeout_s": 600.0}
     outcome = rig.run(rig.recipe(guards=rules))
     assert outcome.state == CampaignState.FAILED
-    assert "suspended for 600 s, the limit of the recipe, because:  chamber: alarms (compressor)" in outcome.reason
+    assert "suspended for 600 s, the limit of the recipe, because: chamber: alarms (compressor)" in outcome.reason
     rig.assert_safe()
 
 

@@ -137,9 +137,9 @@ def test_a_recipe_of_turns_has_neither_rates_nor_temperatures() -> None:
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (by_hand(top="rates_dps = [1]"), "'rates_dps': value error, this key is for a table and a chamber"),
-        (by_hand(top="repeats = 2"), "'repeats': value error, this key is for a table and a chamber"),
-        (by_hand(top="soak = { hold_s = 1 }"), "'soak': value error, this key is for a table and a chamber"),
+        (by_hand(top="rates_dps = [1]"), "'rates_dps': value error, this key is for a table or a chamber"),
+        (by_hand(top="repeats = 2"), "'repeats': value error, this key is for a table or a chamber"),
+        (by_hand(top="soak = { hold_s = 1 }"), "'soak': value error, this key is for a table or a chamber"),
         (by_hand("turns_deg = []"), "'turns.turns_deg': tuple should have at least 1 item"),
         (
             by_hand("turns_deg = [0]"),

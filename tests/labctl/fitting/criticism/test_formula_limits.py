@@ -79,7 +79,7 @@ def test_what_is_too_deep_is_refused_from_any_depth_of_calls(text: str) -> None:
             below(calls - 1)
             return
         with pytest.raises(
-            BadInput, match=rf"formula 'a': (operations are nested more than {DEEPEST} deep|.* cannot be read)"
+            BadInput, match=rf"formula 'a': (operations are nested more than {DEEPEST} levels deep|.* cannot be read)"
         ):
             read_formula(f"a: {text}")
 

@@ -64,7 +64,7 @@ def test_a_formula_that_the_model_has_already_is_not_named(text: str) -> None:
     ("text", "said"),
     [
         ("odd: position", "column 'position' holds text"),
-        ("odd: pressure_kpa", "there is no column 'pressure_kpa' here"),
+        ("odd: pressure_kpa", "the recording has no column 'pressure_kpa'"),
     ],
 )
 def test_a_column_that_a_formula_cannot_take_is_named(text: str, said: str) -> None:
@@ -86,7 +86,7 @@ def test_in_use_the_tables_rate_is_that_of_the_only_axis() -> None:
 def test_of_three_axes_it_is_refused_by_name() -> None:
     recording = three_axes(1)
     used = in_use(recording, SUPPLY)
-    with pytest.raises(BadInput, match="no column 'table_rate_dps' here"):
+    with pytest.raises(BadInput, match="the recording has no column 'table_rate_dps'"):
         used.compensate(np.zeros((2, 3)), 25.0, {"supply_v": np.full(2, 5.0)})
 
 

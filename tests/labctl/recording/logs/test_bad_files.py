@@ -160,7 +160,7 @@ FILES: dict[str, tuple[Callable[[Path], Path], str]] = {
         "not a complete Parquet file",
     ),
     "Parquet of lists": (lambda p: parquet(p / "a.parquet", gyro_x=[[1.0], [2.0]]), "column 'gyro_x' holds list"),
-    "cut-off ULog": (lambda p: truncated_ulog(p / "a.ulg"), "none of sensor_gyro, .* is in this log"),
+    "cut-off ULog": (lambda p: truncated_ulog(p / "a.ulg"), "none of the topics sensor_gyro, .*it has no topic"),
     "cut-off bag": (lambda p: raw(p / "a.bag", b"#ROSBAG V2.0\n" + b"\x45\x00\x00\x00"), "not a complete ROS bag"),
     "a folder": (lambda p: p, r"recording\.toml"),
     "not there": (lambda p: p / "none.csv", "not found"),

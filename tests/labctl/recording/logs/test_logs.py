@@ -43,7 +43,7 @@ def test_an_instance_of_a_ulog_is_a_recording_of_its_own(tmp_path: Path) -> None
     difference = other.gyro_dps("x") - imported(path).gyro_dps("x")
     np.testing.assert_allclose(difference, np.degrees(0.1), atol=1e-4)
     assert other.info.serial == "00ab12cd-1"
-    with pytest.raises(BadInput, match=r"no instance 7 \(there are sensor_gyro 0, sensor_gyro 1\)"):
+    with pytest.raises(BadInput, match=r"no instance 7 \(instances: sensor_gyro 0, sensor_gyro 1\)"):
         imported(path, instance="7")
     with pytest.raises(BadInput, match="option topic"):
         imported(path, topic="sensor_mag")
@@ -122,7 +122,7 @@ def test_a_bag_gives_rates_force_and_temperature_by_the_time_of_the_heads(tmp_pa
 
 def test_of_several_topics_one_is_chosen_and_a_force_that_is_not_there_is_left_out(tmp_path: Path) -> None:
     path = bag(tmp_path / "two.bag", ("/a", "/b"), force=False)
-    with pytest.raises(BadInput, match="/a and /b are of sensor_msgs/msg/Imu; choose one with --option topic=NAME"):
+    with pytest.raises(BadInput, match="/a and /b are all of sensor_msgs/msg/Imu; choose one with --option topic=NAME"):
         imported(path)
     with pytest.raises(BadInput, match="no topic '/c'"):
         imported(path, topic="/c")
@@ -130,7 +130,7 @@ def test_of_several_topics_one_is_chosen_and_a_force_that_is_not_there_is_left_o
 
 
 def test_a_bag_without_a_gyro_says_what_it_has(tmp_path: Path) -> None:
-    with pytest.raises(BadRecording, match=r"no topic of sensor_msgs/msg/Imu \(it has /temp"):
+    with pytest.raises(BadRecording, match=r"no topic of sensor_msgs/msg/Imu \(its topics: /temp"):
         imported(bag(tmp_path / "none.bag", ()))
 
 

@@ -51,7 +51,7 @@ def test_a_turn_that_came_out_short_is_told_in_one_sentence(turned: Recording, a
     wrong = said_otherwise(turned, 9, 432.0)  # 360 deg were turned: five sixths of it
     finding = only(inspect_recording(to_points(wrong) if as_points else wrong))
     assert (finding.what, finding.severity) == ("turn", "certain")
-    assert finding.text.startswith("data set 9, axis y: only 36")
+    assert finding.text.startswith("data set 9, axis y: the integral of the output is only 36")
     assert "deg instead of 432 deg (expected 432 +- 43 deg); repeat the turn, or correct turn_deg" in finding.text
 
 

@@ -120,7 +120,7 @@ def test_another_adapter_is_refused_where_the_wire_tells_nothing(store: Store, p
         begin(store, bench)
     plugged |= {port: "A1", ports["table"]: "A7"}
     with pytest.raises(
-        Conflict, match=r"table: port \S+ is on USB adapter A7; in campaign 2 it was A2. Give the right"
+        Conflict, match=r"table: port \S+ is on USB adapter A7; in campaign 2 the adapter was A2. Give the correct"
     ):
         begin(store, bench)
     begin(store, bench.model_copy(update={"table": bench.table.model_copy(update={"adapter": "A7"})}))

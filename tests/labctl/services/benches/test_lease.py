@@ -243,7 +243,7 @@ def test_a_service_that_lost_its_bench_begins_nothing(shared: Store) -> None:
     hold.take()
     runner = BenchRunner(shared, load_bench("single-axis-sim"), VirtualClock, hold)
     clock.sleep(STOP_S)
-    with pytest.raises(Conflict, match="may not be driven from here"):
+    with pytest.raises(Conflict, match="may not drive bench"):
         runner.start(CampaignRequest(recipe="short"))
     assert shared.campaigns.all() == []
     runner.close()

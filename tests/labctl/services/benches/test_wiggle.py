@@ -86,7 +86,11 @@ def run(wires: dict[str, list[str]], noise_dps: float = 0.1) -> tuple[Any, Hand]
 def test_units_on_their_own_ports_are_right() -> None:
     answer, hand = run({"a": ["a"], "b": ["b"], "c": ["c"]})
     assert answer.ok
-    assert [unit.text for unit in answer.units] == ["it is on /dev/a", "it is on /dev/b", "it is on /dev/c"]
+    assert [unit.text for unit in answer.units] == [
+        "the unit is on /dev/a",
+        "the unit is on /dev/b",
+        "the unit is on /dev/c",
+    ]
     assert hand.heard[0] == "leave every unit at rest for 3 s"
     assert hand.heard[1:3] == [
         "turn unit a (S-a) by hand, back and forth; leave the others at rest", "unit a was to be turned; a moved",
@@ -99,7 +103,7 @@ def test_exchanged_ports_are_named_with_what_to_set() -> None:
     assert [(unit.ok, unit.text) for unit in answer.units] == [
         (False, "b moved instead, so the two ports are exchanged: set port = '/dev/b' for a in the bench file"),
         (False, "a moved instead, so the two ports are exchanged: set port = '/dev/a' for b in the bench file"),
-        (True, "it is on /dev/c"),
+        (True, "the unit is on /dev/c"),
     ]
     around, _ = run({"a": ["b"], "b": ["c"], "c": ["a"]})
     assert {unit.text.split(":")[0] for unit in around.units} == {
@@ -121,7 +125,7 @@ def test_nothing_and_several_are_told(moves: list[str], says: str) -> None:
 
 
 def test_a_unit_that_moves_while_it_is_to_rest_and_a_silent_one_are_refused() -> None:
-    with pytest.raises(BadInput, match=r"a: the unit moved \(.* deg/s\); start again"):
+    with pytest.raises(BadInput, match=r"a: the unit moved \(.* deg/s\) during .*; start again"):
         run({"a": ["a"]}, noise_dps=8.0)
 
 

@@ -200,7 +200,7 @@ def test_without_the_lease_nothing_is_resumed_and_nothing_moves(tmp_path: Path, 
     moves.clear()
     first.lose()
     first.runner.resume_unfinished()
-    with pytest.raises(BenchBusy, match="may not be driven"):
+    with pytest.raises(BenchBusy, match="may not drive bench"):
         first.runner.resume(left.id, ResumeRequest(by="Ada"))
     assert (moves, first.states()) == ([], ["planned"])
     first.hold.renew()

@@ -132,7 +132,7 @@ def test_without_it_the_error_is_in_the_scale_factor_and_is_named_table_rate_rat
     # criticism says what the angles show, and why the readings of the gyro alone show nothing
     assert found.text.startswith("Check the data: column table_rate_dps: table_rate_ratio: the logged table angle")
     assert "looks exactly like an error of the scale factor" in found.text
-    assert "no reading of the gyro can distinguish them" in found.text
+    assert "No reading of the gyro can distinguish the two" in found.text
     assert "so this difference becomes part of the scale factor" in found.events[0][1]
 
 

@@ -118,7 +118,7 @@ def test_another_bench_is_refused(tmp_path: Path) -> None:
     with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
         prepared = prepare(store, "short", load_bench("single-axis-sim"), VirtualClock(), clip=False)
         prepared.bench.close()
-        with pytest.raises(Conflict, match="carries STIM-0001"):
+        with pytest.raises(Conflict, match="has the units STIM-0001"):
             prepare_resume(store, prepared.id, load_bench("triaxial-sim"), lambda _: VirtualClock(), ResumeRequest())
 
 

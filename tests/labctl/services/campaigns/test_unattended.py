@@ -298,7 +298,10 @@ def test_a_campaign_that_ends_while_it_is_looked_at_was_not_left(
 def test_a_bench_whose_campaign_was_killed_says_so_and_begins_no_other(left: str) -> None:
     status = labctl(left, "bench", "status")
     assert (status.exit_code, "the safe state is confirmed" in status.stdout) == (1, False)
-    what = "campaign 1 was interrupted at 0 %; `labctl campaign resume 1` resumes it, `labctl campaign abort 1` ends it"
+    what = (
+        "campaign 1 was interrupted at 0 %; `labctl campaign resume 1` resumes the campaign, `labctl campaign abort 1` "
+        "ends it"
+    )
     assert what in status.stdout
     assert json.loads(labctl(left, "bench", "status", "--json").stdout)[0]["left"] == [what]
     refused = labctl(left, "campaign", "start", "short", "--bench", BENCH.name)
@@ -314,7 +317,7 @@ def test_a_bench_whose_campaign_was_killed_says_so_and_begins_no_other(left: str
 def test_a_simulated_bench_only_says_that_a_campaign_was_left(left: str) -> None:
     assert labctl(left, "bench", "status").exit_code == 0
     started = labctl(left, "campaign", "start", "short", "--bench", BENCH.name, "--json")
-    assert "campaign 1 was interrupted at 0 %; `labctl campaign resume 1` resumes it" in started.stderr
+    assert "campaign 1 was interrupted at 0 %; `labctl campaign resume 1` resumes the campaign" in started.stderr
     assert (json.loads(started.stdout)["id"], json.loads(started.stdout)["state"]) == (2, "done")
 
 
@@ -346,7 +349,10 @@ def test_a_service_that_starts_says_what_it_finds(left: str, monkeypatch: pytest
         return ""
 
     monkeypatch.setattr("labctl.processes.supervisor.serve_forever", serve)
-    assert "campaign 1 was interrupted at 0 % and is resumed now" in labctl(left, "serve", "--bench", BENCH.name).stdout
+    assert (
+        "campaign 1 was interrupted at 0 %; labctl sets the safe state and then resumes the campaign"
+        in labctl(left, "serve", "--bench", BENCH.name).stdout
+    )
     with open_store(left, write=True) as opened:
         opened.benches.mark(BENCH.name, "table to rest: no answer", AT)
     lines = labctl(left, "serve", "--bench", BENCH.name).stdout.splitlines()

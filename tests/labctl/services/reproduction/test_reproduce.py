@@ -188,7 +188,7 @@ def test_a_units_own_recording_is_held_against_the_paper(lab: Lab) -> None:
         (["ojeda2000", "NOBODY"], "NOBODY"),
         (["yang2018", "OSU-FOG-2024", "--axis", "z"], "uses all axes of the recording together"),
         (["ojeda2000", "OSU-FOG-2024", "--axis", "x"], "the recording has axes z"),
-        (["ojeda2000", "--axis", "z"], "are for a unit's recording"),
+        (["ojeda2000", "--axis", "z"], "choose from the data of a unit"),
     ],
 )
 def test_bad_input_is_one_line_and_nothing_is_written(lab: Lab, weiss: Any, arguments: list[str], said: str) -> None:
@@ -205,7 +205,7 @@ def test_a_folder_of_other_files_is_refused_and_stays(lab: Lab) -> None:
     out.mkdir()
     (out / "notes.txt").write_text("mine")
     reported = lab.run("reproduce", "weiss1995", "--out", str(out), status=2)
-    assert "holds 'notes.txt'" in reported.stderr
+    assert "contains 'notes.txt'" in reported.stderr
     assert [p.name for p in out.iterdir()] == ["notes.txt"]
     reported = lab.run("reproduce", "weiss1995", "--out", str(out / "notes.txt"), status=2)
     assert "is a file" in reported.stderr

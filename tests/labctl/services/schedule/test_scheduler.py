@@ -165,7 +165,7 @@ def test_a_refused_start_says_why_and_does_not_block_the_others(lab: Lab) -> Non
     first, second = lab.enter(at="now"), lab.enter(at="now")
     lab.scheduler.tick()
     assert lab.outcomes(first) == lab.outcomes(second) == ["refused"]
-    assert "beyond the table" in lab.message(first)
+    assert "beyond the limit of the table" in lab.message(first)
     lab.refusal = Conflict("bench single-axis-sim is not safe: the table still moves")
     third = lab.enter(at="now")
     lab.scheduler.tick()

@@ -105,7 +105,7 @@ def test_of_a_time_that_comes_twice_the_first_is_meant() -> None:
     ("text", "words"),
     [
         ("2026-03-29T02:30", "does not exist in Europe/Berlin"),
-        ("2026-01-05T08:59", "is in the past, it is now 2026-01-05 09:00"),
+        ("2026-01-05T08:59", "is in the past: it is now 2026-01-05 09:00"),
         ("tomorrow", "cannot be read"),
         ("", "cannot be read"),
         ("0001-01-01T00:00+14:00", "cannot be read"),

@@ -131,7 +131,7 @@ def test_the_angle_so_far_is_shown_while_the_hand_turns() -> None:
     came = [turn.came_deg["mems"] for turn in second]
     assert came == sorted(came) or max(came) - came[-1] < 1.0
     assert any(60 < angle < 300 for angle in came)
-    assert all("other direction" in turn.refused for turn in second)
+    assert all("wrong direction" in turn.refused for turn in second)
     assert there.engine.progress.turn is None
 
 
