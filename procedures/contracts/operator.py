@@ -150,9 +150,7 @@ class HumanOperator:
     def _reply(self, answer: Answer) -> None:
         with self._lock:
             if self._pending is None or self._pending.id != answer.prompt_id or self._answer is not None:
-                is_open = self._pending is not None and self._answer is None
-                now = (
-                    f"answer question {self._pending.id!r}, which is open now" if is_open else "no question is open now"
-                )
+                other = self._pending if self._answer is None else None
+                now = "no question is open now" if other is None else f"answer question {other.id!r}, which is open now"
                 raise StalePrompt(f"question {answer.prompt_id!r} was already answered or withdrawn; {now}")
             self._answer = answer

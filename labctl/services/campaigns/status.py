@@ -13,10 +13,9 @@ from instruments.bench_config import BenchFile
 from labctl.services.benches.bench_clock import has_simulated_time
 from labctl.services.benches.identity import reported_in
 from labctl.services.campaigns.advice import advice_of
-from labctl.services.schemas.campaigns import (
-    CampaignResponse,
+from labctl.services.schemas.campaigns import CampaignResponse, EventResponse
+from labctl.services.schemas.reports.campaign_parts import (
     DriverResponse,
-    EventResponse,
     OutputResponse,
     PromptResponse,
     TurnResponse,

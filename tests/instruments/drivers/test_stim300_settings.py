@@ -49,7 +49,7 @@ def mean_dps(s: Any) -> float:
         ({"crlf": True}, "CR LF on, bench file off"),
         (
             {"sample_rate_hz": 500, "crlf": True},
-            "the sample rate is 500 Hz instead of 125 Hz; CR LF on, bench file off; set",
+            "the sample rate is 500 Hz instead of 125 Hz; CR LF on, bench file off; configure",
         ),
     ],
 )
@@ -142,7 +142,7 @@ def test_a_unit_that_comes_back_set_otherwise_is_noticed(stand: Make) -> None:
     wire = s.bench.simulation.device(s.gyro_url)._device
     wire._says = {command: _as_incremental(says) for command, says in wire._says.items()}
     wire.receive(b"R\r", s.clock.now_s())
-    with pytest.raises(WrongInstrument, match="gyro output unit INCREMENTAL ANGLE"):
+    with pytest.raises(WrongInstrument, match="gyro output unit is INCREMENTAL ANGLE"):
         s.gyro.read(1.0)
 
 
