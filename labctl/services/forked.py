@@ -1,7 +1,7 @@
 """A computation in a fork of this process, on another core, while this process goes on.
 
 For a command that has its process to itself. A process of several threads is not forked (another thread may hold a
-lock that the fork would wait for), nor is one that another labctl has started: there the work is done when its result
+lock that the fork would wait for), nor is one that another process of labctl has started: there the work is done when its result
 is asked for, with the same result.
 """
 
@@ -57,7 +57,7 @@ class Forked(Generic[ResultT]):
         return self._work()
 
     def close(self) -> None:
-        """End the fork, also where nobody wanted its result."""
+        """End the fork, also where its result was not asked for."""
         if self._line is None:
             return
         self._line.close()

@@ -162,7 +162,7 @@ def test_a_wrong_line_and_a_wrong_option_of_an_importer_are_named(outside: Calla
     assert "flight.log: the unit moves in 100 % of the time" in refused  # taken for a text of free motion
     user.install("acme-log")
     wrong = user.labctl("labctl import acme-log/flight.log --option seral=A", status=2).stderr
-    assert "importer acme-log: option seral: Extra inputs are not permitted (there are serial)" in wrong
+    assert "importer acme-log: option seral: Extra inputs are not permitted (its options are serial)" in wrong
     unknown = user.labctl("labctl import acme-log/flight.log --format acme-lag", status=2).stderr
     assert "no importer 'acme-lag' is installed" in unknown
     assert "did you mean 'acme-log'?" in unknown

@@ -36,7 +36,7 @@ ANSWERS = {
     "Manufacturer of the item": "KVH",
     "Condition of the item on receipt": "No visible damage.",
     "Conformity to the specification": "VW-77, 3.2",
-    "Its limit of the error, deg/s": "3",
+    "Limit of the error in the specification, deg/s": "3",
 }
 
 
