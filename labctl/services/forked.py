@@ -1,8 +1,8 @@
 """A computation in a fork of this process, on another core, while this process goes on.
 
-For a command that has its process to itself. A process of several threads is not forked (another thread may hold a
-lock that the fork would wait for), nor is one that another process of labctl has started: there the work is done when its result
-is asked for, with the same result.
+For a command that has its process to itself. A process of several threads is not forked, because another thread may
+hold a lock that the fork would wait for; nor is a process that was started by another process of labctl. There the
+work is done when its result is requested, with the same result.
 """
 
 from __future__ import annotations

@@ -50,7 +50,7 @@ async def trend(
         float | None,
         Query(
             gt=0,
-            description="Largest bias that is acceptable, deg/s; default: twice the error that the calibration states.",
+            description="Largest acceptable bias after correction, deg/s; default: twice the error stated in the calibration.",
         ),
     ] = None,
 ) -> TrendResponse:

@@ -61,7 +61,7 @@ def trend(
         typer.Option(
             "--limit-dps",
             metavar="X",
-            help="Largest bias that is acceptable, deg/s; default: twice the error that the calibration states.",
+            help="Largest acceptable bias after correction, deg/s; default: twice the error stated in the calibration.",
         ),
     ] = None,
     as_json: Json = False,

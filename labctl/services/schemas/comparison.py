@@ -25,8 +25,8 @@ class ModelLines(ResponseModel):
         "each line over the temperature."
     )
     levels: int = Field(
-        description="Number of levels in the recording; if there are more levels than lines, the "
-        "lines are for evenly spaced levels."
+        description="Number of temperatures (for lines over the rate) or rates (for lines over the temperature) in the "
+        "recording; if there are more of these than model lines, the lines are drawn for evenly spaced ones."
     )
     at: list[float] = Field(
         description="Points of the lines: table rate, deg/s, of lines over the rate; "

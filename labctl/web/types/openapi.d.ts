@@ -4932,7 +4932,7 @@ export interface components {
             level: number[];
             /**
              * Levels
-             * @description Number of levels in the recording; if there are more levels than lines, the lines are for evenly spaced levels.
+             * @description Number of temperatures (for lines over the rate) or rates (for lines over the temperature) in the recording; if there are more of these than model lines, the lines are drawn for evenly spaced ones.
              */
             levels: number;
             /**
@@ -7355,7 +7355,7 @@ export interface operations {
             query?: {
                 /** @description Version that is compared with all recordings of the unit; default: the first. */
                 version?: number | null;
-                /** @description Largest bias that is acceptable, deg/s; default: twice the error that the calibration states. */
+                /** @description Largest acceptable bias after correction, deg/s; default: twice the error stated in the calibration. */
                 limit_dps?: number | null;
             };
             header?: never;
