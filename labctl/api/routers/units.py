@@ -50,7 +50,8 @@ async def trend(
         float | None,
         Query(
             gt=0,
-            description="Largest acceptable bias after correction, deg/s; default: twice the error stated in the calibration.",
+            description="Largest acceptable bias after correction, deg/s; "
+            "default: twice the error stated in the calibration.",
         ),
     ] = None,
 ) -> TrendResponse:
