@@ -48,7 +48,7 @@ def driver_checks(
     as_json: Json = False,
     database: Database = None,  # noqa: ARG001  every command takes it
 ) -> None:
-    """Try a driver on its simulated instrument, in virtual time; exit 1 where it does not what every driver must."""
+    """Try a driver on its simulated instrument, in virtual time; exit 1 if it does not meet a requirement."""
     from labctl.services.plugins import check_driver
     from labctl.services.schemas.admin import DriverCheckResponse
 

@@ -47,4 +47,6 @@ def refuse_useless(effect: Effect) -> None:
         )
     span = Span(100.0, 10.0, (10.0, 20.0, 40.0, 60.0, 80.0, 100.0), frozenset(effect.needs))
     if not all(isinstance(term, Term) for term in effect.options(span)):
-        raise TypeError(f"effect {effect.id!r} has options that are not of class Term; return Terms")
+        raise TypeError(
+            f"effect {effect.id!r}: its method options must return objects of class Term; correct the effect"
+        )

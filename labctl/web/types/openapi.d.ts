@@ -1515,7 +1515,7 @@ export interface components {
             };
             /**
              * Expected Dps
-             * @description Error that is expected of the version, deg/s; null: unknown.
+             * @description RMS error that is expected of the version, deg/s; null: unknown.
              */
             expected_dps: number | null;
             /**
@@ -7033,7 +7033,7 @@ export interface components {
             outside_validity: number;
             /**
              * Expected Dps
-             * @description Error that is expected of the version, deg/s: the larger of its held-out error and its error on the data of the fit; null: unknown.
+             * @description RMS error that is expected of the version, deg/s: the larger of its held-out error and its error on the data of the fit; null: unknown.
              */
             expected_dps: number | null;
             /**
