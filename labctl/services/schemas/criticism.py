@@ -50,8 +50,8 @@ class VerificationResponse(ResponseModel):
         description="Number of data sets outside the rates or temperatures of the calibration."
     )
     expected_dps: float | None = Field(
-        description="RMS error that is expected of the version, deg/s: the larger of its held-out error and its error on "
-        "the data of the fit; null: unknown."
+        description="RMS error that is expected of the version, deg/s: the larger of its held-out error and its "
+        "error on the data of the fit; null: unknown."
     )
     ok: bool = Field(description="Whether `rms_dps` is at most twice `expected_dps`.")
 
