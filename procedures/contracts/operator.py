@@ -151,6 +151,9 @@ class HumanOperator:
         with self._lock:
             if self._pending is None or self._pending.id != answer.prompt_id or self._answer is not None:
                 other = self._pending if self._answer is None else None
-                now = "no question is open now" if other is None else f"answer question {other.id!r}, which is open now"
-                raise StalePrompt(f"question {answer.prompt_id!r} was already answered or withdrawn; {now}")
+                now = "no question is open now" if other is None else f"question {other.id!r}"
+                raise StalePrompt(
+                    f"question {answer.prompt_id!r} was already answered or withdrawn; answer only the question "
+                    f"that is open ({now})"
+                )
             self._answer = answer

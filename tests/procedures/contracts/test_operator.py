@@ -32,7 +32,7 @@ def test_an_answer_to_an_old_question_is_refused() -> None:
         person.confirm("1", by="Ada")
     person.ask(FIRST)
     person.ask(SECOND)
-    with pytest.raises(StalePrompt, match="'1' was already answered or withdrawn; answer question '2'"):
+    with pytest.raises(StalePrompt, match=r"'1' was already answered or withdrawn; .* \(question '2'\)"):
         person.confirm("1", by="Ada")
     person.confirm("2", by="Ada")
     with pytest.raises(StalePrompt):
