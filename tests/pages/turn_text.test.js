@@ -21,5 +21,8 @@ test("an angle beyond what is asked, or the other way, leaves the bar in its bou
 });
 
 test("a rest, and a further attempt, are said", () => {
-  assert.equal(turnText({ ...turn, phase: "rest", attempt: 2 }).text, "Keep the unit still, axis -x pointing up (attempt 2).");
+  assert.equal(
+    turnText({ ...turn, phase: "rest", attempt: 2 }).text,
+    "Keep the unit still, axis -x pointing up (attempt 2).",
+  );
 });
