@@ -74,7 +74,6 @@ class Stim300:
         self._counter = SampleCounter(
             self.name, settings.port, step=round(COUNTS_PER_S / self.sample_rate_hz), wrap=COUNTER_WRAP
         )
-        self._steps: int | None = None  #: usual step of the counter
         self._time = StreamTime(1.0 / self.sample_rate_hz, 0.0)
         self._last_frame_s = 0.0
         self._set: Configuration | None = None  # as the unit says
@@ -158,7 +157,8 @@ class Stim300:
     @property
     def counter_step(self) -> tuple[int, int] | None:
         """Get the usual step of the counter, and that of the bench file's rate; None before two datagrams came."""
-        return None if self._steps is None else (self._steps, round(COUNTS_PER_S / self.sample_rate_hz))
+        step = self._counter.step
+        return None if step is None else (step, round(COUNTS_PER_S / self.sample_rate_hz))
 
     def _discard(self) -> None:
         self._stream.discard_input()
@@ -254,8 +254,6 @@ class Stim300:
 
     def _times(self, counter: NDArray[np.int64]) -> tuple[NDArray[np.float64], int]:
         """Return the clock times of frames, (n,) s, and the number of frames missing by counter and by clock."""
-        if len(counter) > 1:
-            self._steps = int(np.median(np.diff(counter) % COUNTER_WRAP))
         advance = self._counter.advance(counter)
         came = self._stream.last
         times, uncounted = self._time.times(

@@ -22,6 +22,12 @@ class SampleCounter:
         self._newest: int | None = None
         self._content: NDArray[np.generic] | None = None
         self._standing = 0
+        self._moved: Whole | None = None
+
+    @property
+    def step(self) -> int | None:
+        """Get by how much the counter usually moves; None before two readings came together."""
+        return None if self._moved is None else int(np.median(self._moved))
 
     def drop(self) -> None:
         """Expect any count next."""
@@ -29,10 +35,11 @@ class SampleCounter:
 
     def is_new(self, counts: Whole, content: NDArray[np.generic]) -> NDArray[np.bool_]:
         """Return which readings (n >= 1,) are not the one before sent again: same count, same `content` (n, k)."""
-        standing = np.diff(counts, prepend=counts[0] - 1 if self._newest is None else self._newest) == 0
+        moved = self._from_before(counts, counts[0] - 1)
         last, self._content = self._content, content[-1].copy()
-        if not standing.any():
-            return ~standing
+        if moved.all():
+            return moved != 0
+        standing = moved == 0
         before = np.vstack([content[:1] if last is None else last[None], content[:-1]])
         new: NDArray[np.bool_] = ~standing | (content != before).any(axis=1)
         if not new.all():
@@ -44,13 +51,24 @@ class SampleCounter:
 
         A counter that comes to the same number has turned once; one that stands in MOST_STANDING readings is broken.
         """
-        before = counts[0] - self._step if self._newest is None else self._newest
-        moved = np.diff(counts, prepend=before) % self._wrap
+        moved = self._from_before(counts, counts[0] - self._step) % self._wrap
         self._newest = int(counts[-1])
-        self._stands(counts, moved == 0)
+        if len(moved) > 1:
+            self._moved = moved[1:]
+        if moved.all():
+            self._standing = 0
+        else:
+            self._stands(counts, moved == 0)
         advance = moved // self._step
         advance[advance == 0] = self.readings_per_turn
         return advance
+
+    def _from_before(self, counts: Whole, first: np.int64) -> Whole:
+        """Return by how much each count differs from the one before; `first` stands before the first of all."""
+        moved = np.empty_like(counts)
+        moved[0] = counts[0] - (first if self._newest is None else self._newest)
+        np.subtract(counts[1:], counts[:-1], out=moved[1:])
+        return moved
 
     def _stands(self, counts: Whole, standing: NDArray[np.bool_]) -> None:
         """Raise MalformedReply where the counter has not moved for too long."""

@@ -1,4 +1,4 @@
-"""Signals that must not interrupted what leaves a bench safe. Each scope restores the handlers that it found.
+"""Signals that must not interrupt what leaves a bench safe. Each scope restores the handlers that it found.
 
 Only a process's main thread gets signals; in another thread none of these scopes does anything.
 """
@@ -27,13 +27,15 @@ def signal_handlers(handlers: Mapping[signal.Signals, Handler]) -> Iterator[None
     if not is_main_thread():
         yield
         return
-    before = {number: signal.getsignal(number) for number in handlers}
+    before: dict[signal.Signals, Handler] = {}
     try:
         for number, handler in handlers.items():
-            signal.signal(number, handler)
+            before[number] = signal.signal(number, handler)
         yield
     finally:
-        restore({number: before[number] for number in handlers if signal.getsignal(number) is handlers[number]})
+        for number, earlier in before.items():
+            if earlier is not None and (found := signal.signal(number, earlier)) is not handlers[number]:
+                signal.signal(number, found)
 
 
 def restore(handlers: Mapping[signal.Signals, Handler]) -> None:

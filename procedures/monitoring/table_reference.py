@@ -29,16 +29,17 @@ class EncoderLog:
 
     def __init__(self, table: RateTable, clock: Clock) -> None:
         self._table, self._clock = table, clock
+        self._encoder = table if isinstance(table, EncoderTable) else None
         self._next_s, self._lost = -math.inf, 0
         self.readings: list[AngleReading] = []
 
     def read(self, *, now: bool = False) -> None:
         """Read the angle if it is due, or now. Raises NoReply after several lost replies, LinkError."""
-        if not isinstance(self._table, EncoderTable) or (not now and self._clock.now_s() < self._next_s):
+        if self._encoder is None or (not now and self._clock.now_s() < self._next_s):
             return
         self._next_s = self._clock.now_s() + READ_EVERY_S
         try:
-            self.readings.append(self._table.read_angle())
+            self.readings.append(self._encoder.read_angle())
             self._lost = 0
         except NoReply:
             self._lost += 1
@@ -50,7 +51,7 @@ class EncoderLog:
 
         Raises StepFailed for too few angles.
         """
-        if not isinstance(self._table, EncoderTable):
+        if self._encoder is None:
             return None
         if len(self.readings) < LEAST:
             raise StepFailed(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ class BodyFrame:
     sign: float
 
     @classmethod
+    @cache
     def of(cls, position: str) -> BodyFrame:
         """Return the frame of a mounting position: the body axis that points up, x, -x, y ..."""
         up = "xyz".index(position.lstrip("-"))

@@ -49,6 +49,15 @@ class UnitTruth:
         return self.offset(np.array([temperature_c]))[0]
 
 
+def _matrices(matrix: Array, diagonal: Array, rows: list[int]) -> Array:
+    """Return rows of a 3 x 3 matrix, (n, rows, 3), with what is added to its diagonal, (n, 3)."""
+    flat = np.empty((len(diagonal), 9))
+    flat[:] = matrix.ravel()
+    flat[:, ::4] += diagonal
+    found = flat.reshape(-1, 3, 3)
+    return found if rows == [0, 1, 2] else found[:, rows]
+
+
 def mems_triaxial(axes: tuple[str, ...], rng: np.random.Generator) -> UnitTruth:
     """Make a tri-axial MEMS unit like that of Yang et al. 2018 (K at 25 deg C as published, signs reconstructed)."""
     published = np.array([[0.0005, 0.0188, 0.0012], [-0.0187, 0.0005, 5.2e-4], [0.0011, 7.5e-4, 0.0017]])
@@ -59,10 +68,7 @@ def mems_triaxial(axes: tuple[str, ...], rng: np.random.Generator) -> UnitTruth:
     rows = ["xyz".index(axis) for axis in axes]
 
     def gain(temperature_c: Array) -> Array:
-        warm = temperature_c[:, None] - 25.0
-        k = np.broadcast_to(k25, (len(temperature_c), 3, 3)).copy()
-        k[:, range(3), range(3)] += slope * warm
-        return k[:, rows]
+        return _matrices(k25, slope * (temperature_c[:, None] - 25.0), rows)
 
     def offset(temperature_c: Array) -> Array:
         warm = temperature_c[:, None] - 25.0
@@ -98,10 +104,7 @@ def yang_paper(axes: tuple[str, ...], _: np.random.Generator) -> UnitTruth:
     line = np.array([_line(each) for each in soft])
 
     def gain(temperature_c: Array) -> Array:
-        warm = temperature_c[:, None] - 25.0
-        k = np.broadcast_to(YANG_K, (len(temperature_c), 3, 3)).copy()
-        k[:, range(3), range(3)] += slope * warm
-        return k[:, rows]
+        return _matrices(YANG_K, slope * (temperature_c[:, None] - 25.0), rows)
 
     def offset(temperature_c: Array) -> Array:
         warm = temperature_c[:, None] - 25.0
