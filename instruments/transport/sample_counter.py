@@ -78,6 +78,6 @@ class SampleCounter:
             raise MalformedReply(
                 self._device,
                 f"the sample counter on {self._port} does not advance: it is {int(counts[-1])} in {self._standing} "
-                "successive readings; check in the bench file which field of the frame is the counter, then switch "
-                "the unit off and on",
+                "successive readings; check that the bench file names the right field of the frame as the counter; "
+                "if it does, switch the unit off and on",
             )

@@ -118,7 +118,8 @@ class AccessMiddleware:
             )
         if "forwarded" in headers or "x-forwarded-for" in headers:
             raise NotAllowed(
-                "the request came through a proxy; a service behind a proxy must be started with --require-keys"
+                "the request came through a proxy, but this service was started without --require-keys; start it with "
+                "--require-keys, so that every request needs an API key"
             )
         reads = scope["method"] in READING
         if reads and not scope["path"].startswith(API):

@@ -106,7 +106,7 @@ def test_turns_profiles_and_poses_are_drawn_as_they_are(service: Service, visit:
     )
     assert named(figure(page, "Residual of each move"))["residual"]["y"] == pytest.approx(poses["residual_deg"])
     expect(page.get_by_role("region", name="Verdict")).to_contain_text("As expected")
-    expect(page.get_by_text(f"All {found['of']} moves between rests.")).to_be_visible()
+    expect(page.get_by_text(f"All {found['of']} moves from one rest to the next are shown.")).to_be_visible()
     for number in (1, 2, 3):
         page = visit(f"/recordings/{number}", size=NARROW)
         settled(page)

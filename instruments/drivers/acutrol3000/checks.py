@@ -80,5 +80,7 @@ def close_interlock(device: str, settings: Acutrol3000Settings, link: AcutrolLin
     while interlock(axis, link) != acl.CLOSED:
         if clock.now_s() > deadline_s:
             cause = interlock_cause(device, axis, link)
-            raise RequestRejected(device, f"does not close its interlock within {CLOSE_S:g} s{cause}; check the wiring")
+            raise RequestRejected(
+                device, f"does not close its interlock within {CLOSE_S:g} s{cause}; check the wiring of the interlock"
+            )
         clock.sleep(POLL_S)

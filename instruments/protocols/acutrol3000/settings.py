@@ -28,5 +28,5 @@ class Acutrol3000Settings(TableSettings):
     @model_validator(mode="after")
     def _one_address(self) -> Acutrol3000Settings:
         if (self.port is None) == (self.host is None):
-            raise ValueError("give one address of the controller: host (Ethernet) or port (serial)")
+            raise ValueError("give either host (Ethernet) or port (serial) for the controller, not both")
         return self

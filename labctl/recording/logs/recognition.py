@@ -56,7 +56,7 @@ def refuse_other(path: Path, head: bytes) -> None:
     """Raise BadRecording for a file that is known to hold no readings as they are."""
     for signature, kind, advice in _SIGNATURES:
         if head.startswith(signature):
-            raise BadRecording(f"{path}: this is {kind}; {advice}")
+            raise BadRecording(f"{path}: this is {kind}, which labctl cannot read as it is; {advice}")
 
 
 def refuse_large(path: Path, most_bytes: int) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 import tomli_w
 from pydantic import ValidationError
 
-from instruments.bench_config import BenchFile
+from instruments.bench_config import BenchFile, shipped_benches
 from instruments.clock import Clock, SystemClock, WallClock
 from instruments.discovery.find import Found, ask_itself, find_on_host, find_on_port
 from instruments.discovery.ports import PortInfo, port_info, serial_ports
@@ -84,9 +84,8 @@ def sections_of(found: Sequence[tuple[PortInfo | None, Found]]) -> list[Section]
         made.append(section)
     if not any(section.kind == "gyro" for section in made):
         raise BadInput(
-            "no gyro was recognised, and a bench needs one: check power and cables, name its port with --port, or copy "
-            "the "
-            "shipped example-real.toml"
+            "no gyro was recognised, and a bench needs one: check power and cables, name the port of the gyro with "
+            f"--port, or copy and edit {shipped_benches()['example-real']}"
         )
     return made
 

@@ -34,8 +34,10 @@ def compensate_file(calibration: Path, source: Path, target: Path, outside: str)
     if not source.is_file():
         raise BadInput(f"{source}: no such file; check the path")
     columns = read_table(source)
-    if target.suffix not in {".csv", ".parquet"} or target.resolve() == source.resolve():
-        raise BadInput(f"{target}: name a result file other than the input, ending in .csv or .parquet")
+    if target.resolve() == source.resolve():
+        raise BadInput(f"{target}: this is the input; name another file for the result")
+    if target.suffix not in {".csv", ".parquet"}:
+        raise BadInput(f"{target}: the result is a table; name a file that ends in .csv or .parquet")
     thermometer = ("temperature_c",) if compensator.needs_temperature or "temperature_c" in columns else ()
     for name in (*(f"gyro_{axis}" for axis in compensator.axes), *thermometer, *compensator.needs):
         if name not in columns:

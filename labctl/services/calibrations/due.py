@@ -60,6 +60,7 @@ def span(text: str) -> timedelta:
     found = _SPAN.fullmatch(text.strip())
     if found is None:
         raise BadInput(
-            f"due_within {text[:40]!r}: give a whole number and h, d or w for hours, days or weeks, such as 30d"
+            f"due_within {text[:40]!r} is not a time span; give a whole number and h, d or w for hours, days or weeks, "
+            "such as 30d"
         )
     return timedelta(days=int(found[1]) * _UNITS[found[2]])

@@ -88,8 +88,10 @@ def orientation_of_file(
 
     from labctl.recording.data_files import read_table  # noqa: PLC0415
 
-    if target is not None and (target.suffix not in TABLES or target.resolve() == source.resolve()):
-        raise BadInput(f"{target}: name a result file other than the input, ending in .csv or .parquet")
+    if target is not None and target.resolve() == source.resolve():
+        raise BadInput(f"{target}: this is the input; name another file for the result")
+    if target is not None and target.suffix not in TABLES:
+        raise BadInput(f"{target}: the result is a table; name a file that ends in .csv or .parquet")
     if source.suffix not in TABLES:
         raise BadInput(
             f"{source}: the file must be a .csv or .parquet table; import any other file with "
@@ -166,7 +168,7 @@ def _rows(source: _Source, axis: str, t_s: Array, rate: Array, warm_up_s: float)
         good &= _column(source, "valid") != 0
     rows = np.flatnonzero(good)
     if len(rows) == 0:
-        raise NotEnoughData(f"{source.what}: gyro_{axis} has no valid reading; check the column")
+        raise NotEnoughData(f"{source.what}: column gyro_{axis} has no valid reading; check that it holds numbers")
     if len(back := np.flatnonzero(np.diff(t_s[rows]) <= 0)):
         row = int(rows[back[0] + 1])
         raise BadRecording(

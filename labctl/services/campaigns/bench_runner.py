@@ -163,7 +163,9 @@ class BenchRunner:
             job = self._job
             if job is not None and job.row.id == campaign:
                 if not job.control.request.pause:
-                    raise Conflict(f"campaign {campaign} runs and is not paused; pause it first, or let it run")
+                    raise Conflict(
+                        f"campaign {campaign} is running, so it cannot be resumed; only a paused campaign can"
+                    )
                 job.control.resume(f"{request.reason or 'goes on'} ({request.by})")
             else:
                 self._refuse_unless_free()

@@ -45,7 +45,7 @@ def compare_version(
     does = "does" if len(measured.rows) == 1 else "do"
     if lacking := data.channels.missing(calibration.fitted.model.needs):
         raise BadInput(
-            f"{serial} version {version} needs {', '.join(lacking)}, which {measured.named} {does} not have; "
+            f"version {version} of {serial} needs {', '.join(lacking)}, which {measured.named} {does} not have; "
             "name another recording"
         )
     held = {

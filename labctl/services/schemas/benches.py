@@ -71,7 +71,8 @@ class DeviceCheck(ResponseModel):
     findings: list[FindingResponse] = Field(default_factory=list)
     reported: dict[str, str] = Field(
         default_factory=dict,
-        description="Identification reported by the instrument and its USB adapter: serial, firmware, adapter ...",
+        description="Identification reported by the instrument and its USB adapter, such as serial number, firmware "
+        "version and name of the adapter.",
     )
     driver: str = Field(default="", description="Name of the driver of the instrument.")
     distribution: str = Field(

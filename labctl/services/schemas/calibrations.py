@@ -179,7 +179,7 @@ class ChangedModel(FittedResponse):
     plausible: dict[str, UsualRange] = Field(
         description="For each effect: the usual range of its size, and whether the fitted size is inside."
     )
-    left_out: list[LeftOut] = Field(description="Effects of the fit that are not exported with the calibration.")
+    left_out: list[LeftOut] = Field(description="Effects in the fitted model that the exported calibration leaves out.")
 
 
 class ImproveResponse(ChangedModel):
@@ -270,7 +270,8 @@ class VersionFacts(ResponseModel):
     )
     left_out: list[LeftOut] = Field(
         default_factory=list,
-        description="Effects of the fit that are not exported, each with its RMS, deg/s.",
+        description="Effects in the fitted model that an export leaves out, each with the RMS of its contribution to "
+        "the rate, deg/s.",
     )
     remembers: list[Follower] = Field(
         default_factory=list,

@@ -28,7 +28,9 @@ class CampaignRequest(Request):
     """Which recipe to run on the service's bench."""
 
     recipe: RecipeSource
-    clip: bool = Field(default=False, description="Leave out points that the bench or a unit cannot do.")
+    clip: bool = Field(
+        default=False, description="Leave out points that are beyond the limits of the bench or of a unit."
+    )
     hide: list[str] = Field(
         default_factory=list,
         max_length=20,

@@ -33,7 +33,9 @@ class PlanRequest(Request):
     """Which recipe to plan on the service's bench."""
 
     recipe: RecipeSource
-    clip: bool = Field(default=False, description="Leave out points that the bench or a unit cannot do.")
+    clip: bool = Field(
+        default=False, description="Leave out points that are beyond the limits of the bench or of a unit."
+    )
     visibility: bool = Field(
         default=False, description="Also compute which effects the plan could detect; takes some seconds."
     )

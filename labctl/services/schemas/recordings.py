@@ -35,7 +35,9 @@ class SimulatedRequest(Request):
         pattern=SERIAL,
         description="Serial number of the unit; default: the serial number in the simulated bench's file.",
     )
-    clip: bool = Field(default=False, description="Leave out points that the bench or the unit cannot do.")
+    clip: bool = Field(
+        default=False, description="Leave out points that are beyond the limits of the bench or of the unit."
+    )
 
 
 class ExampleRequest(Request):

@@ -111,7 +111,8 @@ class AxisUncertainty(ResponseModel):
         description="Expanded uncertainty U of the budget, deg/s; it covers with a probability of 95.45 %."
     )
     unknown: dict[str, str] = Field(
-        description="Which of coefficients, model and repeatability are unknown, each with the reason."
+        description="Contributions to the uncertainty (coefficients, model, repeatability) that could not be determined, "
+        "each with the reason."
     )
 
 
@@ -170,5 +171,5 @@ class SurfaceResponse(ResponseModel):
     version: int
     validity: Validity
     held: dict[str, float] = Field(description="Other channels that the model needs, held at their mean in the fit.")
-    left_out: list[LeftOut] = Field(description="Effects of the fit that are not exported with the calibration.")
+    left_out: list[LeftOut] = Field(description="Effects in the fitted model that the exported calibration leaves out.")
     axes: dict[str, Surface]

@@ -69,12 +69,12 @@ class TrendPoint(ResponseModel):
     recording: int
     at: datetime
     as_found: AppliedVersion | None = Field(
-        description="Error of the newest version fitted only to earlier "
-        "recordings, deg/s; null: there is none, or it cannot be applied."
+        description="RMS error on this recording, deg/s, of the newest version that was fitted only to recordings made "
+        "before it; null: there is no such version, or it cannot be applied to this recording."
     )
     as_left: AppliedVersion | None = Field(
-        description="Error of the newest version fitted to this recording, deg/s; "
-        "null: there is none, or it cannot be applied."
+        description="RMS error on this recording, deg/s, of the newest version that was fitted to it; null: there is "
+        "no such version, or it cannot be applied."
     )
     rms_dps: float | None = Field(
         description="RMS error of the version that the trend compares with all recordings, "

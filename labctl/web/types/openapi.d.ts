@@ -1772,7 +1772,7 @@ export interface components {
             expanded_dps: number | null;
             /**
              * Unknown
-             * @description Which of coefficients, model and repeatability are unknown, each with the reason.
+             * @description Contributions to the uncertainty (coefficients, model, repeatability) that could not be determined, each with the reason.
              */
             unknown: {
                 [key: string]: string;
@@ -2206,7 +2206,7 @@ export interface components {
             recipe: string;
             /**
              * Clip
-             * @description Leave out points that the bench or a unit cannot do.
+             * @description Leave out points that are beyond the limits of the bench or of a unit.
              * @default false
              */
             clip?: boolean;
@@ -3422,7 +3422,7 @@ export interface components {
             technology: string | null;
             /**
              * Recordings
-             * @description Numbers of the recordings from which the figures were computed, in ascending order.
+             * @description Ids of the recordings from which the values in this data sheet were computed, ascending.
              */
             recordings: number[];
             /** Characteristics */
@@ -3479,7 +3479,7 @@ export interface components {
             findings: components["schemas"]["FindingResponse"][];
             /**
              * Reported
-             * @description Identification reported by the instrument and its USB adapter: serial, firmware, adapter ...
+             * @description Identification reported by the instrument and its USB adapter, such as serial number, firmware version and name of the adapter.
              */
             reported: {
                 [key: string]: string;
@@ -4319,7 +4319,7 @@ export interface components {
             };
             /**
              * Left Out
-             * @description Effects of the fit that are not exported with the calibration.
+             * @description Effects in the fitted model that the exported calibration leaves out.
              */
             left_out: components["schemas"]["LeftOut"][];
             /** Version */
@@ -4398,7 +4398,7 @@ export interface components {
             };
             /**
              * Left Out
-             * @description Effects of the fit that are not exported, each with its RMS, deg/s.
+             * @description Effects in the fitted model that an export leaves out, each with the RMS of its contribution to the rate, deg/s.
              */
             left_out: components["schemas"]["LeftOut"][];
             /** Version */
@@ -5356,7 +5356,7 @@ export interface components {
             recipe: string;
             /**
              * Clip
-             * @description Leave out points that the bench or a unit cannot do.
+             * @description Leave out points that are beyond the limits of the bench or of a unit.
              * @default false
              */
             clip?: boolean;
@@ -5526,7 +5526,7 @@ export interface components {
             };
             /**
              * Left Out
-             * @description Effects of the fit that are not exported with the calibration.
+             * @description Effects in the fitted model that the exported calibration leaves out.
              */
             left_out: components["schemas"]["LeftOut"][];
             /** @description Residuals of the changed model, by data set. */
@@ -6334,7 +6334,7 @@ export interface components {
             serial?: string | null;
             /**
              * Clip
-             * @description Leave out points that the bench or the unit cannot do.
+             * @description Leave out points that are beyond the limits of the bench or of the unit.
              * @default false
              */
             clip?: boolean;
@@ -6469,7 +6469,7 @@ export interface components {
             };
             /**
              * Left Out
-             * @description Effects of the fit that are not exported with the calibration.
+             * @description Effects in the fitted model that the exported calibration leaves out.
              */
             left_out: components["schemas"]["LeftOut"][];
             /** Axes */
@@ -6687,9 +6687,9 @@ export interface components {
              * Format: date-time
              */
             at: string;
-            /** @description Error of the newest version fitted only to earlier recordings, deg/s; null: there is none, or it cannot be applied. */
+            /** @description RMS error on this recording, deg/s, of the newest version that was fitted only to recordings made before it; null: there is no such version, or it cannot be applied to this recording. */
             as_found: components["schemas"]["AppliedVersion"] | null;
-            /** @description Error of the newest version fitted to this recording, deg/s; null: there is none, or it cannot be applied. */
+            /** @description RMS error on this recording, deg/s, of the newest version that was fitted to it; null: there is no such version, or it cannot be applied. */
             as_left: components["schemas"]["AppliedVersion"] | null;
             /**
              * Rms Dps
@@ -7130,7 +7130,7 @@ export interface components {
             rate_reference: string;
             /**
              * Left Out
-             * @description Effects of the fit that are not exported, each with its RMS, deg/s.
+             * @description Effects in the fitted model that an export leaves out, each with the RMS of its contribution to the rate, deg/s.
              */
             left_out: components["schemas"]["LeftOut"][];
             /**

@@ -65,7 +65,7 @@ class DatasheetResponse(ResponseModel):
     model: str
     technology: str | None
     recordings: list[int] = Field(
-        description="Numbers of the recordings from which the figures were computed, in ascending order."
+        description="Ids of the recordings from which the values in this data sheet were computed, ascending."
     )
     characteristics: list[Characteristic]
     passed: bool | None = Field(

@@ -67,7 +67,7 @@ function figures(draft) {
       { title: "Mean, deg/s", number: true, cell: (row) => number(row.found?.bias_dps) },
     ],
     /** @type {{ name: string, found: NonNullable<typeof report.as_left> | null, why: string }[]} */ (rows),
-    { label: `As found and as left of ${draft.serial}`, dense: true },
+    { label: `As-found and as-left error of ${draft.serial}`, dense: true },
   );
 }
 

@@ -19,7 +19,7 @@ export async function postFit(fit, confirm) {
   } catch (error) {
     if (!(error instanceof Problem) || !error.type?.endsWith(":data-refused")) throw error;
     const answers = await dialog("The fit is refused", [], {
-      text: "A calibration from these data would be wrong. If you make a version nevertheless, these warnings are stored with it.",
+      text: "A calibration from these data would be wrong. Correct what the warnings name, or choose other data. If you make a version nevertheless, these warnings are stored with it.",
       body: against(error),
       confirm,
       kind: "danger",

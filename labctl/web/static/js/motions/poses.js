@@ -69,13 +69,13 @@ export function poseFigures(found) {
     { class: "stack" },
     found.left_out.length
       ? notice("", `${found.rows} of ${found.of} moves are shown. Left out: ${found.left_out.join("; ")}.`)
-      : h("p", { class: "muted small" }, `All ${found.of} moves between rests.`),
+      : h("p", { class: "muted small" }, `All ${found.of} moves from one rest to the next are shown.`),
     h(
       "div",
       { class: "columns" },
       figure(
         "Angle of each move",
-        `Change of the direction of gravity in the unit from one rest to the next: measured by the accelerometer, and computed from ${of} of the gyro. Dashed: both are equal.`,
+        `Change of the direction of gravity, in the axes of the unit, from one rest to the next: as measured by the accelerometer, and as computed from ${of} of the gyro. On the dashed line both are equal.`,
         angles,
         { height: "19rem" },
       ),

@@ -191,7 +191,7 @@ export function errorFigure(trend) {
   });
   return figure(
     "Error over the years",
-    `As found: the newest version fitted to earlier recordings, applied to each recording. As left: the newest version fitted to the recording itself. Diamonds: version ${trend.version} on every recording.`,
+    `As found: error on each recording of the newest version that was fitted only to recordings made before it. As left: error of the newest version that was fitted to the recording itself. Diamonds: error of version ${trend.version} on every recording.`,
     draw,
     { height: "19rem" },
   );

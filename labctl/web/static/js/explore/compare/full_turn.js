@@ -28,7 +28,7 @@ export function fullTurn(comparison, state) {
     return h(
       "p",
       { class: "muted" },
-      `No data set of this recording turns the axis at ${comparison.least_turn_rate_dps} deg/s or more, or none is at rest.`,
+      `This figure needs data sets of this axis at ${comparison.least_turn_rate_dps} deg/s or more and at rest. This recording lacks one of the two: choose another recording.`,
     );
   const rows = pickRows(own, here);
   const turn = { before: numbersOf(rows.turn_before_deg), after: numbersOf(rows.turn_after_deg) };
