@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import importlib
+import warnings
 from typing import Any
 
 from instruments.clock import Clock
@@ -134,7 +135,9 @@ class LibraryInstrument:
         adapter = type("PortAdapter", (base,), {"_write": self._write, "_read": self._read,
                        "_write_bytes": self._write_bytes, "_read_bytes": self._read_bytes,
                        "flush_read_buffer": self._flush, "close": lambda _: None})  # fmt: skip
-        return found(adapter(), **settings.arguments)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", FutureWarning)  # to PyMeasure's maintainers, not to who calibrates
+            return found(adapter(), **settings.arguments)
 
     def _open_port(self) -> SerialPort:
         if self._port is None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from instruments.clock import Clock
 from instruments.drivers.chambers.setpoint_chamber import SetpointChamber
-from instruments.drivers.driver import ChamberDriver
+from instruments.drivers.driver import ChamberDriver, Trial
 from instruments.drivers.library_instrument import LibraryInstrument
 from instruments.errors import RequestRejected
 from instruments.protocols.library_settings import LibraryChamberSettings
@@ -78,4 +78,12 @@ class LibraryChamber(SetpointChamber):
             self._instrument.call(self._names.start)
 
 
-DRIVER = ChamberDriver(LibraryChamberSettings, LibraryChamber)
+#: A ThermoStream by PyMeasure's class: its air flow is what heats and cools.
+ATS545 = {
+    "instrument": "pymeasure.instruments.temptronic:ATS545",
+    "port": "sim://ats-545",
+    "setpoint": "temperature_setpoint",
+    "start": "start",
+    "stop": "shutdown",
+}
+DRIVER = ChamberDriver(LibraryChamberSettings, LibraryChamber, Trial(section=ATS545))

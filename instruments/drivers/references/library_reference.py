@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from instruments.clock import Clock
-from instruments.drivers.driver import ReferenceDriver
+from instruments.drivers.driver import ReferenceDriver, Trial
 from instruments.drivers.library_instrument import LibraryInstrument
 from instruments.errors import WrongInstrument
 from instruments.interfaces.gyro import Channel
@@ -51,4 +51,8 @@ class LibraryReference:
         self._instrument.close()
 
 
-DRIVER = ReferenceDriver(LibraryReferenceSettings, LibraryReference)
+DRIVER = ReferenceDriver(
+    LibraryReferenceSettings,
+    LibraryReference,
+    Trial(section={"instrument": "pymeasure.instruments.fluke:Fluke7341", "port": "sim://fluke-7341/reference"}),
+)
