@@ -48,7 +48,7 @@ def _stim300(data: bytes, baudrate: int) -> Recognised | None:
 
 
 def _lines(data: bytes, line: LineFormat) -> int:
-    """Return how many lines there are; 0 where one of the whole ones does not fit the format."""
+    """Return the number of complete lines; 0 where one does not fit the format, or there are too few."""
     whole = data.split(b"\n")[1:-1]
     pattern = re.compile(line.pattern)
     fit = [parse_line(each.rstrip(b"\r").decode("latin-1"), pattern, line.length) for each in whole]

@@ -15,7 +15,7 @@ FOLLOW = 0.02
 LOST_PERIODS = 12.0
 #: Polling interval for one fresh reading, in periods: a short one keeps the reading's age below a fraction of a period.
 FRESH_PERIODS = 0.125
-#: So many readings after the start tell the period roughly, by the time that they took.
+#: After this many readings the period is known roughly, from the time that they took.
 ENOUGH = 20
 #: After readings were dropped the known phase is kept, unless the next reading is off by more than this many periods.
 SAME_PHASE = 0.25

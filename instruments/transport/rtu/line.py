@@ -32,7 +32,7 @@ class NeverSilent(MalformedReply):
 
 
 class RtuLine:
-    """What is known of one line. `remarks` tells a technician what was survived."""
+    """State of one line. `remarks` lists, for a technician, the faults that requests survived."""
 
     def __init__(self, device: str, clock: Clock) -> None:
         self._device, self._clock = device, clock
