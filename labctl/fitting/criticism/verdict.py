@@ -35,7 +35,7 @@ INDISTINGUISHABLE_CHI2 = 7.0
 FAR = 12.0
 #: ... nor one with no more coefficients that reproduces more than this share of it.
 ALIKE = 0.995
-#: A smooth function of a channel is only then unexplained when no effect explains this share of it.
+#: A smooth function of a channel counts as unexplained only when no effect explains this share of it.
 EXPLAINED = 0.90
 #: The same for time, which is never a cause.
 EXPLAINED_TIME = 0.75
@@ -145,12 +145,12 @@ def _other_than_refined(comparison: Comparison, refined: Candidate) -> Candidate
 
 
 def is_of_another_law(comparison: Comparison, effect: Candidate) -> bool:
-    """Return whether an effect is only the nearest of the catalogue to a law that is another one."""
+    """Return whether an effect is only the nearest one of the catalogue to a law outside the catalogue."""
     return is_at_end(comparison, effect) or refines_base(comparison, effect)
 
 
 def is_at_end(comparison: Comparison, effect: Candidate) -> bool:
-    """Return whether the longest time constant that an effect may have fits clearly best: its law is another one."""
+    """Return whether the longest possible time constant of an effect fits clearly best: then its law is another one."""
     if effect.term is None or "tau_s" not in effect.term.parameters:
         return False
     lead = 0.0
@@ -274,9 +274,10 @@ def channels_behind(comparison: Comparison) -> tuple[str, ...]:
 
 
 def probabilities(candidates: Sequence[Candidate]) -> dict[str, float]:
-    """Return effect id -> probability that it is the one missing; prior: nothing as likely as all effects together.
+    """Return effect id -> probability that it is the one missing.
 
-    0 for an effect of a size that the unit's technology cannot have.
+    The prior probability that nothing is missing is that of all effects together. The probability is 0 for an effect of
+    a size that the unit's technology cannot have.
     """
     effects = [c for c in candidates if not c.smooth]
     log_bf = np.array([c.log_bf if c.physical else -np.inf for c in effects]) - np.log(max(len(effects), 1))

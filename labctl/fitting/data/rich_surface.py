@@ -62,7 +62,8 @@ def rich_surface(channels: Channels, axis: str) -> NDArray[np.float64]:
 def with_levels_of_temperature(surface: NDArray[np.float64], channels: Channels, axis: str) -> NDArray[np.float64]:
     """Return a surface (m, k) with a level of its own for every discrete temperature, at most 0.7 m columns in all.
 
-    On one rising leg of temperatures these take a drift for a temperature, so they are only for laws that need them.
+    On a single rising leg of temperatures these levels absorb a drift in time, so they are only for laws that need
+    them.
     """
     rate = _scaled(channels.rate_dps(axis), about_zero=True)
     levels = _levels_of_temperature(channels.temperature_c(axis), rate)
@@ -140,16 +141,17 @@ def _of_responses(channels: Channels, axis: str) -> NDArray[np.float64]:
 
 
 def _of_other_axes(channels: Channels, axis: str, warm: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
-    """Yield the rate about each other axis, alone and times straight and bent functions of temperature."""
+    """Yield the rate about each other axis, alone, and times linear and quadratic functions of temperature."""
     for other in channels.rates:
         if other != axis:
             yield _scaled(channels.rate_dps(other), about_zero=True)[:, None] * warm[:, :3]
 
 
 def _levels_of_temperature(temperature_c: Array, rate: Array) -> NDArray[np.float64]:
-    """Return the indicators of discrete temperatures, (m, k): as bias, as scale factor, and times what is left in them.
+    """Return the indicators of discrete temperatures, (m, k): as bias, as scale factor, and with slopes.
 
-    A law that is steep between two of them is no polynomial of all, and turns even hundredths of a kelvin into error.
+    A law that is steep between two levels is no polynomial over all of them, and within a level it turns even
+    hundredths of a kelvin into an error.
     """
     level = temperature_levels(temperature_c)
     if level is None:
@@ -201,7 +203,7 @@ def since_first(channels: Channels) -> Array:
 
 
 def _carried(signs: Array) -> Array:
-    """Return signs (m,) in order of time with each 0 replaced by the last sign before it, at the begin by the first."""
+    """Return signs (m,) in order of time with each 0 replaced by the last sign before it, at the start by the first."""
     where = np.flatnonzero(signs)
     if not len(where):
         return signs

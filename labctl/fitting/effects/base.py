@@ -96,7 +96,7 @@ class Span:
         return channel in self.channels
 
     def between_rates(self, low: float, high: float) -> Array:
-        """Return a value between each two rates from `low` to `high` of the greatest."""
+        """Return the midpoints of neighbouring rates that lie between `low` and `high`, shares of the greatest rate."""
         rates = np.array(self.rates_dps)
         middles = (rates[:-1] + rates[1:]) / 2
         return middles[(middles >= low * self.rate_dps) & (middles <= high * self.rate_dps)]

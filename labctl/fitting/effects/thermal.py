@@ -164,7 +164,7 @@ class SelfHeating(Effect):
     draws = ("power_s", "time")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
-        """What is not yet there of the heating, times the rate: its part at rest is the warm-up's."""
+        """The share of the heating that is still to come: as bias, like a warm-up, and times the rate."""
         on_s = np.asarray(channels["power_s"], dtype=np.float64)
         missing = np.exp(-np.maximum(on_s, 0.0) / term.parameters.get("tau_s", 1200.0))
         return [

@@ -102,7 +102,7 @@ class TemperatureHistory:
 
 
 def lag_shares(step_s: float, tau_s: float) -> tuple[float, float, float]:
-    """Return the shares of follower, last and new temperature in where a first-order follower is after a step.
+    """Return the weights of follower, last and new temperature in the value of a first-order follower after a step.
 
     Exact for a temperature that changes linearly through the step, however long it is.
     """
