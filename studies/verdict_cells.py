@@ -42,7 +42,7 @@ PLAIN: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     ("ojeda2000", "ojeda2000", ()), ("ojeda2000", "bias_scale", BEND), ("short", "bias_scale", BEND),
     ("quick-triaxial", "yang2018", ()), ("informative", "yang2018", ()), ("informative", "bias_scale", ()),
 )  # fmt: skip
-#: Recipe, starting model, and the largest error in deg/s that what the catalogue does not have makes there.
+#: Recipe, starting model, and the largest value, deg/s, of an error outside the catalogue that is added there.
 FOREIGN = (
     ("ojeda2000", "ojeda2000", 0.03),
     ("ojeda2000", "ojeda2000", 1.0),

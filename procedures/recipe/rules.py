@@ -48,7 +48,7 @@ class AcquireRules(Table):
 
     duration_s: Number = Field(default=60.0, ge=1)
     settle_s: Number = Field(default=5.0, ge=0)  #: at the steady rate, before the first reading that counts
-    #: From this rate up a data set lasts whole turns, so that what hangs on the table's angle averages out.
+    #: From this rate up a data set lasts whole turns, so that what depends on the table's angle averages out.
     whole_turns_above_dps: Number | None = Field(default=None, gt=0)
     max_duration_s: Number = Field(default=180.0, gt=0)  #: unless the whole turns would take longer than this
 

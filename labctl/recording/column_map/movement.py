@@ -34,7 +34,7 @@ class Movement:
 
     @property
     def is_rest(self) -> bool:
-        """Whether the unit rested but for knocks."""
+        """Whether the unit rested, apart from knocks."""
         return self.share <= KNOCKS
 
 

@@ -1,4 +1,4 @@
-"""Response of the outputs to the table in one position: gain, and what each data set is off it."""
+"""Response of the outputs to the table in one position: gain, and the deviation of each data set from it."""
 
 from __future__ import annotations
 
