@@ -79,4 +79,4 @@ def _close(opened: Bench) -> None:
     try:
         opened.close()
     except (InstrumentError, OSError):
-        return  # what was found out has said it
+        return  # the findings report it

@@ -117,7 +117,7 @@ class StreamTime:
         return lost
 
     def _period_with(self, newest: int, t_s: float, width_s: float | None) -> float:
-        """Return the period after one more arrival; the line of the times turns about the last reading."""
+        """Return the period after one more arrival; the time of the last reading does not change with it."""
         before_s = self._line.period_s
         self._line.add(newest, t_s, before_s if width_s is None else width_s)
         period_s = self._line.period_s

@@ -126,8 +126,8 @@ class Acutrol3000:
     def is_moving(self) -> bool:
         """Get whether the table moves, by its estimated rate.
 
-        During a slow run half of the rate counts, which may be below the noise of a table at rest. Raises
-        RequestRejected where an interlock ended a run, NoReply, MalformedReply, LinkError.
+        The limit is `still_dps`, or half of the demanded rate during a slow run, which may be below the noise at rest.
+        Raises RequestRejected where an interlock ended a run, NoReply, MalformedReply, LinkError.
         """
         (rate_dps,) = self._numbers(f":Read:Rate? {self._axis}", 1)
         limit_dps = self.settings.still_dps

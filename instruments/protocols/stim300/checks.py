@@ -34,6 +34,6 @@ def differences(found: Configuration, settings: Stim300Settings) -> list[str]:
 
 
 def is_other_serial(found: str, given: str) -> bool:
-    """Return whether the serial number of a bench file is that of another STIM300; a name of its own is none."""
+    """Return whether the serial number of a bench file is that of another STIM300; False for any other name."""
     digits = SERIAL_PATTERN.fullmatch(given)
     return digits is not None and digits[1] != found[1:]

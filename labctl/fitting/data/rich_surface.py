@@ -21,13 +21,13 @@ from labctl.fitting.data.temperature.levels import temperature_levels
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording.columns import OWN_DATASET, RECORDING, WITHIN_S
 
-#: The surface has at most this share of as many columns as there are data sets, and leaves at least so many free.
+#: Largest number of columns, as a share of the number of data sets (also with levels), and least degrees of freedom.
 MOST_SHARE, MOST_SHARE_WITH_LEVELS, LEAST_FREE = 0.5, 0.7, 8
 #: Largest degree in temperature of the bias, of the scale factor and of the terms quadratic and cubic in the rate.
 DEGREES = (6, 4, 2, 2)
 #: Time constants of a warm-up after power-on, s.
 WARM_UP_S = (600.0, 3600.0)
-#: At rest a loop of temperatures shows what lags behind the thermometer, s, or depends on where it came from, K.
+#: Time constants of lags, s, and widths of hystereses, K, that a loop of temperatures at rest shows.
 LAGS_S, WIDTHS_K = (150.0, 400.0, 1000.0, 2500.0), (2.0, 6.0, 15.0)
 #: A column of which those before it leave less than this share says nothing new.
 LEAST_NEW = 1e-2
@@ -36,7 +36,7 @@ DELAYS_S = (1e-3, -1e-3, 3e-3, 1e-2, 2e-2, 5e-2)
 TIME_CONSTANTS_S = (1e-3, 3e-3, 1e-2, 3e-2, 0.1, 1.0, 5.0)
 #: The same share for those: they are nearly alike, and what distinguishes them is large beside the noise.
 LEAST_NEW_OF_RESPONSE = 1e-6
-#: What is logged and no cause of an error by itself, or is there in another form.
+#: Logged columns that cause no error themselves, or that the surface has in another form.
 NO_SURROUNDINGS = frozenset({
     "t_s", "table_rate_dps", "table_angle_deg", "dataset", "position", "mounting", "run", "n", "duration_s",
     "since_begin_s", "valid", "temperature_c", "temperature_x_c", "temperature_y_c", "temperature_z_c", "power_s",

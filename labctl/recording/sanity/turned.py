@@ -1,4 +1,4 @@
-"""Turns by a known angle: whether what came out of the gyro is the angle that is said, and how well it is known."""
+"""Turns by a known angle: whether the integral of the output gives the stated angle, and with which uncertainty."""
 
 from __future__ import annotations
 
