@@ -43,7 +43,7 @@ KINDS: dict[ShiftKind, Repeatability] = {
 
 @dataclass(frozen=True)
 class Shift:
-    """One shift: what it is of, and its regressor (n,)."""
+    """One shift: its kind, its number and its regressor (n,)."""
 
     kind: ShiftKind
     recording: int

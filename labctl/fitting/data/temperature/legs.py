@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from labctl.fitting.numeric.arrays import Array
 
-#: A turn back by less than this share of the range, and by less than this, deg C, is none.
+#: A turn back by less than this share of the range, or by less than this, deg C, does not count.
 LEAST_SHARE, LEAST_K = 0.2, 2.0
 
 
