@@ -16,7 +16,7 @@ from instruments.protocols.stim300.checks import DEFAULT_RATE_HZ
 from instruments.protocols.stim300.frames import COUNTS_PER_S, LAYOUTS, Scan, layout_of, scan
 from instruments.protocols.stim300.settings import DatagramOptions
 
-#: So many intact frames or lines, and no damage beyond the cut ones at both ends, are no accident.
+#: This many intact frames or lines, with no damage but incomplete ones at both ends, identify an instrument.
 LEAST_FRAMES = 4
 SERIAL = "the unit's serial number, from its label"
 RATE = "the largest rate of the unit, deg/s, from its data sheet"

@@ -17,7 +17,7 @@ KNOTS = (5, 9)
 STEPS_AT = (0.2, 0.35, 0.5, 0.65, 0.8)
 WAVES_OVER_RANGE = (1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0)
 STEPS_IN_TIME = tuple(float(at) for at in np.arange(0.1, 0.91, 0.05))
-#: The same over time: an hour of a campaign of a day.
+#: The same over time: down to an hour in a campaign of a day.
 WAVES_OVER_TIME = tuple(float(n) for n in np.arange(1.5, 12.1, 0.5))
 #: A jump is spread over this share of the range.
 SPREAD = 0.1

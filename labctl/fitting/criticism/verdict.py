@@ -73,7 +73,7 @@ class Verdict:
     depends_on: tuple[str, ...] = ()
     reason: str = ""
     terms: Mapping[str, Term] = field(default_factory=dict)  #: effect id -> the shape that fits best
-    confounded: tuple[str, ...] = ()  #: channels that this schedule cannot tell from the first of `depends_on`
+    confounded: tuple[str, ...] = ()  #: channels that this schedule cannot distinguish from the first of `depends_on`
     not_physical: tuple[str, ...] = ()  #: effects alike in these data, at a size that this technology cannot have
     remainder: Remainder | None = None  #: share of the excess that what is named leaves, and its channels
     further: tuple[tuple[str, ...], ...] = ()  #: of an adequate model: what would take off noise, and is not missing
@@ -204,9 +204,9 @@ def axes_of(comparison: Comparison, candidate: Candidate) -> tuple[str, ...]:
 
 
 def confounded_with(comparison: Comparison, channel: str) -> tuple[str, ...]:
-    """Return the channels that this schedule cannot tell from one on which the residual depends.
+    """Return the channels that this schedule cannot distinguish from one on which the residual depends.
 
-    A step in time is a temperature where temperatures only rose.
+    Where temperatures only rose, a step in time is also a step in temperature.
     """
     smooth = [c for c in comparison.candidates if c.smooth and c.log_bf > 0]
     first = next((c for c in smooth if c.id == channel and c.log_bf >= ENOUGH), None) or comparison.candidates[0]

@@ -170,7 +170,7 @@ def _levels_of_rate(channels: Channels) -> NDArray[np.float64]:
 
 
 def _history(channels: Channels, warm: NDArray[np.float64], rate: Array) -> Iterator[NDArray[np.float64]]:
-    """Yield what tells rising from falling temperatures, and the time since power-on."""
+    """Yield columns that distinguish rising from falling temperatures, and functions of the time since power-on."""
     if "t_s" not in channels:
         return
     t_s = np.asarray(channels["t_s"], dtype=np.float64)

@@ -21,7 +21,7 @@ SIZES, LEAST = 18, 0.1
 MOST, IMPOSSIBLE = 200.0, 30.0
 #: Points that together hold less than this share of the evidence are left out.
 NEGLIGIBLE = 1e-4
-#: Of an interval, and its half width over the standard deviation of a normal distribution.
+#: Probability of an interval, and its half width over the standard deviation of a normal distribution.
 LEVEL, FACTOR = 0.95, 1.959963984540054
 BISECTIONS = 40
 

@@ -14,7 +14,7 @@ from labctl.recording.sanity.summary import Summary
 
 #: Tolerance, as a share of the angle: beside two more turns of its axis, beside turns of other axes, and alone.
 OFF_SAME, OFF_OTHERS, OFF_ALONE = 0.05, 0.1, 0.15
-#: And as many standard uncertainties of its angle.
+#: The tolerance is at least this many standard uncertainties of the angle.
 UNCERTAINTIES = 5.0
 #: From this deviation on, as a share, a turn is certainly not the stated one, where other turns show the ratio.
 CERTAIN_SHARE = 0.1
