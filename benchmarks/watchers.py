@@ -1,5 +1,4 @@
-"""What 50 watching clients cost a running campaign: each an open event stream, as a browser on the bench page
-keeps one."""
+"""What 50 watching clients cost a running campaign: each holds an event stream, as the bench page does."""
 
 from __future__ import annotations
 
