@@ -1,4 +1,4 @@
-"""A service as a person starts it, in a process of its own, for the benchmarks that ask it something."""
+"""A service as a person starts it, in a process of its own, for the benchmarks that send requests to it."""
 
 from __future__ import annotations
 

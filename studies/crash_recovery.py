@@ -200,7 +200,7 @@ def _safe(world: World) -> bool:
 
 
 def drawn(instants: int, count: int, seed: int = SEED) -> list[Kill]:
-    """Return kills spread evenly over a campaign's instants, each at a point of its own drawn by lot."""
+    """Return kills spread evenly over a campaign's instants, each at a point of its own drawn at random."""
     rng = np.random.default_rng(seed)
     edges = np.linspace(1, instants, count + 1)
     return [

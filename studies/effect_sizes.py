@@ -60,7 +60,7 @@ def sizing_of(name: str) -> Sizing:
 def sizes_of(sizing: Sizing, effect: str, default: float) -> dict[str, float]:
     """Return z -> size of one effect; levels that no size gives are left out.
 
-    Most effects are proportional to their size: three simulations tell, and the rest is a rule of three.
+    Most effects are proportional to their size: three simulations show this, and the other sizes follow in proportion.
     """
     at, share = sizing.z_of(effect, default)
     if share < LEAST_VISIBLE or at <= 0:

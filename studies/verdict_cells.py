@@ -50,7 +50,7 @@ FOREIGN = (
     ("informative", "yang2018", 0.03),
 )
 READINGS_HZ = 4.0
-#: What the model leaves of an error is not to be seen below this size, in noise units.
+#: The part of an error that the model leaves cannot be seen below this size, in noise units.
 LEAST_Z = 5.0
 
 

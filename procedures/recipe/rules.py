@@ -57,7 +57,7 @@ class Replicates(Table):
     """What is measured more than once, so that the scatter between data sets can be seen."""
 
     zero_rate: tuple[Literal["start", "middle", "end"], ...] = ()  #: where in a level the table also stands still
-    repeated_rates: Whole = Field(default=0, ge=0)  #: rates of each level, drawn by lot, that are run a second time
+    repeated_rates: Whole = Field(default=0, ge=0)  #: rates of each level, drawn at random, that are run a second time
     first_temperature_again: Yes = False  #: each mounting ends with the temperature it began with
 
 
