@@ -26,7 +26,7 @@ PATIENCE_S = 30.0
 
 @contextmanager
 def chromium() -> Iterator[str]:
-    """Start a browser with nothing kept; yields the address of its control."""
+    """Start a browser with an empty profile; yields the address of its DevTools interface."""
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
         words = [shutil.which("chromium") or "chromium", *ARGUMENTS, f"--user-data-dir={folder}", "about:blank"]
         with subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as browser:

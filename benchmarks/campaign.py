@@ -1,4 +1,4 @@
-"""The tri-axial campaign at 125 readings per second: bytes, drivers, parsers, database, and the fit of what it gave."""
+"""The tri-axial campaign at 125 readings per second: bytes, drivers, parsers, database, and the fit of its data."""
 
 from __future__ import annotations
 

@@ -44,7 +44,7 @@ SETTLED_MS = 1500
 
 
 def run() -> dict[str, float | str]:
-    """Measure over loopback: first views in a browser with nothing kept, the rest as one goes on from there."""
+    """Measure over loopback: first views in browsers with empty caches, the rest in one browser."""
     with tempfile.TemporaryDirectory() as folder:
         location = Path(folder) / "lab.sqlite"
         serial, recording = next(
@@ -53,7 +53,7 @@ def run() -> dict[str, float | str]:
         with serve(location) as service, chromium() as control:
             calibrations = f"{service.url}/api/units/{serial}/calibrations"
             httpx.post(calibrations, json={"model": "yang2018"}, timeout=120).raise_for_status()
-            httpx.get(f"{calibrations}/1/criticism", timeout=120).raise_for_status()  # it has been held before
+            httpx.get(f"{calibrations}/1/criticism", timeout=120).raise_for_status()  # the criticism is in the cache
             figures = {
                 **_trace(control, f"{service.url}/recordings", recording),
                 **_pick(control, f"{service.url}/explore?unit={serial}"),

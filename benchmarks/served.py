@@ -1,4 +1,4 @@
-"""A service as a person starts it, in a process of its own, for the benchmarks that ask it something."""
+"""A service as a person starts it, in a process of its own, for the benchmarks that send requests to it."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Served:
 
 @contextmanager
 def serve(database: Path, *options: str) -> Iterator[Served]:
-    """Serve a database until the block ends; answers are kept beside it, so that the first is a first."""
+    """Serve a database until the block ends; its cache is beside the database, so it is empty at the start."""
     words = ["serve", "--port", "0", "--json", "--database", str(database), *options]
     kept = {**os.environ, "XDG_CACHE_HOME": str(database.parent / "cache")}
     command = [sys.executable, "-m", "labctl", *words]

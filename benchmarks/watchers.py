@@ -1,5 +1,4 @@
-"""What 50 watching clients cost a running campaign: each an open event stream, as a browser on the bench page
-keeps one."""
+"""What 50 watching clients cost a running campaign: each holds an event stream, as the bench page does."""
 
 from __future__ import annotations
 
@@ -51,7 +50,7 @@ def run() -> dict[str, float | str]:
 
 
 async def _campaign(service: Served, watchers: int) -> dict[str, float]:
-    """Run a campaign before a number of watching clients; returns the bench's time, the processor's share."""
+    """Run a campaign with a number of watching clients; returns the bench's time, the processor's share."""
     async with httpx.AsyncClient(base_url=service.url, timeout=60) as client:
         before = service.processor_s()
         status = (await client.post("/api/campaigns", json={"recipe": RECIPE})).raise_for_status().json()

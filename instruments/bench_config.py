@@ -47,7 +47,7 @@ class DeviceSettings(BaseModel):
     port: str | None = None  #: serial devices
     host: str | None = None  #: devices on the network
     tcp_port: int = 502
-    adapter: str | None = None  #: serial number of the USB adapter that it hangs on; another one is refused
+    adapter: str | None = None  #: serial number of its USB adapter; another one is refused
 
 
 class TableSettings(DeviceSettings):
@@ -181,7 +181,7 @@ class BenchFile(Strict):
 
     @model_validator(mode="after")
     def _references_are_distinct(self) -> BenchFile:
-        """Reject instruments of one name: what is said of one would be said of another."""
+        """Reject two instruments of one name, and a second reference as the temperature of the units."""
         names = ["table", "chamber", *(unit.name for unit in self.gyros)]
         for reference in self.references:
             if reference.name in names:
@@ -231,7 +231,7 @@ class BenchFile(Strict):
 
     @property
     def adapters(self) -> dict[str, str]:
-        """Device -> serial number of the USB adapter that the file says it hangs on."""
+        """Device -> serial number of the USB adapter that the file names for it."""
         return {name: section.adapter for name, section in self.sections.items() if section.adapter is not None}
 
     @property

@@ -39,7 +39,7 @@ class Laboratory(Contact):
     place: Place = "laboratory"
     #: Address of labctl as a customer reaches it: a certificate's QR code leads to the version there.
     url: str = Field(default="", pattern=r"^(https?://[^\s\x00-\x1f]{1,300})?$")
-    #: In front of the number of every certificate: two laboratories then have none in common.
+    #: Prefix of the number of every certificate, so that no two laboratories have a number in common.
     number_prefix: str = Field(default="", pattern=r"^[A-Za-z0-9._/-]{0,40}$")
     procedure: str = Field(
         default="", pattern=LINE, description="Number of the laboratory's written calibration procedure."

@@ -1,4 +1,4 @@
-"""The face of the simulators: simulated benches in this process or on real ports, and the effects they can hide.
+"""Entry points of the simulators: benches in this process or on real ports, and the effects they can hide.
 
 Simulators are imported inside the functions: a process that drives real instruments never loads them.
 """

@@ -100,7 +100,8 @@ class Calibration:
     def force_sensitivity(self) -> ForceSensitivity | None:
         """What specific force adds to the output, for a consumer with an accelerometer; None: the fit has no such term.
 
-        It is beside `fitted`, and of its effects `left_out` says what they do where no specific force is given.
+        `fitted` does not contain it. `ForceSensitivity.left_out` gives its effects and their size, for use without an
+        accelerometer.
         """
         with _reading("specific_force"):
             given = self.document.get("specific_force")
@@ -197,7 +198,7 @@ def build_calibration(
 def _uncertainty(
     exported: FittedModel, result: FitResult, use: Mapping[str, AxisEvidenceJson], bench: BenchConditions
 ) -> UncertaintyJson | None:
-    """Return the bound of a document, computed from what its readers have."""
+    """Return the bound of a document, computed from the model as it is exported."""
     covered = Covered(_limits(result.rate_dps), _limits(result.temperature_c))
     evidence = {axis: AxisEvidence.from_json(one) for axis, one in use.items()}
     return uncertainty_json(exported, covered, evidence, bench)

@@ -22,7 +22,7 @@ def key() -> str | None:
 
 
 def os_user() -> str:
-    """Return the operating system's name of who runs this process."""
+    """Return the operating system's name of the user who runs this process."""
     import pwd  # noqa: PLC0415
 
     try:

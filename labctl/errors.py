@@ -40,7 +40,7 @@ class LabctlError(Exception):
     """Any failure that one line explains to a user."""
 
     status = 400  #: HTTP
-    exit_status = 2  #: command line; 1 where the answer to a fair question is no
+    exit_status = 2  #: exit code of the command line; 1 where a valid question is answered by no
     slug = "error"  #: last part of the problem document's `type`
 
     @property

@@ -166,7 +166,7 @@ class Orientation:
 
     def _moving(self) -> None:
         if self._standing:
-            # The stretch that was broken off may hold motion's beginning: what was held of it is put back.
+            # The interrupted stretch may hold the beginning of the motion: its angle, which was withheld, is added.
             held = np.array(self._stretch)
             self._angle_deg += float(np.trapezoid(held[:, 1] - self._offset_dps, held[:, 0]))
         self._standing = False

@@ -29,7 +29,7 @@ DISTRIBUTIONS = ("statsmodels", "scikit-learn", "pysindy")
 #: Forward selection ends here at the latest.
 MOST_TERMS = 30
 LASSO_FOLDS = 5
-#: Its usual path, longer and deeper, takes some five times as long on collinear columns, and is right no more often.
+#: The default path of LassoCV takes some five times as long on collinear columns, and is right no more often.
 LASSO_PATH = {"eps": 1e-2, "alphas": 30, "max_iter": 300}
 #: Base columns that add less than this to those before are left out.
 INDEPENDENT = 1e-7

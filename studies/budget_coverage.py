@@ -1,4 +1,4 @@
-"""Coverage of the budget: the truth against U of coefficients and corrected rates, with standards that are really off.
+"""Coverage of the budget: the truth against U of coefficients and corrected rates, with true errors of the standards.
 
 Every campaign is another tri-axial unit on another bench. The bench's time base, thermometer, temperature gradient,
 mountings and table top are off by errors that are drawn from the distributions that its standards state; the unit has
@@ -87,7 +87,7 @@ class Unit:
 
 @dataclass(frozen=True)
 class Bench:
-    """What one bench is off by."""
+    """Errors of one bench."""
 
     clock: float  #: relative error of the indicated rate
     warm_c: float  #: indicated minus true

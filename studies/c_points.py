@@ -148,7 +148,7 @@ def lines(units: dict[str, Callable[[], Calibration]], points: int) -> Iterator[
 
 
 def run() -> str:
-    """Print the table of all units row by row, and return what it is of."""
+    """Print the table of all units row by row, and return the number of points and the compiler flags."""
     for line in lines(UNITS, POINTS):
         print(line, flush=True)
     return f"\n{POINTS} points each, compiled with {' '.join(FLAGS[1:])}; every bound holds"

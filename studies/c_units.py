@@ -59,7 +59,7 @@ def on_table(axes: str = "xyz", *, bends: bool = False) -> Recording:
 
 
 def on_table_fit(model: str | None, effects: list[str] | None = None, axes: str = "xyz") -> Calibration:
-    """Return a fit to a unit on a rate table, which bends where the fit has a sine response."""
+    """Return a fit to a unit on a rate table; the unit has a sine response where the fit has one."""
     return calibrated(on_table(axes, bends="sine_response" in (effects or [])), model, effects)
 
 

@@ -47,8 +47,8 @@ off_s = 60
 rates_dps = [0, 40]
 """
 DATA_SETS = 14
-#: A data set scatters by 0.0014 deg/s/rtHz over 10 s and 0.0011 deg/s of drift. Two fits agree where what they say at
-#: one point differs by less than five times that; the unit's law is bent, so single coefficients mean less.
+#: A data set scatters by 0.0014 deg/s/rtHz over 10 s and 0.0011 deg/s of drift. Two fits agree where their errors at
+#: one point differ by less than five times that; the unit's law is nonlinear, so single coefficients mean less.
 NOISE_DPS = 0.0012
 WITHIN_NOISE_DPS = 5 * 2**0.5 * NOISE_DPS
 REFERENCE_C = 26.5
@@ -200,7 +200,7 @@ def _safe(world: World) -> bool:
 
 
 def drawn(instants: int, count: int, seed: int = SEED) -> list[Kill]:
-    """Return kills spread evenly over a campaign's instants, each at a point of its own drawn by lot."""
+    """Return kills spread evenly over a campaign's instants, each at a point of its own drawn at random."""
     rng = np.random.default_rng(seed)
     edges = np.linspace(1, instants, count + 1)
     return [

@@ -181,7 +181,7 @@ class World:
 
     @property
     def world(self) -> Any:
-        """What the simulated hand reaches into."""
+        """The simulated world, in which the unit handler turns and switches the units."""
         return self.simulation.world
 
     def device(self, url: str) -> SimulatedDevice:

@@ -131,9 +131,9 @@ def _said(found: Criticism) -> dict[str, Any]:
 
 
 def alike(found: Criticism) -> float:
-    """Return the least share of the leader's signal that another of those named with it would give just so, 0 to 1.
+    """Return the least share of the leader's signal that another effect named with it reproduces, 0 to 1.
 
-    At 1 this schedule makes them the same, whatever its readings.
+    At 1 they cannot be distinguished on this schedule, whatever its readings.
     """
     if found.comparison is None or len(found.verdict.groups) != 1:
         return 0.0

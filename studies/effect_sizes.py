@@ -21,19 +21,19 @@ from studies.campaigns import PROTOCOLS, protocol
 FILE = Path(__file__).with_name("effect_sizes.json")
 COMMAND = "python -m studies.effect_sizes"
 Z_LEVELS = (5.0, 10.0, 20.0, 30.0, 100.0)
-#: Less of an effect than this beside the model, and the protocol cannot show it.
+#: A protocol cannot show an effect of which less than this share is visible beside the model.
 LEAST_VISIBLE = 0.15
 #: z is taken to be proportional to the size when it is at both ends of the levels, to within this share.
 STRAIGHT = 0.03
-#: A size may be this many times what a person would notice, or as much less.
+#: A size may be this many times the noticeable size, or as many times less.
 FARTHEST = 1e3
 ROUNDS = 16
-#: What is known and taken off (the Earth), what a mean of many noisy readings hides whatever its size, or what changes
-#: the thermometer and so everything.
+#: Effects that are known and subtracted (the Earth's rate), that the mean of many noisy readings hides at any size, or
+#: that change the thermometer and so everything.
 NOT_DRAWN = frozenset(
     {"earth_rate", "quantization", "self_heating", "thermometer_error", "bias", "scale_factor", "table_rate_ratio"}
 )
-#: On one axis a tilt of the gyro is only seen by the Earth, and is then called so.
+#: On a single axis a tilt of the gyro is only seen by the Earth's rate, as the effect of that rate.
 ONE_AXIS_NOT = frozenset({"misalignment", "non_orthogonality", "cross_axis_nonlinearity"})
 
 Sizes = dict[str, dict[str, float]]
@@ -60,7 +60,7 @@ def sizing_of(name: str) -> Sizing:
 def sizes_of(sizing: Sizing, effect: str, default: float) -> dict[str, float]:
     """Return z -> size of one effect; levels that no size gives are left out.
 
-    Most effects are proportional to their size: three simulations tell, and the rest is a rule of three.
+    Most effects are proportional to their size: three simulations show this, and the other sizes follow in proportion.
     """
     at, share = sizing.z_of(effect, default)
     if share < LEAST_VISIBLE or at <= 0:

@@ -69,7 +69,7 @@ class LimitedClock(VirtualClock):
 
 
 class CountingJournal(StoreJournal):
-    """Remembers what was handed over, to hold the database against it."""
+    """Counts what was handed over, for comparison with the database."""
 
     def __init__(self, database: Database, campaign: int) -> None:
         super().__init__(database, campaign)

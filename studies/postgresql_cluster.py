@@ -50,7 +50,7 @@ class Cluster:
     def start(self) -> None:
         """Start the server; it answers when this returns.
 
-        It does not wait for the disk: it may crash here, the machine does not.
+        It does not wait for the disk (fsync off): the studies let the server crash, but not the machine.
         """
         settings = {
             "listen_addresses": "''",

@@ -1,4 +1,4 @@
-"""A real process, ended by `kill -9` while it talks to another process's simulators over pty and TCP, and its heir."""
+"""A real process, ended by `kill -9` while it talks to another process's simulators over pty and TCP; then the next."""
 
 from __future__ import annotations
 
@@ -24,9 +24,8 @@ from studies.databases import close_server, new_database
 
 KILLS = int(os.environ.get("LABCTL_STUDY_REAL_KILLS", "30"))
 SPEED = 5.0
-#: About what the campaign takes of real time, s. A machine that is busy otherwise stalls for seconds of the bench's
-#: time:
-#: the recipe allows for that, as it is not what is measured here.
+#: Approximate duration of the campaign in real time, s. A busy machine may stall for seconds of bench time: the recipe
+#: allows for that, because it is not what is measured here.
 WHOLE_S = 16.0
 RECIPE = """
 format = "labctl-recipe/1"
@@ -53,7 +52,7 @@ DATA_SETS = 4
 
 @dataclass(frozen=True)
 class Heir:
-    """What the process made of it that came after the killed one."""
+    """State of the campaign after the process that followed the killed one."""
 
     after_s: float
     state: str

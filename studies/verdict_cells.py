@@ -42,7 +42,7 @@ PLAIN: tuple[tuple[str, str, tuple[str, ...]], ...] = (
     ("ojeda2000", "ojeda2000", ()), ("ojeda2000", "bias_scale", BEND), ("short", "bias_scale", BEND),
     ("quick-triaxial", "yang2018", ()), ("informative", "yang2018", ()), ("informative", "bias_scale", ()),
 )  # fmt: skip
-#: Recipe, starting model, and the largest error in deg/s that what the catalogue does not have makes there.
+#: Recipe, starting model, and the largest value, deg/s, of an error outside the catalogue that is added there.
 FOREIGN = (
     ("ojeda2000", "ojeda2000", 0.03),
     ("ojeda2000", "ojeda2000", 1.0),
@@ -50,7 +50,7 @@ FOREIGN = (
     ("informative", "yang2018", 0.03),
 )
 READINGS_HZ = 4.0
-#: What the model leaves of an error is not to be seen below this size, in noise units.
+#: The part of an error that the model leaves cannot be seen below this size, in noise units.
 LEAST_Z = 5.0
 
 

@@ -1,1 +1,1 @@
-"""What a technician has to know of a bench before a campaign: asked of every instrument and port; nothing moves."""
+"""What a technician has to know about a bench before a campaign: every instrument and port; nothing moves."""

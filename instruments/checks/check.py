@@ -16,9 +16,9 @@ from instruments.transport.adapters import adapter_of
 
 
 def check(bench: BenchFile, clock: Clock, simulation: Simulation | None = None) -> list[DeviceReport]:
-    """Return what was found out about every instrument of a bench; raises as `open_bench`.
+    """Return the findings about every instrument of a bench; raises as `open_bench`.
 
-    An instrument whose port cannot be used is not asked: the port says why.
+    An instrument whose port cannot be used is not asked: the finding about the port gives the reason.
     """
     opened = open_bench(bench, clock, simulation)
     ports = {name: str(section.port) for name, section, _ in _sections(bench) if is_real_port(section.port)}
@@ -79,4 +79,4 @@ def _close(opened: Bench) -> None:
     try:
         opened.close()
     except (InstrumentError, OSError):
-        return  # what was found out has said it
+        return  # the findings report it

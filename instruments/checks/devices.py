@@ -21,7 +21,7 @@ MOST_BAD = 0.01
 
 
 def ask_table(table: RateTable, report: DeviceReport) -> None:
-    """Find out who the table is, whether it stands, and what it can do."""
+    """Check the identity of the table, whether it is at rest, and its limits."""
     try:
         report.add([Finding("identity", table.identify())])
         if table.is_moving():
@@ -48,7 +48,7 @@ def ask_table(table: RateTable, report: DeviceReport) -> None:
 
 
 def ask_chamber(chamber: Chamber, report: DeviceReport) -> None:
-    """Find out who the chamber is, its air, set point and alarms, and what keeps it from control."""
+    """Check the identity of the chamber, its air temperature, set point and alarms, and what prevents control."""
     try:
         report.add([Finding("identity", chamber.identify())])
         limits = chamber.limits
@@ -75,7 +75,7 @@ def ask_chamber(chamber: Chamber, report: DeviceReport) -> None:
 
 
 def ask_reference(reference: Reference, report: DeviceReport) -> None:
-    """Find out who a reference instrument is, and what it reads."""
+    """Check the identity of a reference instrument, and its readings."""
     try:
         report.add([Finding("identity", reference.identify())])
         raw = reference.read().raw
@@ -88,7 +88,7 @@ def ask_reference(reference: Reference, report: DeviceReport) -> None:
 
 
 def ask_gyro(gyro: Gyro, report: DeviceReport) -> None:
-    """Find out who the unit is, how its readings come, and what it says at rest."""
+    """Check the identity of the unit, how its readings arrive, and its output at rest."""
     try:
         found = gyro.identify()
         report.reported |= dict(found.reported)

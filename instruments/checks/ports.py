@@ -1,4 +1,4 @@
-"""What the computer knows of a serial port: that it is there, may be used, is named stably, is alone and is quick."""
+"""What the computer knows of a serial port: existence, permission, stable name, other users, latency."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def latency_timer_ms(name: str) -> int | None:
 
 
 def shared(ports: Mapping[str, str]) -> dict[str, Finding]:
-    """Return, of devices with their ports, those that share one although its names differ."""
+    """Return a finding for each device whose port is that of an earlier device, also under another name."""
     found: dict[str, Finding] = {}
     first: dict[str, str] = {}
     for device, port in ports.items():

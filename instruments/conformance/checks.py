@@ -19,7 +19,7 @@ TRIALS = 12
 
 
 class Failed(Exception):
-    """A driver does not what every driver must do; the text is one line."""
+    """A driver that does not do what every driver must do; the text is one line."""
 
 
 def require(holds: object, text: str) -> None:

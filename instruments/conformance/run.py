@@ -16,7 +16,7 @@ Check = Callable[[Stand], None]
 
 
 class Outcome(NamedTuple):
-    """Outcome of one check: what the driver must do, and what it does instead; empty where it does it."""
+    """Outcome of one check: what the driver must do, and what it does instead (empty: the check passed)."""
 
     check: str
     problem: str
@@ -28,9 +28,10 @@ def checks_of(name: str) -> tuple[Check, ...]:
 
 
 def try_driver(name: str, file: BenchFile | None = None) -> Iterator[Outcome]:
-    """Yield the outcome of each check of a driver, on its own place or on a simulated bench that has it.
+    """Yield the outcome of each check of a driver, on the given bench or on that of `place_of`.
 
-    Raises PluginError for a driver that is not installed or cannot be loaded, ValueError where it has no place.
+    Raises PluginError for a driver that is not installed or cannot be loaded, ValueError where no simulated bench has
+    it.
     """
     file = place_of(name) if file is None else file
     for check in checks_of(name):

@@ -53,14 +53,14 @@ class Stand:
 
 
 def kind_of(name: str) -> Kind:
-    """Return what a driver drives; raises PluginError for one that is not installed or cannot be loaded."""
+    """Return the kind of a driver; raises PluginError for one that is not installed or cannot be loaded."""
     return KINDS[type(DRIVERS.get(name))]
 
 
 def place_of(name: str) -> BenchFile:
-    """Return the simulated bench on which a driver is tried: its own trial's, else a shipped one that has it.
+    """Return the simulated bench on which a driver is tried: that of its own trial, else a shipped bench that uses it.
 
-    Raises PluginError for a driver that is not installed, ValueError where there is no place for it.
+    Raises PluginError for a driver that is not installed, ValueError where no simulated bench has it.
     """
     kind, trial = kind_of(name), DRIVERS.get(name).trial
     if trial is not None:

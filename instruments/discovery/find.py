@@ -83,9 +83,9 @@ def find_on_host(host: str, tcp_port: int, clock: Clock) -> Found:
 
 
 def ask_itself(name: str, values: Mapping[str, object], clock: Clock) -> dict[str, object]:
-    """Return keys of a bench file that an instrument says itself: limits of a chamber, serial number of a gyro.
+    """Return keys of a bench file that an instrument reports itself: limits of a chamber, serial number of a gyro.
 
-    `values` are the keys that are known. Empty where it says nothing, or does not answer.
+    `values` are the keys that are known. Empty where it reports none of them, or does not answer.
     """
     driver = _all()[str(values["driver"])]
     try:

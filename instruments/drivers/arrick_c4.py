@@ -178,7 +178,7 @@ class ArrickC4:
         return found
 
     def check_home(self, wait: Wait) -> HomeCheck | None:
-        """Measure whether home is where it was left: back by counted steps, then home. None: the place is not known.
+        """Measure whether steps were missed: back by counted steps, then home. None: the position is not known.
 
         The first check learns how long the homing takes. Raises RequestRejected, NoReply, LinkError.
         """

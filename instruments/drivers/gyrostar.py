@@ -31,7 +31,7 @@ from instruments.transport.modbus_link import Client
 REPLY_S = 1.0
 #: The module converts about ten times a second; a faster poll reads the same code again.
 SAMPLE_RATE_HZ = 10.0
-TINY = 1e-6  #: sampling periods that count as none
+TINY = 1e-6  #: sampling periods, a tolerance for rounding
 
 
 def make_channels(axis: str, options: WiringOptions) -> tuple[Channel, ...]:

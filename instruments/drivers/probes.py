@@ -16,7 +16,7 @@ from instruments.protocols.stim300.checks import DEFAULT_RATE_HZ
 from instruments.protocols.stim300.frames import COUNTS_PER_S, LAYOUTS, Scan, layout_of, scan
 from instruments.protocols.stim300.settings import DatagramOptions
 
-#: So many intact frames or lines, and no damage beyond the cut ones at both ends, are no accident.
+#: This many intact frames or lines, with no damage but incomplete ones at both ends, identify an instrument.
 LEAST_FRAMES = 4
 SERIAL = "the unit's serial number, from its label"
 RATE = "the largest rate of the unit, deg/s, from its data sheet"
@@ -48,7 +48,7 @@ def _stim300(data: bytes, baudrate: int) -> Recognised | None:
 
 
 def _lines(data: bytes, line: LineFormat) -> int:
-    """Return how many lines there are; 0 where one of the whole ones does not fit the format."""
+    """Return the number of complete lines; 0 where one does not fit the format, or there are too few."""
     whole = data.split(b"\n")[1:-1]
     pattern = re.compile(line.pattern)
     fit = [parse_line(each.rstrip(b"\r").decode("latin-1"), pattern, line.length) for each in whole]

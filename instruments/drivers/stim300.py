@@ -51,8 +51,8 @@ ASK_EVERY_S = 0.4
 class Stim300:
     """Driver of a STIM300 in normal mode.
 
-    After each start the unit is asked how it is set and who it is, before its first reading is passed on. What it says
-    of itself later, after a reset, is checked in the same way.
+    After each start the unit is asked for its configuration and serial number before its first reading is passed on.
+    What it reports later, after a reset, is checked in the same way.
     """
 
     def __init__(self, settings: Stim300Settings, ports: Ports, clock: Clock) -> None:
@@ -181,7 +181,7 @@ class Stim300:
 
     @property
     def _is_unknown(self) -> bool:
-        """Whether the unit has yet to say how it is set and who it is."""
+        """Whether the unit has yet to report its configuration and serial number."""
         return self.options.ask and (self._set is None or self._serial is None)
 
     def _hear(self, special: bytes) -> None:

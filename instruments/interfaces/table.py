@@ -24,9 +24,7 @@ class TableLimits:
     max_rate_dps: float
     max_acceleration_dps2: float
     step_deg: float  #: table angle of one motor step; 0 for a table without steps
-    clock_run_s: float = (
-        0.0  #: by how much the longer of two runs is longer that measure the step clock; 0: not measured
-    )
+    clock_run_s: float = 0.0  #: difference in duration of the two runs that measure the step clock; 0: not measured
     checks_home: bool = False  #: whether missed steps are looked for at the home switch
     reference: Reference = "computed"  #: what the rate of a data set is known from
 
@@ -177,7 +175,7 @@ class OpenLoopTable(Protocol):
         ...
 
     def check_home(self, wait: Wait) -> HomeCheck | None:
-        """Measure whether home is where it was left, and home; None where the position is not known."""
+        """Measure whether steps were missed since home, and home; None where the position is not known."""
         ...
 
 

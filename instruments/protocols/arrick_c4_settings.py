@@ -38,7 +38,7 @@ class ArrickC4Settings(StepperSettings):
     terminator: str = "\r"
     #: Motors energised, limits removed and the like: once per opening of the link, before the table moves.
     init_commands: tuple[InitCommand, ...] = ()
-    #: By how much the longer of the two runs is longer that measure the step clock, s; 0: the clock is not measured.
+    #: Difference in duration of the two runs that measure the step clock, s; 0: the clock is not measured.
     clock_run_s: float = Field(default=60.0, ge=0, le=3600)
     reply_u_s: float = Field(
         default=0.001, gt=0

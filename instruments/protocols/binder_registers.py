@@ -1,7 +1,8 @@
 """Binder controllers MK 53 and MK 56 over Modbus: registers as data.
 
 From SiLab-Bonn/basil 85c4116, HL/binder_mk53.py and HL/binder_mk56.py. Floats have their low word first and are written
-by function 16. A MK 53 has two set points, of its manual and of its basic mode; which of them counts hangs on the mode.
+by function 16. A MK 53 has two set points, of its manual and of its basic mode; which of them is in force depends on
+the mode.
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ class LibraryOptions(BaseModel):
     address: str = ""  #: of msl-equipment, in its own words: "TCP::10.0.0.7::2000", "ASRL/dev/ttyUSB0"
     #: Further arguments of the class (pymeasure), or properties of the connection (msl-equipment).
     arguments: dict[str, JsonValue] = Field(default_factory=dict)
-    identity: str = ""  #: attribute that says who it is
+    identity: str = ""  #: attribute that states its identity
 
     @model_validator(mode="after")
     def _has_address(self) -> LibraryOptions:

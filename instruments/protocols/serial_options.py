@@ -27,4 +27,4 @@ class SerialOptions(Strict):
     rts: bool | None = None
     echo: bool = False  #: the adapter echoes what is sent; it is dropped
     rs485: Rs485Options | None = None
-    adapter: str | None = None  #: serial number of the USB adapter that the unit hangs on
+    adapter: str | None = None  #: serial number of the USB adapter of the unit

@@ -1,4 +1,4 @@
-"""What every simulated chamber is, whatever it speaks: a set point that controls the world's air while it runs."""
+"""What every simulated chamber is, whatever its protocol: a set point that controls the world's air while it runs."""
 
 from __future__ import annotations
 

@@ -52,7 +52,7 @@ def _kind_of(link: str) -> str:
 
 
 def _maker(kind: str) -> MakeDevice | PluginError:
-    """Return what makes a kind of simulated instrument, or why it cannot be used: said when it is opened."""
+    """Return what makes a kind of simulated instrument, or why it cannot be used, which is raised when it is opened."""
     try:
         return SIMULATORS.get(kind)
     except PluginError as error:

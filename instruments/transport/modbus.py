@@ -47,7 +47,7 @@ class Registers:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What was survived on the line and needs a repair, one text each."""
+        """Faults of the line that requests survived and that need a repair, one text each."""
         return self._link.remarks
 
     def get(self, register: Register) -> float:

@@ -8,7 +8,7 @@ from instruments.errors import one_line
 from instruments.protocols.modbus_codes import TCP_PREFIX_BYTES
 
 SHORTEST_RTU_BYTES = 5
-#: So many printable characters in a row are the greeting of another kind of server; it is shown up to here.
+#: This many printable characters in a row are the greeting of another kind of server; it is shown up to this length.
 LEAST_TEXT, LONGEST_TEXT = 6, 40
 LINE = "check line settings and cable"
 ADDRESS = "check host and tcp_port in the bench file"

@@ -73,7 +73,7 @@ class ModbusLink:
 
     @property
     def remarks(self) -> tuple[str, ...]:
-        """What was survived on the line and needs a repair."""
+        """Faults of the line that requests survived and that need a repair."""
         return tuple(self._line.remarks)
 
     def exchange(self, what: str, ask: Request, fits: Check) -> ModbusPDU:
@@ -123,7 +123,7 @@ class ModbusLink:
             client = self._connected()
             reply = ask(client)
         except DISCONNECTED as error:
-            if not self._is_serial and (advice := other_server(self._received)):  # which closed what it does not know
+            if not self._is_serial and (advice := other_server(self._received)):  # it is no Modbus server
                 raise MalformedReply(self.device, f"cannot {what}, {advice}") from error
             # pymodbus's own text is the client's address in memory
             detail = "" if isinstance(error, ConnectionException) else f" ({one_line(error)})"
@@ -161,7 +161,7 @@ class ModbusLink:
         return isinstance(self._client, ModbusSerialClient)
 
     def _give_up(self, error: LinkError) -> None:
-        """Close the link after a failed try; a port that was gone has lost what was still to come.
+        """Close the link after a failed try; after a time-out or a malformed reply a late reply may still come.
 
         Raises NeverSilent again: no further try helps.
         """

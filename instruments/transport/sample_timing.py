@@ -15,7 +15,7 @@ FOLLOW = 0.02
 LOST_PERIODS = 12.0
 #: Polling interval for one fresh reading, in periods: a short one keeps the reading's age below a fraction of a period.
 FRESH_PERIODS = 0.125
-#: So many readings after the start tell the period roughly, by the time that they took.
+#: After this many readings the period is known roughly, from the time that they took.
 ENOUGH = 20
 #: After readings were dropped the known phase is kept, unless the next reading is off by more than this many periods.
 SAME_PHASE = 0.25
@@ -117,7 +117,7 @@ class StreamTime:
         return lost
 
     def _period_with(self, newest: int, t_s: float, width_s: float | None) -> float:
-        """Return the period after one more arrival; the line of the times turns about the last reading."""
+        """Return the period after one more arrival; the time of the last reading does not change with it."""
         before_s = self._line.period_s
         self._line.add(newest, t_s, before_s if width_s is None else width_s)
         period_s = self._line.period_s

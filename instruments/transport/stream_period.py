@@ -95,7 +95,7 @@ class PeriodLine:
 
     @property
     def _bound_s(self) -> float:
-        """Largest error that the widths of the points can give the slope, however they conspire (Cauchy, Schwarz)."""
+        """Largest error that the widths of the points can give the slope in the worst case (Cauchy, Schwarz)."""
         return 0.5 * math.sqrt(self._points / self._sxx)
 
     def _is_off(self, x: float, z: float, width_s: float) -> bool:

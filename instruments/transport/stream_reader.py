@@ -12,7 +12,7 @@ from typing import NamedTuple, Protocol
 from instruments.clock import Clock
 from instruments.transport.serial import BROKEN, SerialPort, StampingPort
 
-#: From look to look of the thread, s of real time.
+#: Polling interval of the thread, s of real time.
 LOOK_EVERY_S = 0.004
 #: A USB adapter holds bytes back for this long, s of real time (latency timer of the FTDI chips, as delivered).
 ADAPTER_HOLDS_S = 0.016
@@ -47,7 +47,7 @@ class StreamReader(Protocol):
 
 
 def empty(port: SerialPort) -> bytes:
-    """Return all bytes that a port holds: one look shows no more than the driver's own buffer, often 4095."""
+    """Return all bytes that a port holds: one read returns at most the kernel driver's buffer, often 4095 bytes."""
     data = b""
     while (waiting := port.in_waiting) and (part := port.read(waiting)):
         data = data + part if data else part

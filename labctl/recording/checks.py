@@ -17,9 +17,9 @@ from labctl.recording.motions.constant_rate import rate_change
 from labctl.recording.motions.turns import check_turns, mean_rate_dps
 from labctl.recording.recording import Column
 
-#: What no gyro, table or chamber has ever been at: another unit, or a slip.
+#: Values outside of these ranges are in another unit, or mistakes.
 POSSIBLE = {"table_rate_dps": (-1e5, 1e5), "temperature_c": (-273.15, 1000.0), "chamber_c": (-273.15, 1000.0)}
-#: A spread is a root of squares: beyond this a square is no number, and so is what is made of it.
+#: Largest size of a value: the square of a larger one, as a spread needs it, may overflow.
 LARGEST = 1e100
 #: The refusal of a recording of free motion.
 NO_REFERENCE = (

@@ -93,10 +93,10 @@ def _windows(since_s: NDArray[np.float64], temperature_c: NDArray[np.float64] | 
 
 
 def with_pieces(points: Recording, readings_of: Callable[[int], Columns]) -> Recording:
-    """Return points in which each data set that is taken in pieces has a row for each of them, under its own number.
+    """Return points with a row for each piece of a data set that is divided, under the number of the data set.
 
     For means that are kept without their readings: `readings_of` returns those of a data set; only the long ones are
-    read. What the readings do not say, such as the set point, a piece has from its data set.
+    read. A column that the readings do not have, such as the set point, is copied from the data set.
     """
     columns = {name: np.asarray(values) for name, values in points.columns.items()}
     longest_s = 0.0 if points.info.motion == "rest" else LONG_S

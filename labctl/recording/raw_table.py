@@ -19,8 +19,8 @@ class RawColumn:
     """One column of a file, n rows.
 
     `values` are its numbers, (n,), nan where a cell is empty or no number; `words` its texts where it holds texts.
-    `unit` is what the format itself says, empty where it says nothing. `wrong` are the first cells among numbers that
-    are none, as (row, text), of `n_wrong`; rows count from 1.
+    `unit` is what the format itself says, empty where it says nothing. `wrong` are the first cells of a column of
+    numbers that are no numbers, as (row, text), of `n_wrong`; rows count from 1.
     """
 
     name: str

@@ -22,8 +22,9 @@ class CampaignState(StrEnum):
 _S = CampaignState
 #: Ways to stop before the end of the plan.
 _ENDS = frozenset({_S.INTERRUPTED, _S.ABORTED, _S.FAILED})
-#: Which state may follow which. Only `done` is final: what failed or was aborted goes on by a person's word, what was
-#: interrupted or a dying process left as it was by itself. A suspension inside a pause is a pause for another reason.
+#: Which state may follow which. Only `done` is final: a failed or aborted campaign is resumed when a person asks for
+#: it, one that was interrupted, or left by a process that died, by the service itself. A suspension during a pause is
+#: again a pause, with another reason.
 NEXT: Mapping[CampaignState, frozenset[CampaignState]] = {
     _S.PLANNED: frozenset({_S.RUNNING, *_ENDS}),
     _S.RUNNING: frozenset({_S.RUNNING, _S.PAUSED, _S.WAITING, _S.DONE, *_ENDS}),
@@ -37,11 +38,11 @@ NEXT: Mapping[CampaignState, frozenset[CampaignState]] = {
 
 #: Over: nothing happens any more unless a person resumes the campaign.
 ENDED: frozenset[CampaignState] = frozenset({_S.DONE, _S.ABORTED, _S.FAILED})
-#: A process has the campaign in hand, unless that process is gone.
+#: A process runs the campaign, unless that process has ended.
 ACTIVE: frozenset[CampaignState] = frozenset({_S.PLANNED, _S.RUNNING, _S.PAUSED, _S.WAITING})
 #: The bench may move or be hot; an interrupted campaign had its safe state, a planned one has not begun.
 UNDER_WAY: frozenset[CampaignState] = ACTIVE - {_S.PLANNED}
-#: Without an end: those in hand, and those to be resumed.
+#: Not ended: active campaigns, and those to be resumed.
 UNFINISHED: frozenset[CampaignState] = ACTIVE | {_S.INTERRUPTED}
 #: Stopped before the end of the plan.
 STOPPED_EARLY: frozenset[CampaignState] = _ENDS

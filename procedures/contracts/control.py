@@ -34,7 +34,7 @@ class Control:
         self._end: ControlRequest | None = None  # beside the lock: an abort waits for nothing
         self._heard = threading.Event()
         self._loss = loss
-        self.polls = 0  #: how often the thread that drives the bench has asked: it moves
+        self.polls = 0  #: number of polls by the thread that drives the bench: it rises while the thread runs
 
     @property
     def request(self) -> ControlRequest:

@@ -72,7 +72,7 @@ class EnvironmentSample:
     references: Mapping[str, float] = field(default_factory=dict)  #: column -> value of a reference instrument
 
 
-#: How an event of kind `safe_state` begins that says what could not be confirmed.
+#: Beginning of the text of a `safe_state` event that names what could not be confirmed.
 NOT_SAFE = "NOT confirmed safe: "
 
 

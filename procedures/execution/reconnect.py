@@ -17,8 +17,8 @@ REPEATABLE = (Home, MeasureClock, MoveChamber, Soak, Acquire, Turn, Rest)
 def is_reconnectable(context: ExecutionContext, step: Step, error: LinkError) -> bool:
     """Return whether a step may be begun again once its instrument answers.
 
-    A table that is silent or talks nonsense in the middle of a move may have lost steps or time, and a person has to
-    inspect it; a table whose port went away and came back is homed.
+    A table that is silent or sends malformed replies in the middle of a move may have lost steps or time, and a person
+    has to inspect it; a table whose port went away and came back is homed.
     """
     if not isinstance(step, REPEATABLE):
         return False

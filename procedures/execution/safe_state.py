@@ -58,7 +58,7 @@ def _tried(what: str, part: Callable[[], str | None]) -> str:
 
 
 def stop_table(table: RateTable, clock: Clock) -> str | None:
-    """Bring the table to rest and look until it stands; returns what could not be confirmed. Raises InstrumentError."""
+    """Stop the table and poll it until it is at rest; returns what could not be confirmed. Raises InstrumentError."""
     table.stop()
     until_s = clock.now_s() + STANDSTILL_TIMEOUT_S
     while table.is_moving():

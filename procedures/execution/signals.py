@@ -1,4 +1,4 @@
-"""Signals that must not interrupt what leaves a bench safe. Each scope restores the handlers that it found.
+"""Signals that must not interrupt the steps that make a bench safe. Each scope restores the handlers that it found.
 
 Only a process's main thread gets signals; in another thread none of these scopes does anything.
 """
@@ -20,7 +20,7 @@ ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 @contextmanager
 def signal_handlers(handlers: Mapping[signal.Signals, Handler]) -> Iterator[None]:
-    """Handle signals so while the block runs.
+    """Handle signals by these handlers while the block runs.
 
     A handler that something else has replaced by the end of the block is left alone.
     """

@@ -44,7 +44,7 @@ def home(context: ExecutionContext, _step: Home) -> Figures:
 
 
 def power_on(context: ExecutionContext, step: PowerOn) -> Figures:
-    """Have the units switched on, make sure they are who the bench file says, open their streams, warm up."""
+    """Have the units switched on, check that they are those of the bench file, open their streams, warm up."""
     context.soaked = None
     run = step.run + context.added_runs
     ask(context, Prompt(context.new_prompt_id(), "power_on", f"switch the units on (session {run})"))

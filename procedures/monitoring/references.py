@@ -14,7 +14,7 @@ from procedures.monitoring.links import LinkStates
 
 
 class ReferenceWatch:
-    """Asks each instrument at every poll; between two answers its last one stands, for as long as the links allow."""
+    """Reads each instrument at every poll; its last answer holds until the next one, for as long as the links allow."""
 
     def __init__(self, references: Mapping[str, Reference], links: LinkStates) -> None:
         self._references, self._links = references, links

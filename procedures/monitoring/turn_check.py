@@ -51,7 +51,7 @@ class UnitTurn:
 
 @dataclass(frozen=True)
 class Stillness:
-    """What one unit says at rest, axis by axis, and from which change on it is no longer at rest."""
+    """Output of one unit at rest, axis by axis, and the change from which on it is no longer at rest."""
 
     outputs: Mapping[str, Nominal]
     bias_dps: Mapping[str, float]
@@ -60,7 +60,7 @@ class Stillness:
 
     @classmethod
     def of(cls, rest: Course, still_dps: float) -> Stillness:
-        """Return it by a rest."""
+        """Return the stillness that a rest shows."""
         n = _part(rest.sample_rate_hz)
         limits = {axis: _limit_dps(rest.rate_dps(axis), n, still_dps) for axis in rest.outputs}
         return cls(rest.outputs, {axis: rest.mean_dps(axis) for axis in rest.outputs}, limits, n)
@@ -134,7 +134,7 @@ def moved(rest: Course, still_dps: float, when: str) -> str:
 
 
 def _part(sample_rate_hz: float) -> int:
-    """Return how many readings make a mean that is compared."""
+    """Return the number of readings in each mean that is compared."""
     return max(int(PART_S * sample_rate_hz), 1)
 
 
@@ -146,7 +146,7 @@ def _means(rates: Array, n: int) -> Array:
 
 
 def _limit_dps(rates: Array, n: int, still_dps: float) -> float:
-    """Return from which change of a mean of n readings on a unit moves: the limit beside the noise of rest (m,)."""
+    """Return the change of a mean of n readings above which a unit moves: `still_dps` plus noise of the rest (m,)."""
     return still_dps + NOISE * _noise_dps(rates) / float(np.sqrt(n))
 
 

@@ -87,7 +87,7 @@ def _merged(blocks: list[MountingBlock]) -> list[MountingBlock]:
 
 
 def _with_rates(recipe: Recipe, block: MountingBlock, number: int) -> MountingBlock:
-    """Return the mounting with each level's rates in their final order; `number` makes each level's lot its own."""
+    """Return the mounting with each level's rates in their final order; `number` enters each level's random seed."""
     levels = tuple(
         Level(
             level.temperature_c,

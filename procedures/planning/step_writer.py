@@ -22,7 +22,7 @@ from procedures.planning.point_order import Level, MountingBlock, order_points
 from procedures.planning.turn_steps import turn_steps
 from procedures.recipe.recipe import Recipe
 
-# What is expected of things that have no limit to compute with; only the forecast hangs on them.
+# What is expected of things that have no limit to compute with; only the forecast depends on them.
 ROOM_C = 25.0
 CHAMBER_SETTLING_S = 300.0  #: from the end of the ramp until the air is in the band
 HOMING_S = 30.0

@@ -27,7 +27,7 @@ class Ramp(Table):
         return LONGEST_STEP_S
 
     def rate_dps(self, t_s: float) -> float:
-        """Return the rate at a time since the begin, s."""
+        """Return the rate at a time since the start, s."""
         return self.from_dps + (self.to_dps - self.from_dps) * t_s / self.duration_s
 
 
@@ -47,7 +47,7 @@ class SineSweep(Table):
         return min(LONGEST_STEP_S, 1.0 / (STEPS_OF_PERIOD * max(self.from_hz, self.to_hz)))
 
     def rate_dps(self, t_s: float) -> float:
-        """Return the rate at a time since the begin, s."""
+        """Return the rate at a time since the start, s."""
         growth = math.log(self.to_hz / self.from_hz) / self.duration_s
         cycles = self.from_hz * (math.expm1(growth * t_s) / growth if growth else t_s)
         fade = min(t_s, self.duration_s - t_s) / self.fade_s if self.fade_s else 1.0

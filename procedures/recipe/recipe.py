@@ -70,7 +70,7 @@ class Recipe(Table):
     inverted: Inverted | None = None
     power_cycle: PowerCycle | None = None
     mounting: Mounting = Mounting()
-    profiles: tuple[Profile, ...] = ()  #: courses of the rate, run at the begin of each level; simulated only
+    profiles: tuple[Profile, ...] = ()  #: courses of the rate, run at the start of each level; simulated only
     guards: GuardRules = GuardRules()
     on_failure: OnFailure = OnFailure()
     resume: ResumeRules = ResumeRules()

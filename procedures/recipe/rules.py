@@ -48,7 +48,7 @@ class AcquireRules(Table):
 
     duration_s: Number = Field(default=60.0, ge=1)
     settle_s: Number = Field(default=5.0, ge=0)  #: at the steady rate, before the first reading that counts
-    #: From this rate up a data set lasts whole turns, so that what hangs on the table's angle averages out.
+    #: From this rate up a data set lasts whole turns, so that what depends on the table's angle averages out.
     whole_turns_above_dps: Number | None = Field(default=None, gt=0)
     max_duration_s: Number = Field(default=180.0, gt=0)  #: unless the whole turns would take longer than this
 
@@ -57,7 +57,7 @@ class Replicates(Table):
     """What is measured more than once, so that the scatter between data sets can be seen."""
 
     zero_rate: tuple[Literal["start", "middle", "end"], ...] = ()  #: where in a level the table also stands still
-    repeated_rates: Whole = Field(default=0, ge=0)  #: rates of each level, drawn by lot, that are run a second time
+    repeated_rates: Whole = Field(default=0, ge=0)  #: rates of each level, drawn at random, that are run a second time
     first_temperature_again: Yes = False  #: each mounting ends with the temperature it began with
 
 

@@ -67,6 +67,6 @@ class TurnRules(Table):
     attempts: Whole = Field(default=10, ge=1)  #: so many refused ones of one turn end the campaign
     #: What may be off, as a share of the angle: the tolerance of the nominal scale factor.
     tolerance: Number = Field(default=0.1, gt=0, lt=0.5)
-    still_dps: Number = Field(default=1.0, gt=0)  #: a rest in which the output changes by more, beside noise, was none
+    still_dps: Number = Field(default=1.0, gt=0)  #: the unit moved in a rest if its output changes by more
     max_lost: Number = Field(default=0.02, ge=0, lt=1)  #: readings of a turn that may be lost or bad, as a share
     ask: Asked = Asked()

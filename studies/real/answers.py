@@ -79,7 +79,7 @@ def by_turns(commands: Commands, name: str, map_name: str) -> Answer:
 
 
 def in_poses(commands: Commands, name: str, map_name: str, *beside: str) -> Answer:
-    """Return the matrix, the bias and what gravity is off by after a move, of a unit in poses."""
+    """Return the matrix, the bias and the error of gravity's direction after a move, of a unit in poses."""
     serial = commands.taken(name, map_name, *beside)
     fit = commands.json("fit", serial, "--model", "poses")
     moves, held_out = fit["poses"]["moves"], fit["poses"]["held_out"]

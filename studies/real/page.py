@@ -11,7 +11,7 @@ from studies.real.comparison import Compared, all_compared, figures
 from studies.real.peers import Peer, lines
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "explanation" / "real-gyros.md"
-#: What the tables hang on.
+#: Packages on whose versions the tables depend.
 DISTRIBUTIONS = ("numpy", "scipy", "imucal", "allantools")
 HEAD = """\
 # Real gyros

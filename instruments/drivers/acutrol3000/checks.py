@@ -74,7 +74,7 @@ def close_interlock(device: str, settings: Acutrol3000Settings, link: AcutrolLin
                 "reset_interlocks = true in the bench file",
             )
         link.ask(":Interlock:Reset")
-    link.ask(acl.off(axis))  # no demand of before may move the table when it is servoed
+    link.ask(acl.off(axis))  # an earlier demand must not move the table once the servo is on
     link.ask(f":Interlock:Close {axis}")
     deadline_s = clock.now_s() + CLOSE_S
     while interlock(axis, link) != acl.CLOSED:

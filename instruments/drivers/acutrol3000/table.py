@@ -19,13 +19,14 @@ from instruments.protocols.acutrol3000.settings import Acutrol3000Settings
 from instruments.transport.factory import Ports
 
 POLL_S = 0.2
-#: A motion may last this much longer than computed, s and share: jerk limits and filters are the controller's.
+#: A motion may last this much longer than computed, s and share: the controller has its own jerk limits and filters.
 END_TOLERANCE_S, END_TOLERANCE_SHARE = 10.0, 0.5
-#: Of a run the table stays at its rate for at least this much longer than asked for, s.
+#: In a run the table stays at its rate for at least this much longer than requested, s.
 SPARE_S = 0.5
 #: The table is home when it is this near, degrees.
 HOME_DEG = 0.01
-#: Of an angle the quickest of so many answers counts, where they come within this time, s: its time is the surest.
+#: An angle is asked for this often, and the quickest answer is used, where answers come within this time, s: the time
+#: of the quickest answer is the least uncertain.
 QUESTIONS, QUICK_S = 3, 0.02
 MODES = (acl.RATE, acl.POSITION, acl.OFF)
 
@@ -46,9 +47,10 @@ class Acutrol3000:
         self._quickest_s = math.inf  #: shortest time from a question to its answer
 
     def identify(self) -> str:
-        """Get manufacturer, model, serial number and software; raises WrongInstrument, also for too high limits.
+        """Get manufacturer, model, serial number and software; raises WrongInstrument.
 
-        Raises NoReply, MalformedReply, LinkError.
+        WrongInstrument also stands for limits of the bench file above those of the controller. Raises NoReply,
+        MalformedReply, LinkError.
         """
         text = self._link.ask(acl.IDENTIFY)
         if not any(word in text.lower() for word in acl.IDENTITY):
@@ -124,8 +126,8 @@ class Acutrol3000:
     def is_moving(self) -> bool:
         """Get whether the table moves, by its estimated rate.
 
-        During a slow run half of the rate counts, which may be below the noise of a table at rest. Raises
-        RequestRejected where an interlock ended a run, NoReply, MalformedReply, LinkError.
+        The limit is `still_dps`, or half of the demanded rate during a slow run, which may be below the noise at rest.
+        Raises RequestRejected where an interlock ended a run, NoReply, MalformedReply, LinkError.
         """
         (rate_dps,) = self._numbers(f":Read:Rate? {self._axis}", 1)
         limit_dps = self.settings.still_dps
@@ -147,8 +149,9 @@ class Acutrol3000:
     def read_angle(self) -> AngleReading:
         """Get the angle of the encoder, and the middle between question and answer as its time.
 
-        Of a few the quickest counts. It is unwrapped by the demanded rate from the reading before. The time is the less
-        certain, the longer the answer took than the quickest one. Raises NoReply, MalformedReply, LinkError.
+        The quickest of a few answers is used. The angle is unwrapped from the reading before by the demanded rate. The
+        uncertainty of the time grows with the delay of the answer beyond that of the quickest answer so far. Raises
+        NoReply, MalformedReply, LinkError.
         """
         text, sent_s, answered_s = self._quickest_answer(f":Read:Position? {self._axis}")
         t_s = (sent_s + answered_s) / 2

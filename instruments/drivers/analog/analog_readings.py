@@ -78,8 +78,9 @@ class AnalogReadings:
     ) -> Readings:  # fmt: skip
         """Return the readings that scans complete, with the count of those that are missing.
 
-        `numbers` (n,) of the scans, rising; `codes` (n, inputs), `good` (n,); `came_s` is when the newest scan was
-        there, and (where known) when it came and within which width, s. Raises WrongInstrument for another rate.
+        `numbers` (n,) of the scans, rising; `codes` (n, inputs), `good` (n,); `came_s` is a clock time at which the
+        newest scan was there and, where it is known better, the end and the width of the interval in which it arrived,
+        s. Raises WrongInstrument for another rate.
         """
         groups, sums, valid = self._means.add(numbers, codes, good)
         if not len(groups):

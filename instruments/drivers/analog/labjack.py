@@ -57,7 +57,7 @@ class LabJackGyro:
 
     @property
     def channels(self) -> tuple[Channel, ...]:
-        """Get the voltages, by the calibration constants of the device; the first use asks it."""
+        """Get the voltages, by the calibration constants of the device, which the first use reads."""
         return analog_channels(self.settings, self._known_scaling())
 
     def identify(self) -> GyroIdentity:

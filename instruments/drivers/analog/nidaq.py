@@ -178,7 +178,7 @@ class NidaqGyro:
         """
         task, self._task = self._task, None
         if task is not None:
-            with contextlib.suppress(Exception):  # the first error is the one to say
+            with contextlib.suppress(Exception):  # the first error is the one to report
                 task.close()
         code = getattr(error, "error_code", None)
         text = f"error {code}: {one_line(error)}" if code is not None else one_line(error)

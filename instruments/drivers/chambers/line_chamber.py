@@ -44,7 +44,7 @@ class TextChamber(SetpointChamber):
         found = super().make_safe()
         if self._ends_off:
             self._switch_off()
-            self._has_controlled = False  # off is right from now on
+            self._has_controlled = False  # that the chamber is off is no fault from now on
         return found
 
     @abstractmethod

@@ -152,7 +152,7 @@ class WatlowF4T(Watlow):
         return state == f4t.ERROR or status == f4t.FAIL or error != f4t.NONE
 
     def _runs(self) -> bool:
-        """Return whether the output that shows it is on; True where the bench file names none."""
+        """Return whether the output that shows that the chamber runs is on; True where the bench file names none."""
         if self.settings.run_output is None:
             return True
         module, output = self.settings.run_output

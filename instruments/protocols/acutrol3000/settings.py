@@ -16,7 +16,7 @@ class Acutrol3000Settings(TableSettings):
     baudrate: int = 9600
     axis: int = Field(default=1, ge=1, le=6)
     direction: Literal[1, -1] = 1  #: -1 where a positive rate turns the table clockwise, seen from above
-    #: Of readings: what the encoder measured, or the rate that was demanded; the encoder's angles are kept in both.
+    #: Reference of readings: the rate measured by the encoder, or the demanded rate; both keep the encoder's angles.
     reference: Literal["measured", "demanded"] = "measured"
     rate_u_ppm: float = Field(default=20.0, ge=0)  #: standard uncertainty of a demanded rate
     encoder_u_deg: float = Field(default=3e-4, gt=0)  #: standard uncertainty of an angle against another one

@@ -15,14 +15,14 @@ DEFAULT_RATE_HZ = 125.0
 
 
 def differences(found: Configuration, settings: Stim300Settings) -> list[str]:
-    """Return what a unit is set to that its bench file does not say, one phrase each."""
+    """Return the settings of a unit that differ from its bench file, one phrase each."""
     options, said = settings.options, []
     if found.unit not in RATE_UNITS:
         said.append(
             f"the gyro output unit is {UNIT_NAMES[found.unit]} in deg instead of ANGULAR RATE or AVERAGE ANGULAR RATE"
         )
     rate_hz = settings.sample_rate_hz or DEFAULT_RATE_HZ
-    if found.sample_rate_hz not in {None, rate_hz}:  # by an external trigger it is what the stream shows
+    if found.sample_rate_hz not in {None, rate_hz}:  # None: external trigger; the stream shows its rate
         said.append(f"the sample rate is {found.sample_rate_hz} Hz instead of {rate_hz:g} Hz")
     if options.datagram not in found.datagrams:
         said.append(f"the datagram is 0x{found.datagrams[0]:02X} instead of 0x{options.datagram:02X}")
@@ -34,6 +34,6 @@ def differences(found: Configuration, settings: Stim300Settings) -> list[str]:
 
 
 def is_other_serial(found: str, given: str) -> bool:
-    """Return whether the serial number of a bench file is that of another STIM300; a name of its own is none."""
+    """Return whether the serial number of a bench file is that of another STIM300; False for any other name."""
     digits = SERIAL_PATTERN.fullmatch(given)
     return digits is not None and digits[1] != found[1:]

@@ -121,9 +121,10 @@ def special_at(data: bytes, at: int) -> Layout | None:
 
 
 def _end_of_gap(data: bytes, at: int, ahead: int) -> tuple[int, bool]:
-    """Return where a gap ends in which no frame begins from `at` to `ahead`, at the end of the data.
+    """Return where a gap at the end of the data ends, and whether it ends at an incomplete special datagram.
 
-    It ends behind a special datagram that reaches further, or before one that has not come whole: then also True.
+    No frame begins from `at` to `ahead`. The gap ends at `ahead`, or behind an intact special datagram that reaches
+    further, or before an incomplete one.
     """
     done = at
     for candidate in SPECIAL_BEGINS.finditer(data, at):

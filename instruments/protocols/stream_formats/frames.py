@@ -146,7 +146,7 @@ class FrameDecoder:
         return Decoded(values, flags(self._format, values, good), damaged)
 
     def _decoded(self, frames: Bytes) -> list[tuple[dict[str, Whole], Mask]]:
-        """Return the numbers of consecutive frames of one length, in parts of equal structure; other messages go."""
+        """Return the numbers of consecutive frames of one length, in parts of equal structure; others are dropped."""
         parts = []
         while len(frames):
             n, items = self._alike(frames)

@@ -47,7 +47,7 @@ class ReferenceModel:
 
     title: str
     source: str
-    identity: str  #: the request; empty: it does not say who it is
+    identity: str  #: the request; empty: it reports no identity
     serial: str  #: pattern of the reply; group `serial`
     quantities: dict[str, Quantity]
     end: str = "\r\n"

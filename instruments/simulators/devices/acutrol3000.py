@@ -24,7 +24,7 @@ PARSING, OUT_OF_RANGE, NOT_SERVOED = 100, 101, 102
 TEXTS = {PARSING: "Command Parse Error", OUT_OF_RANGE: "Parameter Out Of Range", NOT_SERVOED: "Axis Not Servoed"}
 STATES = {acl.CLOSED: "Close", acl.OPEN: "Open", acl.FAULT: "Fault"}
 MODE_NAMES = {acl.OFF: "Off", acl.RATE: "Rate", acl.POSITION: "Position"}
-#: Of the estimated rate at rest, deg/s.
+#: Noise of the estimated rate at rest, deg/s.
 RATE_NOISE_DPS = 1e-4
 
 

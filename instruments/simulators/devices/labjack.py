@@ -80,7 +80,7 @@ def _stream_of(setup: InstrumentSetup) -> Stream:
 
 
 class SimulatedT7(ModbusDevice):
-    """The registers that the driver uses; `product` and `constants` are what a person may find otherwise."""
+    """The registers that the driver uses; `product` and `constants` may be set to those of another device."""
 
     def __init__(self, setup: InstrumentSetup) -> None:
         self.product = float(lj.T7)

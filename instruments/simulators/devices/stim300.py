@@ -90,7 +90,7 @@ class SimulatedStim300:
         self._columns = [AXES.index(axis) for axis in setup.gyro.axes]
         self._rate_hz = float(device.sample_rate_hz or self._unit.sample_rate_hz)
         nominal_hz = device.sample_rate_hz or setup.gyro.sample_rate_hz or self._rate_hz
-        self._step = round(COUNTS_PER_S / nominal_hz)  # by its own clock, however fast that is
+        self._step = round(COUNTS_PER_S / nominal_hz)  # by the clock of the unit, which may be fast or slow
         self._device = device
         self._angle_deg = np.zeros(3)
         self._sent = 0  #: index of the newest frame sent

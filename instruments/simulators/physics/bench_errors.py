@@ -1,4 +1,4 @@
-"""What a simulated bench is really off by: errors drawn from the distributions that its reference standards state."""
+"""True errors of a simulated bench, drawn from the distributions that its reference standards state."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class BenchErrors:
-    """Errors of one bench, indicated minus true. Without standards that are drawn it is exact."""
+    """Errors of one bench, indicated minus true. A bench whose standards are not drawn from is exact."""
 
     rate: float = 0.0  #: relative, of the table's rate
     air_c: float = 0.0  #: of the chamber's thermometer at the units, K

@@ -17,12 +17,12 @@ MISTAKES = ("short", "axis", "direction", "nudge", "fast", "nothing")
 SHORT_SHARE, NUDGE_DEG, NUDGE_AFTER_S, FAST_DPS = 5.0 / 6.0, 8.0, 3.0, 2000.0
 #: Duration of a nudge, s.
 NUDGE_S = 0.4
-#: Standard deviation of the time between a question and the begin of the turn, as a share of `reaction_s`.
+#: Standard deviation of the time between a question and the start of the turn, as a share of `reaction_s`.
 REACTION_SPREAD = 0.2
 
 
 class Motion(Protocol):
-    """What moves the units otherwise."""
+    """A motion below the hand, such as that of a table."""
 
     def angle_deg(self, t_s: Array) -> Array: ...
 
@@ -103,7 +103,7 @@ class HandMotion:
         return np.asarray(below + self._by_hand(t_s))
 
     def commanded_deg(self, t_s: Array) -> Array:
-        """Return the angle that was asked for, deg: of the table below; a hand commands nothing."""
+        """Return the commanded angle of the table below plus the true angle of the hand, which has no command, deg."""
         below = np.zeros(len(t_s)) if self._below is None else self._below.commanded_deg(t_s)
         return np.asarray(below + self._by_hand(t_s))
 

@@ -79,7 +79,7 @@ class ServoMotion:
         return angle, self._rate[k] + max(share, 0.0) * (self._rate[k + 1] - self._rate[k])
 
     def _follow(self, t_s: float, corners: list[tuple[float, float, float]]) -> None:
-        """Replace what was to come at and after a time by other corners; corners at one time are one."""
+        """Replace the corners at and after a time by others; corners at the same time become one."""
         kept = [one for one in zip(self._t_s, self._angle, self._rate, strict=True) if one[0] < t_s]
         distinct = [one for one, after in pairwise(corners) if after[0] > one[0]]
         whole = [*kept, *distinct, corners[-1]][-HISTORY:]

@@ -29,7 +29,7 @@ from instruments.simulators.physics.unit_profiles import UnitTruth, make_unit, u
 
 Array = NDArray[np.float64]
 
-#: Of the table and the chamber that a bench does not have: neither ever moves.
+#: Values for a table and a chamber that a bench does not have: neither ever moves.
 USUAL_STEPS_PER_TURN, USUAL_RAMP_C_PER_MIN = 1600, 1.67
 
 

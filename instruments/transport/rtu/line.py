@@ -16,9 +16,9 @@ log = logging.getLogger(__name__)
 
 #: The line has to be silent for this much longer than the longest latency that was seen.
 SILENCE_FACTOR = 1.25
-#: No less than the time-out of a request, s: a reply that did not come within it may come later.
+#: Lower limit of the longest latency, s, the time-out of a request: a reply that did not come within it may come later.
 LEAST_LATENCY_S = 1.0
-#: One reply after minutes makes no later failure cost minutes, s.
+#: Upper limit of the longest latency, s: one reply after minutes must not make every later failure take minutes.
 LARGEST_LATENCY_S = 5.0
 #: A line that is never silent is given up after this long, s.
 LONGEST_DRAIN_S = 20.0
@@ -32,7 +32,7 @@ class NeverSilent(MalformedReply):
 
 
 class RtuLine:
-    """What is known of one line. `remarks` tells a technician what was survived."""
+    """State of one line. `remarks` lists, for a technician, the faults that requests survived."""
 
     def __init__(self, device: str, clock: Clock) -> None:
         self._device, self._clock = device, clock

@@ -12,7 +12,7 @@ from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.temperature import LagrangeTable
 from labctl.fitting.numeric.arrays import Array
 
-#: Standard deviation of the slope of a table at a node, over the slope: the law between the nodes is not known there.
+#: Standard deviation of the slope of a table at a node, over the slope: the law between the nodes is not known.
 SLOPE_ERROR = 0.5
 
 
@@ -30,10 +30,10 @@ def base_of(data: ReducedRecording, model: ErrorModel, axis: str) -> tuple[NDArr
 
 
 def _slope_errors(data: ReducedRecording, model: ErrorModel, axis: str) -> NDArray[np.float64] | None:
-    """Return what the slope of a table on both sides of its nodes may be wrong by, (R, m, 2 nodes); None without one.
+    """Return columns for errors of a table's slope on both sides of each node, (R, m, 2 nodes); None without a table.
 
-    A table is exact at its nodes, whatever the unit's law is; how steep the law is there it only takes from the
-    neighbours. The temperatures of a level scatter by hundredths of a kelvin, which a steep law makes visible.
+    A table is exact at its nodes, whatever the unit's law is, but it takes the slope there from the neighbouring nodes.
+    The temperatures of a level scatter by hundredths of a kelvin, so where the law is steep a wrong slope is visible.
     """
     if not isinstance(model.temperature, LagrangeTable) or (slope := temperature_slope(data, model, axis)) is None:
         return None

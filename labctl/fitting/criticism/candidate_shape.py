@@ -21,7 +21,7 @@ class CandidateShape:
     rows: NDArray[np.float64]  #: (R, m, k)
     names: tuple[str, ...]
     units: tuple[str, ...]
-    beside_base: bool = False  #: whether only what the base leaves of it is meant, however little that is
+    beside_base: bool = False  #: whether only the part that the base leaves of it counts, however small
 
     @property
     def smooth(self) -> bool:

@@ -51,7 +51,7 @@ def span_of(data: ReducedRecording) -> Span:
 def untestable_channels(data: ReducedRecording, catalogue: Mapping[str, Effect] = CATALOGUE) -> dict[str, list[str]]:
     """Return effects whose channels are not logged, with the channels.
 
-    Of turns the rate at each instant is not known: what is not linear in it lacks that column.
+    In a recording of turns the rate at each instant is not known: an effect that is not linear in the rate lacks it.
     """
     found: dict[str, list[str]] = {}
     for kind in catalogue.values():

@@ -17,7 +17,7 @@ KNOTS = (5, 9)
 STEPS_AT = (0.2, 0.35, 0.5, 0.65, 0.8)
 WAVES_OVER_RANGE = (1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0)
 STEPS_IN_TIME = tuple(float(at) for at in np.arange(0.1, 0.91, 0.05))
-#: The same over time: an hour of a campaign of a day.
+#: The same over time: down to an hour in a campaign of a day.
 WAVES_OVER_TIME = tuple(float(n) for n in np.arange(1.5, 12.1, 0.5))
 #: A jump is spread over this share of the range.
 SPREAD = 0.1
@@ -37,9 +37,9 @@ TIMES = frozenset({"t_s", "power_s"})
 OF_TEMPERATURE_AND_TIME = TIMES | {"temperature_c"}
 #: Channels whose straight line is an effect, or in the base.
 OF_BASE_AND_TIME = OF_TEMPERATURE_AND_TIME | {"table_rate_dps"}
-#: Time since power-on is time where their difference changes by less than this.
+#: Time since power-on counts as time where their difference changes by less than this.
 SAME_TIME_S = 1.0
-#: Channels without steps and waves: the rate, and the time since power-on, which is time again.
+#: Channels without steps and waves: the rate, and the time since power-on, as time has its own.
 NO_SURROUNDINGS = frozenset({"table_rate_dps", "power_s"})
 
 
@@ -59,7 +59,8 @@ def smooth_channels(data: ReducedRecording, axis: str) -> dict[str, Array]:
 def channel_options(data: ReducedRecording, axis: str) -> list[CandidateShape]:
     """Return piecewise linear functions, steps and waves of every channel that varies, for one axis.
 
-    Each as bias and as scale factor; of temperature also as both. Time since power-on is left out where it is time.
+    Each as bias and as scale factor, and those of temperature also as both together. The time since power-on is left
+    out where it differs from time only by a constant.
     """
     found = []
     channels = smooth_channels(data, axis)

@@ -109,7 +109,7 @@ def criticise(
     fitted: FittedMeans | None = None,
     full: bool = True,
 ) -> Criticism:
-    """Hold a model against a recording. Without `full` only the verdict is sought, as long studies do.
+    """Compare a model with a recording. Without `full` only the verdict is computed, for long studies.
 
     `points` are the recording's means, and `fitted` the fit to them, where they are already known. Raises
     NotEnoughData only where the model cannot even be fitted; too little for a verdict is a verdict. Raises Cancelled

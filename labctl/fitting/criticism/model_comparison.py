@@ -116,10 +116,10 @@ def centred(option: CandidateShape, level: NDArray[np.float64] | None) -> Candid
 
 
 def orthogonalised(option: CandidateShape, base: NDArray[np.float64]) -> CandidateShape:
-    """Return a formula, or what is only meant beside the base, orthogonalised to it (R, m, k); others unchanged.
+    """Return a formula, or an option with `beside_base`, orthogonalised to the base (R, m, k); others unchanged.
 
-    A formula is not centred on what was measured: of `supply_v * table_rate_dps` all but a hundredth is scale factor,
-    and that hundredth is what is meant. A formula that lies in the span of the base stays as it is.
+    A formula is not centred on what was measured: all but a hundredth of `supply_v * table_rate_dps` is scale factor,
+    and only that hundredth is of interest. A formula that lies in the span of the base stays as it is.
     """
     meant = option.beside_base or (option.term is not None and option.term.formula)
     if not meant or base.shape[2] == 0:

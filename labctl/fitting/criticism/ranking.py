@@ -32,7 +32,7 @@ class Candidate:
 
 
 def are_exact(*candidates: Candidate) -> bool:
-    """Return whether each candidate is an effect of which the parameters are all of the shape."""
+    """Return whether each candidate is an effect whose parameters determine its shape."""
     kinds = [CATALOGUE.get(candidate.id) for candidate in candidates if not candidate.smooth]
     return len(kinds) == len(candidates) and all(kind is not None and kind.exact for kind in kinds)
 

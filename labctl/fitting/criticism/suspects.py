@@ -31,7 +31,7 @@ from labctl.progress import report_stage
 
 #: At most this many suspects are reported.
 SHOWN = 6
-#: And at most this many that have the evidence, but at a size that the unit's technology cannot have.
+#: At most this many more suspects have the evidence, but a size that the unit's technology cannot have.
 UNPHYSICAL_SHOWN = 2
 
 

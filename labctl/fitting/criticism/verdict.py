@@ -35,7 +35,7 @@ INDISTINGUISHABLE_CHI2 = 7.0
 FAR = 12.0
 #: ... nor one with no more coefficients that reproduces more than this share of it.
 ALIKE = 0.995
-#: A smooth function of a channel is only then unexplained when no effect explains this share of it.
+#: A smooth function of a channel counts as unexplained only when no effect explains this share of it.
 EXPLAINED = 0.90
 #: The same for time, which is never a cause.
 EXPLAINED_TIME = 0.75
@@ -73,7 +73,7 @@ class Verdict:
     depends_on: tuple[str, ...] = ()
     reason: str = ""
     terms: Mapping[str, Term] = field(default_factory=dict)  #: effect id -> the shape that fits best
-    confounded: tuple[str, ...] = ()  #: channels that this schedule cannot tell from the first of `depends_on`
+    confounded: tuple[str, ...] = ()  #: channels that this schedule cannot distinguish from the first of `depends_on`
     not_physical: tuple[str, ...] = ()  #: effects alike in these data, at a size that this technology cannot have
     remainder: Remainder | None = None  #: share of the excess that what is named leaves, and its channels
     further: tuple[tuple[str, ...], ...] = ()  #: of an adequate model: what would take off noise, and is not missing
@@ -145,12 +145,12 @@ def _other_than_refined(comparison: Comparison, refined: Candidate) -> Candidate
 
 
 def is_of_another_law(comparison: Comparison, effect: Candidate) -> bool:
-    """Return whether an effect is only the nearest of the catalogue to a law that is another one."""
+    """Return whether an effect is only the nearest one of the catalogue to a law outside the catalogue."""
     return is_at_end(comparison, effect) or refines_base(comparison, effect)
 
 
 def is_at_end(comparison: Comparison, effect: Candidate) -> bool:
-    """Return whether the longest time constant that an effect may have fits clearly best: its law is another one."""
+    """Return whether the longest possible time constant of an effect fits clearly best: then its law is another one."""
     if effect.term is None or "tau_s" not in effect.term.parameters:
         return False
     lead = 0.0
@@ -204,9 +204,9 @@ def axes_of(comparison: Comparison, candidate: Candidate) -> tuple[str, ...]:
 
 
 def confounded_with(comparison: Comparison, channel: str) -> tuple[str, ...]:
-    """Return the channels that this schedule cannot tell from one on which the residual depends.
+    """Return the channels that this schedule cannot distinguish from one on which the residual depends.
 
-    A step in time is a temperature where temperatures only rose.
+    Where temperatures only rose, a step in time is also a step in temperature.
     """
     smooth = [c for c in comparison.candidates if c.smooth and c.log_bf > 0]
     first = next((c for c in smooth if c.id == channel and c.log_bf >= ENOUGH), None) or comparison.candidates[0]
@@ -274,9 +274,10 @@ def channels_behind(comparison: Comparison) -> tuple[str, ...]:
 
 
 def probabilities(candidates: Sequence[Candidate]) -> dict[str, float]:
-    """Return effect id -> probability that it is the one missing; prior: nothing as likely as all effects together.
+    """Return effect id -> probability that it is the one missing.
 
-    0 for an effect of a size that the unit's technology cannot have.
+    The prior probability that nothing is missing is that of all effects together. The probability is 0 for an effect of
+    a size that the unit's technology cannot have.
     """
     effects = [c for c in candidates if not c.smooth]
     log_bf = np.array([c.log_bf if c.physical else -np.inf for c in effects]) - np.log(max(len(effects), 1))

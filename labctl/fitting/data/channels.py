@@ -119,7 +119,7 @@ class Channels:
         return np.full(len(self), USUAL_DURATION_S)
 
     def decayed(self, tau_s: float) -> Array:
-        """Return the mean over each row of exp(-time since its data set's begin / tau), (n,)."""
+        """Return the mean over each row of exp(-time since the start of its data set / tau), (n,)."""
         begin = np.zeros(len(self))
         if "since_begin_s" in self.columns:
             begin = np.asarray(self.columns["since_begin_s"], dtype=np.float64)

@@ -53,12 +53,12 @@ class FitData:
 
     @property
     def folds(self) -> list[NDArray[np.bool_]]:
-        """The data sets that are left out together, (m,) each: those of one temperature, or without it of one time."""
+        """The data sets that are left out together, (m,) each: of one temperature or, without thermometer, one time."""
         return folds(self.temperature_c, thermometer=self.channels.history.thermometer)
 
     @cached_property
     def held_out_pairs(self) -> list[tuple[FitData, FitData]]:
-        """For each part left out: the other data sets, and the part: a temperature, or of turns a turn."""
+        """For each part left out (a temperature or, of turns, a turn): the other data sets, and the part."""
         if self.info.motion != "turns":
             return self.without_each_temperature
         turns = np.eye(len(self), dtype=bool)[self.channels.table_rate_dps() != 0]

@@ -99,7 +99,7 @@ def joined_coverage(parts: Sequence[Covered | None]) -> Covered | None:
 def _least_known(infos: Sequence[RecordingInfo]) -> tuple[Standard, ...]:
     """Return the standards of several recordings; of one that several have, the entry with the largest uncertainty.
 
-    Campaigns of one bench share what their standards are off by, so that more of them make nothing more certain.
+    Campaigns of one bench share the errors of its standards, so that more campaigns do not reduce this uncertainty.
     """
     found: dict[tuple[str, str], Standard] = {}
     for each in (standard for info in infos for standard in info.standards):

@@ -1,4 +1,4 @@
-"""Noise floor of a recording: what no model can leave less of, whatever the model that is compared with it.
+"""Noise floor of a recording: the least residual that any model can leave, whichever model is compared with it.
 
 White noise is what the readings within a data set show. The drift between data sets is estimated beside a rich surface
 of rate, temperature and surroundings, by restricted maximum likelihood, so that neither the error of a model nor the

@@ -127,7 +127,7 @@ def rate_profile(columns: Columns, *, windows: bool) -> RateProfile:
 
 
 def _filtered(t_s: Array, rate_dps: Array, factor: Factor, memory_s: float) -> Array:
-    """Return what a factor on the spectrum makes of rates (n,); before and after them they soon stay what they are."""
+    """Return rates (n,) with a factor applied to their spectrum; beyond both ends the rates soon become constant."""
     from scipy.fft import next_fast_len
     from scipy.interpolate import CubicSpline
 

@@ -21,13 +21,13 @@ from labctl.fitting.data.temperature.levels import temperature_levels
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording.columns import OWN_DATASET, RECORDING, WITHIN_S
 
-#: The surface has at most this share of as many columns as there are data sets, and leaves at least so many free.
+#: Largest number of columns, as a share of the number of data sets (also with levels), and least degrees of freedom.
 MOST_SHARE, MOST_SHARE_WITH_LEVELS, LEAST_FREE = 0.5, 0.7, 8
 #: Largest degree in temperature of the bias, of the scale factor and of the terms quadratic and cubic in the rate.
 DEGREES = (6, 4, 2, 2)
 #: Time constants of a warm-up after power-on, s.
 WARM_UP_S = (600.0, 3600.0)
-#: At rest a loop of temperatures shows what lags behind the thermometer, s, or depends on where it came from, K.
+#: Time constants of lags, s, and widths of hystereses, K, that a loop of temperatures at rest shows.
 LAGS_S, WIDTHS_K = (150.0, 400.0, 1000.0, 2500.0), (2.0, 6.0, 15.0)
 #: A column of which those before it leave less than this share says nothing new.
 LEAST_NEW = 1e-2
@@ -36,7 +36,7 @@ DELAYS_S = (1e-3, -1e-3, 3e-3, 1e-2, 2e-2, 5e-2)
 TIME_CONSTANTS_S = (1e-3, 3e-3, 1e-2, 3e-2, 0.1, 1.0, 5.0)
 #: The same share for those: they are nearly alike, and what distinguishes them is large beside the noise.
 LEAST_NEW_OF_RESPONSE = 1e-6
-#: What is logged and no cause of an error by itself, or is there in another form.
+#: Logged columns that cause no error themselves, or that the surface has in another form.
 NO_SURROUNDINGS = frozenset({
     "t_s", "table_rate_dps", "table_angle_deg", "dataset", "position", "mounting", "run", "n", "duration_s",
     "since_begin_s", "valid", "temperature_c", "temperature_x_c", "temperature_y_c", "temperature_z_c", "power_s",
@@ -62,7 +62,8 @@ def rich_surface(channels: Channels, axis: str) -> NDArray[np.float64]:
 def with_levels_of_temperature(surface: NDArray[np.float64], channels: Channels, axis: str) -> NDArray[np.float64]:
     """Return a surface (m, k) with a level of its own for every discrete temperature, at most 0.7 m columns in all.
 
-    On one rising leg of temperatures these take a drift for a temperature, so they are only for laws that need them.
+    On a single rising leg of temperatures these levels absorb a drift in time, so they are only for laws that need
+    them.
     """
     rate = _scaled(channels.rate_dps(axis), about_zero=True)
     levels = _levels_of_temperature(channels.temperature_c(axis), rate)
@@ -140,16 +141,17 @@ def _of_responses(channels: Channels, axis: str) -> NDArray[np.float64]:
 
 
 def _of_other_axes(channels: Channels, axis: str, warm: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
-    """Yield the rate about each other axis, alone and times straight and bent functions of temperature."""
+    """Yield the rate about each other axis, alone, and times linear and quadratic functions of temperature."""
     for other in channels.rates:
         if other != axis:
             yield _scaled(channels.rate_dps(other), about_zero=True)[:, None] * warm[:, :3]
 
 
 def _levels_of_temperature(temperature_c: Array, rate: Array) -> NDArray[np.float64]:
-    """Return the indicators of discrete temperatures, (m, k): as bias, as scale factor, and times what is left in them.
+    """Return the indicators of discrete temperatures, (m, k): as bias, as scale factor, and with slopes.
 
-    A law that is steep between two of them is no polynomial of all, and turns even hundredths of a kelvin into error.
+    A law that is steep between two levels is no polynomial over all of them, and within a level it turns even
+    hundredths of a kelvin into an error.
     """
     level = temperature_levels(temperature_c)
     if level is None:
@@ -168,7 +170,7 @@ def _levels_of_rate(channels: Channels) -> NDArray[np.float64]:
 
 
 def _history(channels: Channels, warm: NDArray[np.float64], rate: Array) -> Iterator[NDArray[np.float64]]:
-    """Yield what tells rising from falling temperatures, and the time since power-on."""
+    """Yield columns that distinguish rising from falling temperatures, and functions of the time since power-on."""
     if "t_s" not in channels:
         return
     t_s = np.asarray(channels["t_s"], dtype=np.float64)
@@ -201,7 +203,7 @@ def since_first(channels: Channels) -> Array:
 
 
 def _carried(signs: Array) -> Array:
-    """Return signs (m,) in order of time with each 0 replaced by the last sign before it, at the begin by the first."""
+    """Return signs (m,) in order of time with each 0 replaced by the last sign before it, at the start by the first."""
     where = np.flatnonzero(signs)
     if not len(where):
         return signs

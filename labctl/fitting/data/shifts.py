@@ -24,7 +24,7 @@ ShiftKind = Literal["turn_on", "day_to_day", "mounting"]
 
 @dataclass(frozen=True)
 class Repeatability:
-    """One kind of shift: the standard's term, its unit, and the largest standard deviation that is believed."""
+    """One kind of shift: the standard's term, its unit, and the largest standard deviation that is accepted."""
 
     kind: ShiftKind
     term: str
@@ -43,7 +43,7 @@ KINDS: dict[ShiftKind, Repeatability] = {
 
 @dataclass(frozen=True)
 class Shift:
-    """One shift: what it is of, and its regressor (n,)."""
+    """One shift: its kind, its number and its regressor (n,)."""
 
     kind: ShiftKind
     recording: int
@@ -71,9 +71,9 @@ def shift_columns(channels: Channels, axis: str) -> NDArray[np.float64]:
 
 
 def shift_contrasts(channels: Channels, axis: str) -> tuple[NDArray[np.float64], Array]:
-    """Return what shifts of one axis differ by, (n, k), and the largest standard deviation of each, (k,).
+    """Return contrasts between the shifts of one axis, (n, k), and the largest standard deviation of each, (k,).
 
-    What all recordings have in common is no shift: an error of the bias that they share stays to be found.
+    What all recordings have in common is no shift: an error of the bias that they share can still be found.
     """
     kinds: dict[tuple[ShiftKind, str], list[Array]] = {}
     for shift in shifts_of(channels, axis):

@@ -91,7 +91,7 @@ class CentripetalAcceleration(_Acceleration):
     draws = ("table_rate_dps", "map")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
-        """At a radius of 0.1 m; which way the pull points in the body may be another one in every position."""
+        """Return the centripetal acceleration at 0.1 m; its direction in the body may differ between positions."""
         pull_g = np.deg2rad(channels.table_rate_dps()) ** 2 * 0.1 / GRAVITY
         if not term.parameters.get("by_position", 1.0):
             return [Column("centripetal", "deg/s/g", pull_g)]

@@ -96,7 +96,7 @@ class Span:
         return channel in self.channels
 
     def between_rates(self, low: float, high: float) -> Array:
-        """Return a value between each two rates from `low` to `high` of the greatest."""
+        """Return the midpoints of neighbouring rates that lie between `low` and `high`, shares of the greatest rate."""
         rates = np.array(self.rates_dps)
         middles = (rates[:-1] + rates[1:]) / 2
         return middles[(middles >= low * self.rate_dps) & (middles <= high * self.rate_dps)]
@@ -141,7 +141,7 @@ class Effect(ABC):
     draws: tuple[str, ...] = ()  #: views of a criticism, or channels, whose picture it would draw
     shows_at_rest: bool = False  #: whether it is an error of the bias, at least in part: then it takes no rate to see
     remembers: ClassVar[bool] = False  #: whether it needs the temperatures before, which a state stands for in use
-    exact: ClassVar[bool] = False  #: whether its parameters are all of its shape: then fit alone tells two such apart
+    exact: ClassVar[bool] = False  #: whether its parameters determine its shape: a fit alone distinguishes two such
     in_use: ClassVar[bool] = True  #: whether what it needs is known where the gyro is used, and not on the bench only
 
     @abstractmethod
@@ -175,7 +175,7 @@ class Effect(ABC):
         return abs(value) - spare > max(abs(span[0]), abs(span[1]))
 
     def least(self, term: Term) -> tuple[int, int]:
-        """Return how many different (rates, temperatures) tell this effect's coefficients apart."""
+        """Return how many different (rates, temperatures) this effect's coefficients need to be determined."""
         return (1 if self.shows_at_rest else 2), 1
 
     def options(self, span: Span) -> list[Term]:

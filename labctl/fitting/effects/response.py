@@ -17,14 +17,14 @@ from labctl.json_types.models import Origin
 class _Responding(Effect):
     """A part of the response. Every other effect sees the rate that has come through the whole response."""
 
-    in_use = False  # what is late cannot be undone reading by reading, nor what the output does not follow
+    in_use = False  # a delay cannot be undone reading by reading, nor can a finite bandwidth
     exact = True
     origin: ClassVar[Origin] = "sensor"
     rows: ClassVar[Rows] = "own"
     name: ClassVar[str]
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
-        """Return the change of the rate with the delay or time constant, from that of the channels' response on."""
+        """Return the change of the rate by a delay or time constant that differs from the channels' response."""
         profile, here = channels.profile, channels.response
         if profile is None:
             return [Column(self.name, "s", np.zeros(len(channels)))]

@@ -31,7 +31,7 @@ class TemperatureRate(Effect):
     draws = ("legs", "time")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
-        """Against the change of the gyro's thermometer, or (of_gradient) the air's lead over it."""
+        """Return the thermometer's rate of change or (`of_gradient`) the air temperature less the thermometer's."""
         if term.parameters.get("of_gradient", 0.0) and "chamber_c" in channels:
             lead = np.asarray(channels["chamber_c"], dtype=np.float64) - channels.temperature_c(axis)
             return [Column("chamber_lead", "deg/s/K", lead)]
@@ -39,7 +39,7 @@ class TemperatureRate(Effect):
         return [Column("temperature_rate", "deg/s/(K/min)", channels.history.rate_k_min(channels.columns, over_s))]
 
     def options(self, span: Span) -> list[Term]:
-        """A thermometer's noise asks for a long slope, a quick gyro for a short one."""
+        """Return a long slope, for a noisy thermometer, a short one, for a fast gyro, and the gradient if known."""
         slopes = by_parameter(self.id, of_gradient=np.array([0.0]), over_s=np.array([60.0, 300.0]))
         return slopes + ([Term(self.id, None, {"of_gradient": 1.0})] if span.has("chamber_c") else [])
 
@@ -96,7 +96,7 @@ class ThermalHysteresis(Effect):
     draws = ("legs", "temperature_c")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
-        """A play of the temperature; `rounded`: several plays together, so that the new side is approached smoothly."""
+        """Return a play of the temperature; with `rounded` several, so that the new side is approached smoothly."""
         width_k = term.parameters.get("width_k", 3.0)
         state = channels.history.hysteresis_state(
             channels.columns, width_k, rounded=bool(term.parameters.get("rounded", 0.0))
@@ -110,7 +110,7 @@ class ThermalHysteresis(Effect):
         return [Column("leg", "deg/s", state)]
 
     def kept(self, term: Term, history: TemperatureHistory) -> Term:
-        """Return the term with the temperatures between which it is bowed: in use there is no recording to ask."""
+        """Return the term with the temperatures at which a bowed hysteresis vanishes: in use no recording has them."""
         if not term.parameters.get("bowed", 0.0):
             return term
         low, high = history.span_c
@@ -164,7 +164,7 @@ class SelfHeating(Effect):
     draws = ("power_s", "time")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
-        """What is not yet there of the heating, times the rate: its part at rest is the warm-up's."""
+        """The share of the heating that is still to come: as bias, like a warm-up, and times the rate."""
         on_s = np.asarray(channels["power_s"], dtype=np.float64)
         missing = np.exp(-np.maximum(on_s, 0.0) / term.parameters.get("tau_s", 1200.0))
         return [
@@ -194,7 +194,7 @@ class ThermometerError(Effect):
     draws = ("temperature_c", "map")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
-        """A bend of the temperature scale across the range, in the bias and in the scale factor."""
+        """Return the temperature about its reference, as an error of the bias and of the scale factor."""
         centred = channels.temperature_c(axis) - reference.temperature_c
         return [
             Column("thermometer", "deg/s/K", centred),

@@ -29,7 +29,7 @@ def require_enough_data(data: FitData, model: ErrorModel) -> None:
 
 
 def _require_mean_rates(data: FitData, model: ErrorModel) -> None:
-    """Refuse what turns cannot tell: their rate is known on average alone."""
+    """Refuse models that turns cannot determine: only the mean of their rate is known."""
     if data.info.motion != "turns":
         return
     for axis in data.outputs:

@@ -42,7 +42,7 @@ def without_response(fitted: FittedModel) -> FittedModel:
 
 
 def first_response(data: FitData, model: ErrorModel, axis: str) -> Response:
-    """Return the response of a model from which Gauss-Newton steps find the best: that of a grid nearest the output."""
+    """Return the response at which the Gauss-Newton steps start: the one of a grid that fits the output best."""
     delayed, limited = TimeDelay.id in model.effect_ids, Bandwidth.id in model.effect_ids
     if data.channels.profile is None or not (delayed or limited) or not np.any(data.channels.up(axis)):
         return Response()
@@ -58,8 +58,8 @@ def first_response(data: FitData, model: ErrorModel, axis: str) -> Response:
 def next_response(before: Response, wanted: Response, model: ErrorModel, u_s: float) -> Response:
     """Return the response of the next step, at most 1 s; `u_s` is the time constant's standard uncertainty before, s.
 
-    Beside a delay only the square of a time constant T is seen near 0, where a change of the one is a change of the
-    other. T times u(T) is half the uncertainty of that square, so the root of it is the least T that differs visibly
+    Beside a delay only the square of a time constant T is seen near 0, where a change of T acts like a change of the
+    delay. T times u(T) is half the uncertainty of that square, so the root of it is the least T that differs visibly
     from 0: nearer to 0 a step does not go, and T comes out as half of that with all of it as its u.
     """
     if TimeDelay.id not in model.effect_ids or Bandwidth.id not in model.effect_ids:
@@ -77,7 +77,7 @@ def _within_reach(response: Response) -> Response:
 
 
 def _nearest(data: FitData, axis: str, responses: list[Response]) -> Response:
-    """Return the response with which a line through the output leaves least."""
+    """Return the response at which a straight line through the output leaves the smallest residuals."""
 
     def left(response: Response) -> float:
         seen = data.through(response).true_rate_dps(axis)

@@ -33,8 +33,8 @@ def quantities(kind: Effect) -> list[Parameter]:
 def with_shapes(data: FitData, preset: Preset, *, all_of_them: bool = False) -> Preset:
     """Return a preset whose effects that remember have the shapes that fit the data best.
 
-    Of those that a term states already only with `all_of_them`, and then where there are several. Raises NotEnoughData
-    where the preset cannot be built.
+    A shape that a term states already is kept, unless `all_of_them` is given and several effects remember. Raises
+    NotEnoughData where the preset cannot be built.
     """
     model, _ = preset.build(data)
     remembering = [term for term in model.terms if quantities(kind_of(term))]

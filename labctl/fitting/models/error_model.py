@@ -42,7 +42,7 @@ class ErrorModel:
 
     @property
     def needs(self) -> tuple[str, ...]:
-        """The channels that its effects need beside rate and temperature; what remembers has its state instead."""
+        """The channels that its effects need beside rate and temperature; effects that remember have a state."""
         return tuple(sorted({n for t in self.terms if not kind_of(t).remembers for n in kind_of(t).needs}))
 
     @property
@@ -98,8 +98,8 @@ class ErrorModel:
 def _by_recording(term: Term, columns: list[Column], channels: Channels) -> list[Column]:
     """Return the columns of an effect, those of bench, fixture and environment with a coefficient for each recording.
 
-    What belongs to the unit is common to all of its recordings; the rest is of the day. A run's or a mounting's shift
-    has a column for each anyway.
+    What belongs to the unit is common to all of its recordings; the rest differs from day to day. A run's or a
+    mounting's shift has a column for each anyway.
     """
     parts = channels.by_recording(np.ones(len(channels), dtype=bool))
     if len(parts) < 2 or kind_of(term).origin in EXPORTED_ORIGINS:

@@ -22,7 +22,7 @@ from labctl.fitting.numeric.arrays import Array
 
 @dataclass(frozen=True)
 class Follower:
-    """One element that follows the temperature, and the error that its distance from it makes."""
+    """One element that follows the temperature, and the error that is due to its distance from the temperature."""
 
     kind: Literal["lag", "play"]
     parameter: float  #: time constant, s, or width, K

@@ -32,7 +32,7 @@ LONGEST_SHARE = 0.25
 CONFIDENCE = 0.95
 #: A term is shown only where it is this share of the variance at some averaging time.
 SHOWN_SHARE = 0.3
-#: The longest averaging times of a record whose trend was taken off: the trend has taken some of the noise there along.
+#: The same share of a record whose trend was subtracted: the trend has absorbed some of the noise at longer times.
 LONGEST_SHARE_TRENDLESS = 0.125
 #: A random walk counts where it prevails over this many octaves and more: it is read beyond the record.
 PREVAILING_OCTAVES = 3

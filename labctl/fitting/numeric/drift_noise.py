@@ -60,12 +60,12 @@ class Drift:
 def whitened(
     scatter: Scatter, drifts: Sequence[Drift], white_var: Array, values: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], Array]:
-    """Return values (m, k) with each drift's correlation taken out, (drifts, m, k) with the rows in order of time, and
-    the log determinants of the covariances, (drifts,).
+    """Return values (m, k) whitened for each drift, (drifts, m, k), and log determinants of the covariances, (drifts,).
 
-    Row by row in time, as a Kalman filter goes: of an Ornstein-Uhlenbeck process only the last value matters, so it is
-    the same as by the Cholesky factors, in a number of operations that grows with m and not with its cube. What is
-    expected of each row is a linear recurrence, solved for all columns at once.
+    The returned rows are in order of time. They are whitened one after the other, as in a Kalman filter: only the last
+    value of an Ornstein-Uhlenbeck process matters, so the result is that of the Cholesky factors, in a number of
+    operations that grows with m and not with its cube. The expectation of each row is a linear recurrence, solved for
+    all columns at once.
     """
     order = np.lexsort((scatter.t_s, scatter.run))
     ordered = values[order]
@@ -107,8 +107,10 @@ def _expected_of_many(
 def _filter(
     scatter: Scatter, drifts: Sequence[Drift], white_var: Array, order: NDArray[np.int64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Return, (drifts, m) each, for rows in time: the share of the drift that is left since the row before (0 where a
-    run begins), the variance of a row about what is expected of it, and the drift's share of that variance.
+    """Return the terms of the recurrence for rows in order of time, (drifts, m) each.
+
+    They are the share of the drift that is left since the row before (0 where a run begins), the variance of a row
+    about its expectation, and the drift's share of that variance.
     """
     size_var, tau_s, per_rate = np.array([(d.drift_dps**2, d.tau_s, d.per_rate) for d in drifts]).T[:, :, None]
     begins = np.concatenate([[True], np.diff(scatter.run[order]) != 0])

@@ -160,7 +160,7 @@ def _at(
     r, projected, chi2 = reduce(rows)
     log_dets = log_dets + 2 * np.log(np.abs(np.diagonal(r, axis1=1, axis2=2))).sum(axis=1)
     freedom = max(m - k, 1)
-    # what no noise explains is the model's fault, and makes its coefficients that much less certain
+    # a chi2 above that of the noise is due to the model, and makes its coefficients as much less certain
     scale = np.maximum(chi2 / freedom, 1.0) if known else np.maximum(chi2, 1e-300) / freedom
     fit_terms = chi2 if known else freedom * np.log(np.maximum(chi2, 1e-300))
     priors = np.array([drift_noise.log_prior(scatter, drift) for drift in drifts])
@@ -175,7 +175,7 @@ def _unexplained(design: NDArray[np.float64], y: Array, scatter: Scatter, values
     largest = scatter.largest_drift_dps / max(drift_noise.DRIFT_SIZES)
     if scatter.white_var is None:
         return float(min(1.0, largest / np.sqrt(max(total, 1e-300))))
-    # each data set counts by what its white noise lets it say of the rest: DerSimonian and Laird 1986, eq. 8
+    # each data set is weighted by the inverse of its white variance: DerSimonian and Laird 1986, eq. 8
     per_white = 1.0 / scatter.white_var
     excess = float(residual**2 @ per_white) / freedom - 1.0
     unexplained = np.sqrt(max(max(excess, 0.01) / float(per_white.mean()), 1e-24))

@@ -43,7 +43,7 @@ def slow_trend(rate_dps: Array) -> Array | None:
 
 
 def _fit(design: NDArray[np.float64], steps: Array) -> tuple[float, Array]:
-    """Return the probability that steps without order fit a design as well by chance, and its coefficients."""
+    """Return the probability that random steps fit a design as well by chance, and its coefficients."""
     coefficients, *_ = np.linalg.lstsq(design, steps)
     left = float(np.sum((steps - design @ coefficients) ** 2))
     k, freedom = design.shape[1], len(steps) - design.shape[1]

@@ -15,13 +15,13 @@ from scipy.special import chdtrc, ndtr
 
 from labctl.fitting.numeric.arrays import Array
 
-#: Standard deviations tried for each kind: so many, from this share of what an effect is uncertain by ...
+#: Standard deviations tried for each kind: so many, from this share of the standard uncertainty of an effect ...
 SIZES, LEAST = 18, 0.1
-#: ... to this many times the effects themselves, of which no spread is this many times smaller than they are.
+#: ... (or their spread over IMPOSSIBLE, if that is less) to MOST times the larger of that uncertainty and their spread.
 MOST, IMPOSSIBLE = 200.0, 30.0
 #: Points that together hold less than this share of the evidence are left out.
 NEGLIGIBLE = 1e-4
-#: Of an interval, and its half width over the standard deviation of a normal distribution.
+#: Probability of an interval, and its half width over the standard deviation of a normal distribution.
 LEVEL, FACTOR = 0.95, 1.959963984540054
 BISECTIONS = 40
 

@@ -48,7 +48,7 @@ def require_determined(serial: str, moves: Moves, equations: Equations, noise: N
     `noise` (2m, 2m) is the covariance of the equations, rad^2.
     """
     white = np.linalg.solve(np.linalg.cholesky(noise), equations.jacobian)
-    # half a unit of a coefficient is known before: what no move sees then shows as that, and not as a singular matrix
+    # each coefficient has a prior standard deviation of 0.5: one that no move shows keeps it, and no matrix is singular
     u = np.sqrt(np.diag(np.linalg.inv(white.T @ white + np.eye(9) / 0.5**2))).reshape(3, 3)
     if float(u.max()) <= LARGEST_U and condition_of(equations.jacobian, noise) <= LARGEST_CONDITION:
         return

@@ -24,7 +24,7 @@ class MoveErrors:
 
     rate_dps: NDArray[np.float64]  #: (m, 2) two components square to gravity, divided by the move's duration
     by_axis_dps: NDArray[np.float64]  #: (m, 3) the same about the body axes; what is about the vertical is not seen
-    t_s: NDArray[np.float64]  #: (m, 2) begin and end of each move
+    t_s: NDArray[np.float64]  #: (m, 2) start and end of each move
     accelerometer_deg: Array  #: (m,) by how much gravity's direction moved in the body, by the accelerometer
     gyro_deg: Array  #: (m,) the same by the integrated rates
     residual_deg: Array  #: (m,) angle between gravity's direction at the end by the rates and by the accelerometer

@@ -25,7 +25,7 @@ class Equations:
     residual: Array  #: (2m,)
     jacobian: NDArray[np.float64]  #: (2m, 9) by the errors of the gyro, row after row
     across: NDArray[np.float64]  #: (m, 2, 3) the two directions, in the body at the end
-    by_turn: NDArray[np.float64]  #: (m, 2, 3) by a small rotation in the axes of the begin, rad
+    by_turn: NDArray[np.float64]  #: (m, 2, 3) by a small rotation in the body axes at the start, rad
     rotations: Rotations
 
     def take(self, rows: NDArray[np.bool_]) -> Equations:

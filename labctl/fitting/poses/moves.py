@@ -25,7 +25,7 @@ class Moves:
     """m moves between rests, filled up to the same number n of readings with steps of 0 s."""
 
     before: NDArray[np.int64]  #: (m,) the rest that a move began in; it ended in the next
-    t_s: NDArray[np.float64]  #: (m, 2) begin and end
+    t_s: NDArray[np.float64]  #: (m, 2) start and end
     rate_dps: NDArray[np.float64]  #: (m, n, 3) output, with its bias
     step_s: NDArray[np.float64]  #: (m, n - 1)
     share: NDArray[np.float64]  #: (m, n) how far between the middles of the two rests a reading lies, 0 to 1

@@ -13,14 +13,14 @@ from labctl.fitting.poses.triad import cross_matrix
 
 @dataclass(frozen=True)
 class Rotations:
-    """m moves: rotations from the body at the end to the body at the begin, and their derivatives.
+    """m moves: rotations from the body axes at the end to those at the start, and their derivatives.
 
-    A derivative is that of a small rotation in the axes of the begin, rad.
+    A derivative is that of a small rotation in the body axes at the start, rad.
     """
 
     matrix: NDArray[np.float64]  #: (m, 3, 3)
     by_error: NDArray[np.float64]  #: (m, 3, 9) per unit of E, row after row
-    by_bias_before: NDArray[np.float64]  #: (m, 3, 3) per rad/s of bias at the begin, fading to the end
+    by_bias_before: NDArray[np.float64]  #: (m, 3, 3) per rad/s of bias at the start, fading to the end
     by_bias_after: NDArray[np.float64]  #: (m, 3, 3) per rad/s of bias at the end
     white: NDArray[np.float64]  #: (m, 3, 3) covariance per (rad/s)^2 s of white noise of each axis alike
 
@@ -41,7 +41,7 @@ def integrate(
     for k in range(vectors.shape[1]):  # of all moves at once: a product goes step by step
         middle[:, k] = matrix @ half[:, k]
         matrix = middle[:, k] @ half[:, k]
-    turned = middle @ inverse  # (m, n, 3, 3): from an error in the outputs' axes to one in the body's at the begin
+    turned = middle @ inverse  # (m, n, 3, 3): from an error in the outputs' axes to one in the body axes at the start
     weight = (share[:, :-1] + share[:, 1:]) / 2 * step_s
     by_error = -np.einsum("mkai,mkj->maij", turned, mean).reshape(len(rate), 3, 9)
     return Rotations(
@@ -112,7 +112,7 @@ def change_of_direction(up: NDArray[np.float64], matrix: NDArray[np.float64]) ->
 
 
 def seen_at_end(up: NDArray[np.float64], matrix: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return directions of the begin (m, 3) in the body axes of the end."""
+    """Return directions (m, 3), given in the body axes at the start, in the body axes at the end."""
     return np.asarray(np.einsum("mji,mj->mi", matrix, up))
 
 

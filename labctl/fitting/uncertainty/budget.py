@@ -78,7 +78,7 @@ class Budget:
 def budget_of(result: str, unit: str, lines: Sequence[BudgetLine], value: float | None = None) -> Budget:
     """Return a budget of independent lines.
 
-    Each line is one source at this place; what its inputs have in common is inside of it. A line of type A that is
+    Each line is one source at this place; what its inputs have in common is included in it. A line of type A that is
     unknown leaves the result unknown; a standard that is not stated is listed and not in U.
     """
     known = [line for line in lines if line.contribution is not None]

@@ -23,7 +23,7 @@ BY_HELD_OUT = "by temperatures and rates left out of the fit in turn; the drift 
 def coefficient_line(
     fitted: FittedModel, law: LawFunction, temperature_c: float, evidence: AxisEvidence | None, unit: str
 ) -> BudgetLine:
-    """Return the line of the fitted coefficients, of what the law gives in `unit`."""
+    """Return the line of the fitted coefficients: their uncertainty in the result of the law, in `unit`."""
     u = law.u(fitted, temperature_c)
     why = PUBLISHED if u is None else BY_COVARIANCE
     count = fitted.axes[law.axis].values.size

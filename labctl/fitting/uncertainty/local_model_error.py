@@ -14,7 +14,8 @@ NEAR_SHARE = 0.12
 LEAST_NEAR = 3.0
 #: Farther than this many widths from every data set nothing is known.
 FARTHEST = 2.0
-#: Of the scatter of the estimate itself this much is the least that is claimed: an error as large would not be seen.
+#: The least variance that is stated, as a share of the standard uncertainty of the estimate itself: a smaller one could
+#: not be seen.
 LEAST_SHARE = 0.25
 #: Data sets beyond this many are averaged in groups of neighbours, of temperatures in so many groups.
 MOST_KEPT, TEMPERATURES = 2000, 10
@@ -79,7 +80,7 @@ class LocalModelError:
 
 
 def _effective_number(weight: Array) -> float:
-    """Return how many data sets of equal weight say as much."""
+    """Return the effective number: how many data sets of equal weight carry as much information."""
     return float(weight.sum() ** 2 / (weight**2).sum())
 
 

@@ -16,7 +16,7 @@ _GRAVITY_WITHIN = 0.06
 _EPOCH = (1e9, 4.2e9)
 #: Degrees Celsius, and kelvin, that a thermometer of a gyro may show.
 _CELSIUS, _KELVIN = (-80.0, 180.0), (193.0, 453.0)
-#: Usual steps of time, s, of which one unit makes sense.
+#: Usual steps of time, s, at which only one unit makes sense.
 _STEPS = (1e-5, 0.6)
 #: Whole numbers as time: least and largest step, their unit, and how many of it are a second.
 _WHOLE_STEPS = ((2, 200, "ms", 1e3), (201, 200_000, "us", 1e6), (200_001, 1e12, "ns", 1e9))

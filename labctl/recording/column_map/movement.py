@@ -16,7 +16,7 @@ WINDOW_S, LEAST_READINGS = 0.5, 8
 MOST_NOISE_DPS = 0.5
 #: A window moves where its spread is beyond so many times the usual, and beyond this, deg/s.
 TIMES_USUAL, LEAST_SPREAD_DPS = 5.0, 0.1
-#: A still unit's output may stray so far from its usual value by temperature, deg/s.
+#: The output of a still unit may differ this much from its usual value by temperature, deg/s.
 MOST_DRIFT_DPS = 5.0
 #: A unit that moves in more than this share of its windows was moved; less are knocks.
 KNOCKS = 0.02
@@ -34,7 +34,7 @@ class Movement:
 
     @property
     def is_rest(self) -> bool:
-        """Whether the unit rested but for knocks."""
+        """Whether the unit rested, apart from knocks."""
         return self.share <= KNOCKS
 
 

@@ -89,7 +89,7 @@ def _by_names(table: RawTable, guesses: list[str]) -> dict[str, MappedColumn]:
 
 
 def _with_unit(name: str, target: str, unit: str, column: RawColumn, guesses: list[str]) -> MappedColumn | None:
-    """Return the mapped column; None for one that is of no use without a unit that is known."""
+    """Return the mapped column; None for one that cannot be used without a known unit."""
     quantity = unit_of_target(target)
     if target == "t_s" and column.is_text:
         return MappedColumn.of(name, "date-time") if _dates(column) else None
@@ -107,7 +107,7 @@ def _with_unit(name: str, target: str, unit: str, column: RawColumn, guesses: li
     if why:
         guesses.append(f"column {name!r}: unit taken for {unit} ({why})")
     if quantity in {"deg C", "V", "microtesla", "deg"} and (not unit or is_lsb(unit)):
-        return None  # nothing needs it so much that its unit is asked for
+        return None  # a recording can do without it, so its unit is not asked for
     return MappedColumn.of(name, "" if is_lsb(unit) else unit)
 
 

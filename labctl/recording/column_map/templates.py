@@ -52,7 +52,7 @@ KINDS: tuple[Motion, ...] = get_args(Motion)
 
 
 def template(kind: str) -> str:
-    """Return the template of a kind of data as CSV; raises BadInput for a kind that there is not."""
+    """Return the template of a kind of data as CSV; raises BadInput for an unknown kind."""
     for motion, (header, rows) in _TEMPLATES.items():
         if motion == kind:
             return "".join(",".join(row) + "\n" for row in (header, *rows))

@@ -1,5 +1,4 @@
-"""How much one data file may hold: an import takes a bounded part of the memory, whatever a file has an unpacked
-size of."""
+"""How much one data file may hold: an import uses bounded memory, however large a file becomes when unpacked."""
 
 from __future__ import annotations
 
@@ -12,7 +11,7 @@ from labctl.errors import BadRecording
 MOST_VALUES = 100_000_000
 MOST_COLUMNS = 256
 VALUE_BYTES = 8
-#: What the pages of a file may unpack to, one after the other: its values with their dictionaries.
+#: Largest unpacked size of all pages of a file: its values with their dictionaries.
 MOST_UNPACKED_BYTES = 2_000_000_000
 #: Whole numbers up to here are exact in every reader of the answers: 2^53 - 1.
 LARGEST_WHOLE = (1 << 53) - 1
@@ -47,7 +46,7 @@ def refuse_too_many(path: Path, rows: int, columns: int) -> None:
 
 
 def refuse_too_large(path: Path, size: int) -> None:
-    """Raise BadRecording where a file has an unpacked size of more than so many values need: long words, padding."""
+    """Raise BadRecording where the unpacked size, in bytes, is above the limit, as by long words or padding."""
     if size > MOST_UNPACKED_BYTES:
         raise BadRecording(
             f"{path}: has an unpacked size of {size / 1e6:g} MB; at most {MOST_UNPACKED_BYTES / 1e6:g} MB are read "

@@ -1,5 +1,4 @@
-"""A Parquet file as columns: its footer first, then rows in pieces, so that what it has an unpacked size of is
-known beforehand."""
+"""A Parquet file as columns: its footer first, which states the unpacked size, then rows in pieces."""
 
 from __future__ import annotations
 

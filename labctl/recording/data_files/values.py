@@ -89,7 +89,7 @@ class ColumnValues:
         return words[np.asarray(pc.fill_null(text.indices, len(words) - 1))]
 
     def _wide(self, words: pa.Array) -> int:
-        """Return the bytes that each row of a column takes whose longest word is among these."""
+        """Return the bytes per row of a text column whose longest word is among these."""
         return CHARACTER_BYTES * int(pc.max(pc.utf8_length(words.cast(pa.large_string()))).as_py() or 1)
 
     def _readable(self, text: pa.Array) -> pa.Array:

@@ -39,7 +39,7 @@ def column_of(name: str, pieces: Sequence[pa.Array], decimal: str, unit: str = "
 
 
 def _numbers(piece: pa.Array, decimal: str) -> tuple[Any, list[tuple[int, str]], int]:
-    """Return the numbers of a piece, (n,), nan where there is none, the cells that are none, and how many they are."""
+    """Return the numbers of a piece, (n,), nan where there is none, the first wrong cells, and the number of all."""
     if decimal == ".":
         try:
             return np.asarray(piece.cast(pa.float64())), [], 0

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from labctl.errors import BadRecording
 
-#: The largest text file that is read: as many digits as the values that an import takes have.
+#: The largest text file that is read: about ten bytes for each value that an import takes.
 MOST_TEXT_BYTES = 1_000_000_000
 #: A binary log is held in memory whole by its reader.
 MOST_LOG_BYTES = 1_000_000_000

@@ -87,7 +87,7 @@ def _opened(path: Path) -> Iterator[Any]:
 
 
 def _topic(path: Path, bag: Any, asked: str | None, kind: str, option: str) -> str | None:
-    """Return the topic of a kind of message; None for a temperature that there is not."""
+    """Return the topic of a kind of message; None where the bag has no temperature."""
     there = sorted(name for name, info in bag.topics.items() if info.msgtype == kind)
     if asked is not None:
         if asked not in there:

@@ -32,7 +32,7 @@ class TextOptions(TableOptions):
 
 
 def probe(path: Path) -> float:
-    """Return a low sureness for a file that is text, 0 for anything else."""
+    """Return a low confidence for a file that is text, 0 for anything else."""
     if not path.is_file() or path.suffix.lower() == ".parquet":
         return 0.0
     try:

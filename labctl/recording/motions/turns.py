@@ -55,7 +55,7 @@ def check_turns(path: Path, info: RecordingInfo, columns: Columns) -> None:
 
 
 def _check_means(path: Path, info: RecordingInfo, columns: Columns) -> None:
-    """Refuse means without their time, and without the noise behind them: a rest is known far better than a turn."""
+    """Refuse means without duration, spread or number of readings, which weight rests and turns."""
     for name in ("n", *(f"gyro_{axis}_std" for axis in info.axes)):
         if name not in columns:
             raise BadRecording(

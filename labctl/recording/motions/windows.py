@@ -1,7 +1,7 @@
 """Windows of a recording whose rate changes: a few readings each, over which output and reference are averaged.
 
 The mean of the output over a window is compared with the mean of the reference over the same window, so it is exact
-however long the window is. What is lost is what goes faster than once in two windows.
+however long the window is. Only changes faster than once in two windows are lost.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from labctl.recording.spread import LEAST_FOR_SPECTRUM, white_std
 MOST_WINDOWS = 20_000
 #: Readings further apart than this many usual steps have a gap between them: no window goes across it.
 GAP_STEPS = 3.0
-#: Of a stretch the beginning and the end are left out, this long, s, and at most this share: what an output is late by
-#: there is of rates before the first, which are not known.
+#: The beginning and the end of a stretch are left out, this long, s, and at most this share of it: an output with a
+#: delay depends there on rates outside the stretch, which are not known.
 EDGE_S, EDGE_SHARE = 0.25, 0.05
 #: Readings before and after that may shape an output, beside powers of the rate, where its white noise is sought.
 LAGS = 16

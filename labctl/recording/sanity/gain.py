@@ -136,7 +136,7 @@ def _turned(position: str) -> str:
 
 
 def _size(summary: Summary, axis: str, signed: list[tuple[str, float, Response]]) -> Iterator[Finding]:
-    # the position furthest from 1 speaks: a wrong one among right ones must not vanish in their median
+    # the position furthest from 1 decides: a wrong one among right ones must not vanish in their median
     position, gain, one = max(signed, key=lambda entry: abs(math.log(max(abs(entry[1]), 1e-12))))
     size = abs(gain)
     if USUAL[0] <= size <= USUAL[1]:

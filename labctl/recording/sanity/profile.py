@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 STRETCHES, READINGS = 500, 4
 #: An output may be late by this long, s, and this many readings early.
 LATEST_S, EARLIEST = 0.25, 10
-#: Of the lags at which output and rate agree nearly as well as anywhere, the shortest is taken.
+#: The shortest lag is taken at which output and rate agree to this share of their best agreement.
 NEARLY = 0.95
 
 
@@ -23,7 +23,7 @@ def stretches(n: int) -> list[slice]:
 def lag_of(rate_dps: NDArray[np.float64], output: NDArray[np.float64], step_s: float) -> int:
     """Return by how many readings an output (n,) is late against the rate (n,); it may have the other sign.
 
-    What is late must not look like a wrong sign or scale: at 10 Hz 50 ms are half a period.
+    A delay must not look like a wrong sign or scale: at 10 Hz 50 ms are half a period.
     """
     n = len(rate_dps)
     rate, values = rate_dps - rate_dps.mean(), output - output.mean()

@@ -1,4 +1,4 @@
-"""Response of the outputs to the table in one position: gain, and what each data set is off it."""
+"""Response of the outputs to the table in one position: gain, and the deviation of each data set from it."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from labctl.recording.sanity.summary import Summary
 
-#: Rates that differ by less than this in all, deg/s, do not tell a gain.
+#: Rates that differ by less than this in all, deg/s, do not determine a gain.
 LEAST_SPAN_DPS = 1.0
-#: Two data sets alone tell a gain from this difference of rates on, deg/s.
+#: Two data sets alone determine a gain from this difference of rates on, deg/s.
 TWO_POINT_SPAN_DPS = 20.0
 #: Data sets per column from which temperature enters, and the span of temperature, K.
 SETS_PER_COLUMN, LEAST_WARMTH_K = 3, 1.0
@@ -38,7 +38,7 @@ class Response:
 
 
 def responses(summary: Summary) -> dict[str, dict[str, Response]]:
-    """Return position -> output axis -> response, where the table's rates tell one."""
+    """Return position -> output axis -> response, where the table's rates determine one."""
     position = np.asarray(summary["position"]).astype(np.str_)
     found: dict[str, dict[str, Response]] = {}
     for there in dict.fromkeys(position.tolist()):

@@ -1,4 +1,4 @@
-"""Turns by a known angle: whether what came out of the gyro is the angle that is said, and how well it is known."""
+"""Turns by a known angle: whether the integral of the output gives the stated angle, and with which uncertainty."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from labctl.recording.motions.turns import USUAL_U_DEG
 from labctl.recording.sanity.finding import Finding
 from labctl.recording.sanity.summary import Summary
 
-#: Share of a turn that may be off beside two more turns of its axis, beside turns of other axes, and alone.
+#: Tolerance, as a share of the angle: beside two more turns of its axis, beside turns of other axes, and alone.
 OFF_SAME, OFF_OTHERS, OFF_ALONE = 0.05, 0.1, 0.15
-#: And as many standard uncertainties of its angle.
+#: The tolerance is at least this many standard uncertainties of the angle.
 UNCERTAINTIES = 5.0
-#: From this share on a turn is certainly not what is said, where others say what a turn gives.
+#: From this deviation on, as a share, a turn is certainly not the stated one, where other turns show the ratio.
 CERTAIN_SHARE = 0.1
-#: Turns of one axis that say what a turn of it gives, and turns of any axes that do.
+#: Turns of one axis that are enough to know its ratio, and turns of any axes.
 ENOUGH, PAIR = 3, 2
-#: A lone turn outside of this share has another unit rather than another angle; the gain says which.
+#: A lone turn whose ratio is outside of this range has another unit rather than another angle; the gain says which.
 UNIT_SHARE = (0.5, 2.0)
 
 
 @dataclass(frozen=True)
 class OffTurn:
-    """A turn that came out otherwise than is said."""
+    """A turn whose integral differs from the stated angle."""
 
     row: int  #: of the summary
     said_deg: float
@@ -65,7 +65,7 @@ def off_turns(summary: Summary) -> list[OffTurn]:
 
 
 def _ratios(summary: Summary, turned: NDArray[np.bool_]) -> NDArray[np.float64]:
-    """Return what came out of each turn over what is said, (m,); NaN at rest and where its axis has no output."""
+    """Return the integral of each turn over its stated angle, (m,); NaN at rest and where its axis has no output."""
     position = np.asarray(summary["position"]).astype(np.str_)
     turn, duration_s = (np.asarray(summary[name], dtype=np.float64) for name in ("turn_deg", "duration_s"))
     found = np.full(len(summary), np.nan)
@@ -99,7 +99,7 @@ def _consensus(ratios: NDArray[np.float64]) -> float:
 
 
 def check_turned(summary: Summary, off: list[OffTurn]) -> Iterator[Finding]:
-    """Yield the turns that came out otherwise than is said, and uncertainties that are not said."""
+    """Yield the turns whose integral differs from the stated angle, and uncertainties that are not stated."""
     for each in off:
         number, position = summary["dataset"][each.row], summary["position"][each.row]
         yield Finding(
@@ -117,14 +117,14 @@ def check_turned(summary: Summary, off: list[OffTurn]) -> Iterator[Finding]:
 
 
 def turn_in_words(off: OffTurn) -> str:
-    """Return what came out of a turn, in words."""
+    """Return the integral of a turn, in words."""
     came = round(off.came_deg)
     only = "only " if 0 <= off.came_deg / off.said_deg < 1 else ""
     return f"the integral of the output is {only}{came:d} deg instead of {off.said_deg:g} deg"
 
 
 def what_to_do(off: OffTurn) -> str:
-    """Return what to do about a turn that came out otherwise."""
+    """Return what to do about a turn whose integral differs from the stated angle."""
     if off.came_deg * off.said_deg < 0:
         return "correct the sign of turn_deg or of the position, or turn again"
     return "repeat the turn, or correct turn_deg"

@@ -79,7 +79,7 @@ def _attempt(context: ExecutionContext, step: Turn, rules: TurnRules, shown: Tur
 
 
 def _rest(readings: TurnReadings, step: Turn, rules: TurnRules) -> str:
-    """Take the rest before the turn; returns why it was none."""
+    """Take the rest before the turn; returns what moved in it, empty when nothing did."""
     readings.rest_before(step.rest_s)
     return next((text for course in readings.before() if (text := moved(course, rules.still_dps, "before"))), "")
 

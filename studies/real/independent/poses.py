@@ -69,7 +69,7 @@ class Move:
     dt_s: Array
 
     def off(self, matrix: Array) -> Array:
-        """Return what gravity after the move is off by, (3,), if output = bias + (1 + matrix) rate."""
+        """Return the error of gravity after the move, (3,), if output = bias + (1 + matrix) rate."""
         inverse = np.linalg.inv(np.eye(3) + matrix)
         return np.asarray(self.after - turned(self.rates @ inverse.T, self.dt_s).T @ self.before)
 
@@ -96,13 +96,13 @@ def moves_of(session: Session, constant_bias: Array | None = None) -> tuple[list
 
 
 def off_by_deg(found: list[Move], matrix: Array) -> float:
-    """Return the root mean square of a component (of two) of what gravity is off by after a move, deg."""
+    """Return the root mean square of a component (of two) of the error of gravity's direction after a move, deg."""
     left = np.concatenate([move.off(matrix) for move in found])
     return float(np.degrees(np.sqrt(left @ left / (2 * len(found)))))
 
 
 def fitted(session: Session) -> tuple[Array, Array, Array, float]:
-    """Return E of output = bias + (1 + E) rate, its uncertainty, the bias, and what gravity is off by, deg.
+    """Return E of output = bias + (1 + E) rate, its uncertainty, the bias, and the error of gravity's direction, deg.
 
     The uncertainty is that of least squares by the scatter of the moves.
     """
@@ -119,7 +119,7 @@ def fitted(session: Session) -> tuple[Array, Array, Array, float]:
 
 
 def analysis(session: Session) -> Found:
-    """Return the matrix in 1e-3, the bias in deg/s, and what gravity is off by after a move, deg."""
+    """Return the matrix in 1e-3, the bias in deg/s, and the error of gravity's direction after a move, deg."""
     matrix, u, bias, off = fitted(session)
     found: Found = {}
     for row, axis in enumerate(AXES):

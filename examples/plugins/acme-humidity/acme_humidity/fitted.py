@@ -25,5 +25,5 @@ class HumiditySensitivity(Effect):
     draws = ("humidity_pct",)
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
-        """Return one regressor: how far the humidity is from usual."""
+        """Return one regressor: the deviation of the humidity from its usual value, per cent."""
         return [Column("humidity", "deg/s/%", channels["humidity_pct"] - USUAL_PCT)]

@@ -9,7 +9,7 @@ from instruments.simulators.hidden.base import Array
 
 
 class HumidityFilm(HiddenEffect):
-    """A bias that rises with the humidity, a little bent."""
+    """A bias that rises with the humidity, slightly nonlinear."""
 
     id, unit, default = "humidity_sensitivity", "deg/s/%", 1e-3
 

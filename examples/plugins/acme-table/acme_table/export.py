@@ -1,4 +1,4 @@
-"""A calibration as CSV: what is to be taken off the output, over output and temperature."""
+"""A calibration as CSV: the error to subtract from the output, over output and temperature."""
 
 from __future__ import annotations
 

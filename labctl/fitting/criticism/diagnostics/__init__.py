@@ -1,7 +1,7 @@
 """Where and how a model fails, as numbers for pictures: one list for each view, compact enough to leave as JSON.
 
-A view says nothing about a cause; `draws` names, for each view, the effects of the catalogue that would draw a picture
-there, as the effects themselves say.
+A view says nothing about a cause; `draws_of` names, for each view, the effects of the catalogue whose signature would
+appear in it, as each effect states itself.
 """
 
 from __future__ import annotations
@@ -67,6 +67,6 @@ def _within(
 
 
 def draws_of(catalogue: Mapping[str, Effect], channels: set[str]) -> dict[str, list[str]]:
-    """Return view or channel -> ids of the effects that would draw a picture there."""
+    """Return view or channel -> ids of the effects whose signature would appear there."""
     names = (*VIEWS, *sorted(channels))
     return {name: [kind.id for kind in catalogue.values() if name in kind.draws] for name in names}

@@ -15,14 +15,14 @@ from labctl.json_types.views import AngleLine, AngleSpectrum, FrequencySpectrum,
 
 #: Waves in the angle are computed over data sets of at least this many turns ...
 TURNS = 2.0
-#: ... up to this often per turn, where the readings are close enough to follow it ...
+#: ... up to this many cycles per turn, where the readings are close enough to resolve them ...
 MOST_PER_TURN = 208
-#: ... and where at least this many data sets are.
+#: ... and where there are at least this many such data sets.
 LEAST_SETS = 6
 ANGLE_BINS = 2048
 FREQUENCIES = 200
 PROFILE_POINTS = 40
-#: Chance that the highest of all waves is above the limit with nothing there.
+#: Probability that noise alone puts the highest of all waves above the limit.
 ALARM = 0.05
 
 

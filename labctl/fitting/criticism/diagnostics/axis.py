@@ -13,7 +13,7 @@ from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.criticism.residuals import Residuals
 from labctl.fitting.numeric.arrays import Array, over
 
-#: Of a 95 % band, in standard deviations.
+#: Half width of a 95 % band, in standard deviations.
 BAND = 1.96
 
 

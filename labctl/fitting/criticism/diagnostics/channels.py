@@ -91,7 +91,7 @@ def _channel_line(view: AxisView, channel: str, mean: MeanLine) -> ChannelLine:
 
 
 def running_mean(view: AxisView, values: Array, here: NDArray[np.bool_]) -> MeanLine:
-    """Return the mean residual along a channel (m,), where `here`, with a band that knows of the drift.
+    """Return the mean residual along a channel (m,), where `here`, with a 95 % band that includes the drift.
 
     A channel of few levels has a point for each; another a running mean.
     """
@@ -138,7 +138,7 @@ def previous_rate(view: AxisView) -> PreviousRateLine | None:
 
 
 def time_line(view: AxisView) -> TimeLine:
-    """Return the residual against time, where power came, and whether neighbours hang together.
+    """Return the residual against time, the power-ons, and whether neighbouring residuals are correlated.
 
     Where no time is known it is against the order of the data sets: `order` and `power_on_order` stand for `t_s` and
     `power_on_t_s`.

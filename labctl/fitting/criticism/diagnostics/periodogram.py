@@ -41,7 +41,7 @@ def between_sets(view: AxisView) -> BetweenSets | None:
 def _taken_off(values: Array, waves: NDArray[np.complex128]) -> Array:
     """Return which part of the sum of squares a wave of each frequency takes off, beside a mean (Lomb-Scargle).
 
-    Our own few lines: scipy.signal alone would add a third to the start of every command.
+    Computed here: importing scipy.signal would lengthen the start of every command by a third.
     """
     pairs = np.stack([waves.real, waves.imag], axis=2)
     pairs -= pairs.mean(axis=1, keepdims=True)

@@ -18,8 +18,8 @@ from labctl.fitting.criticism.evidence.noise_grid import Noise
 from labctl.fitting.effects import kind_of
 from labctl.fitting.numeric.arrays import Array
 
-#: What follows another channel than the base's own (rate and temperature) does not compete where the base leaves less
-#: than this share of it: no shape is known so exactly that the rest of it would tell.
+#: An option that follows another channel than those of the base (rate and temperature) does not compete where the base
+#: leaves less than this share of it: no shape is known so exactly that the rest would be evidence.
 LEAST_COMPETING = 0.1
 OF_BASE = frozenset({"temperature_c", "table_rate_dps"})
 

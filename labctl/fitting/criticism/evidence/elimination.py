@@ -95,10 +95,10 @@ class MeansByNoise:
 def gains_by_noise(means: MeansByNoise, others: NonMeanProducts) -> tuple[
     Array, NDArray[np.float64], NDArray[np.int64]
 ]:  # fmt: skip
-    """Return the log likelihood of the base at each noise, (noises,), and of each option, (noises, options), the chi2
-    that it removes and the number of its directions.
+    """Return the log likelihood of the base at each noise, and the gains of the options.
 
-    The same as from `WhitenedBase`, without the inner products between options, which are most of the work.
+    The log likelihood is (noises,); the chi2 that each option removes and the number of its directions are (noises,
+    options). The same as from `WhitenedBase`, without the inner products between options, which are most of the work.
     """
     left, right = means.options.left, means.options.right
     own_pairs, own_with_data = others.own[left, right], others.own[:, -1]

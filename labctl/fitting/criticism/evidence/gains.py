@@ -27,7 +27,7 @@ class _Group:
 
 @dataclass(frozen=True)
 class OptionPairs:
-    """Pairs of columns that belong to one option: the inner products of which its gain takes, and no others."""
+    """Pairs of columns that belong to one option: its gain needs the inner products of these, and no others."""
 
     groups: tuple[_Group, ...]
     left: NDArray[np.int64]  #: (p,) column

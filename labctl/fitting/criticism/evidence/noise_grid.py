@@ -140,7 +140,7 @@ def _modes(tau_s: float, white: bytes, times: bytes, runs: bytes) -> DriftModes:
 def whiten(
     blocks: list[tuple[NDArray[np.int64], NDArray[np.float64]]], values: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Return values (m,) or (m, k) with the correlation taken out whose Cholesky factors these are."""
+    """Return values (m,) or (m, k) whitened by the Cholesky factors of their covariance, run by run."""
     found = np.empty_like(values)
     for rows, factor in blocks:
         found[rows] = solve_triangular(factor, values[rows], lower=True, check_finite=False)

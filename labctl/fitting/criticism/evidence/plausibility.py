@@ -10,13 +10,14 @@ from labctl.fitting.criticism.evidence.gains import solve_option
 from labctl.fitting.effects import CATALOGUE
 from labctl.fitting.numeric.arrays import Array
 
-#: A coefficient counts as what it is larger than with this many standard uncertainties to spare.
+#: The size of a coefficient counts as its estimate less this many standard uncertainties.
 SPARE_U = 2.0
 #: A first coefficient this many times its technology's span is not physical.
 FARTHEST = 1e4
-#: Largest physical coefficient by its unit, whatever the technology: an error of many times the rate itself is none.
+#: Largest physical coefficient by its unit, whatever the technology: an error of many times the rate itself is not
+#: physical.
 LARGEST = {"1": 3.0}
-#: Evidence on an axis, nats, from which on the size there counts.
+#: Evidence on an axis, nats, from which on the size on that axis counts.
 SUPPORTED = 2.0
 
 

@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 #: A reading further than this many robust standard deviations from its data set's median is left out ...
 OUTLIER = 6.0
-#: ... and further than this many times what nine tenths of them keep within: a line of the table's steps takes few
-#: values only; ...
+#: ... and further than this many times the distance within which nine tenths of the readings lie: a line of the table's
+#: steps has few different values; ...
 BEYOND = 3.0
-#: ... unless there are more of them than this share: then the data set is like that.
+#: ... unless such readings are more than this share: then they belong to the data set.
 FEW = 0.05
 
 
@@ -26,7 +26,7 @@ def inlier_mask(values: NDArray[np.float64], there: NDArray[np.float64]) -> NDAr
 
 
 def _quantile(ordered: NDArray[np.float64], count: NDArray[np.int64], share: float) -> NDArray[np.float64]:
-    """Return the quantile of the first `count` (m,) values of each ordered row (m, n), (m, 1), between neighbours."""
+    """Return the quantile of the first `count` (m,) values of each ordered row (m, n), (m, 1), interpolated."""
     place = share * (np.maximum(count, 1) - 1)
     low = np.floor(place).astype(np.int64)
     rows, high = np.arange(len(ordered)), np.minimum(low + 1, np.maximum(count, 1) - 1)
@@ -37,7 +37,7 @@ def _quantile(ordered: NDArray[np.float64], count: NDArray[np.int64], share: flo
 def white_level_dps(values: NDArray[np.float64], there: NDArray[np.float64]) -> float:
     """Return the white standard deviation of one reading, deg/s: the median over data sets and frequencies.
 
-    It is NaN for data sets of fewer than 6 readings: they have no frequencies to tell it by.
+    It is NaN for data sets of fewer than 6 readings: they are too short for a spectrum.
     """
     full = there.all(axis=1) if there.all(axis=1).sum() >= max(8, len(there) // 10) else np.ones(len(there), dtype=bool)
     chosen, mask = values[full], there[full]

@@ -1,9 +1,9 @@
-"""Discrepancy of a named effect: what its shape may be wrong by, as columns of the base with a prior on their size.
+"""Discrepancy of a named effect: possible errors of its shape, as columns of the base with a prior on their size.
 
 No shape is exact. Beside an effect that was found, the base also holds its signal times smooth functions of what drives
 it, smooth functions of these drivers, and what its parameters move, each with a Gaussian prior of a few per cent of the
-signal (model discrepancy: Kennedy and O'Hagan 2001, doi:10.1111/1467-9868.00294). So what is asked next is weighed
-against the remainder of what was named before.
+signal (model discrepancy: Kennedy and O'Hagan 2001, doi:10.1111/1467-9868.00294). So the next candidates compete with
+the possible remainder of the effects that were named before.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Parameters of effects whose shape follows from them alone: by Gauss-Newton steps beside the base, as a fit does."""
+"""Parameters of effects whose shape they determine alone, by Gauss-Newton steps beside the base, as in a fit."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ LEAST, LEAST_LEFT = 1e-6, 0.25
 
 
 def exact_terms(terms: Iterable[Term]) -> tuple[Term, ...]:
-    """Return the terms of which the parameter is all of the shape."""
+    """Return the terms whose parameter determines the shape."""
     return tuple(term for term in terms if kind_of(term).exact and term.parameters)
 
 

@@ -1,7 +1,8 @@
-"""Free shapes: polynomials over rate and temperature, which what is to be named must not fall behind.
+"""Free shapes: polynomials over rate and temperature, whose evidence an effect must reach before it is named.
 
-Any law is followed a little by some shape of the catalogue. A name says more: that the shape is this one. So what is to
-be named is weighed, its discrepancy included, against polynomials over rate and temperature that mean nothing.
+Some shape of the catalogue follows any law to some degree, but to name an effect is to claim that the shape is this
+one. So the effects to be named, with their discrepancy, are compared with polynomials over rate and temperature that
+have no physical meaning.
 """
 
 from __future__ import annotations
@@ -33,8 +34,8 @@ from labctl.progress import report_stage
 
 #: Degrees of a polynomial of the rate, and total degrees of one over rate and temperature.
 OF_RATE, OF_BOTH = (5, 7), (5, 8)
-#: A name may leave this share of its evidence to shapes without meaning: none is exact, and what remains is said
-#: beside it. Of laws that are not in the catalogue the shapes had more than twice the evidence of any name.
+#: Free shapes may have this share more evidence than the named effects: no shape is exact, and the remainder is
+#: reported beside the names. For laws outside the catalogue they had more than twice the evidence of any named effect.
 SHARE_LEFT = 0.1
 RATE, TEMPERATURE = "table_rate_dps", "temperature_c"
 
@@ -44,10 +45,9 @@ def channels_of_free_shape(
 ) -> tuple[str, ...]:
     """Return the channels of a polynomial that has clearly more evidence than terms and their discrepancy; () if none.
 
-    Nor where it has less evidence than `least`.
-
-    `first` is the comparison without the terms, `beside` the one with them and their discrepancy in its base, at whose
-    scatter all are weighed. Terms that are exact need no discrepancy.
+    The polynomial must also have at least the evidence `least`. `first` is the comparison without the terms, `beside`
+    the one with them and their discrepancy in its base, at whose scatter all are weighed. Terms that are exact need no
+    discrepancy.
     """
     report_stage(f"comparing {', '.join(term.effect for term in terms) or 'channels'} with free shapes")
     model = with_steady(first, terms)

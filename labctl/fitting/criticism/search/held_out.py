@@ -30,8 +30,8 @@ LEAST_SIGNAL = 1e-3
 def held_out_rises(comparison: Comparison, terms: tuple[Term, ...], catalogue: Mapping[str, Effect]) -> bool:
     """Return whether leaving data sets out shows that a model predicts them worse with these terms than without.
 
-    `comparison` is that of the model without them. The prior of each added coefficient is as wide as the coefficient
-    is large in the fit to all: what a fold cannot show is not compared with an effect.
+    `comparison` is that of the model without them. The prior of each added coefficient is as wide as the coefficient is
+    large in the fit to all: so a coefficient that a fold does not determine does not count against the effect.
     """
     report_stage(f"leaving data sets out to check {', '.join(term.effect for term in terms)}")
     axes = [_Axis.of(comparison, axis, terms, catalogue) for axis in comparison.axes]
@@ -52,7 +52,7 @@ def _by_temperature(comparison: Comparison) -> list[NDArray[np.bool_]]:
 
 
 def _by_rate(comparison: Comparison) -> list[NDArray[np.bool_]]:
-    """Return groups of neighbouring rates, neither the slowest nor the fastest: beyond them no law need hold."""
+    """Return groups of neighbouring rates, without the slowest and the fastest, so that no law is extrapolated."""
     speed = np.round(np.abs(comparison.data.at_sets(comparison.data.nodes.table_rate_dps())), 1)
     levels = np.unique(speed)[1:-1]
     groups = np.array_split(levels, min(RATE_GROUPS, len(levels))) if len(levels) else []

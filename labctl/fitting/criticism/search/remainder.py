@@ -26,7 +26,7 @@ SURELY_NOISE = 0.995
 def remainder_of(
     first: Comparison, final: Comparison, terms: tuple[Term, ...], catalogue: Mapping[str, Effect]
 ) -> Remainder | None:
-    """Return what effects leave in the shapes that they have, at the noise beside them; None where it is noise.
+    """Return what remains beside effects in their present shapes, at the noise beside them; None where it is noise.
 
     `share` is of the excess chi2 before, `over_floor` the means' RMS over their noise, and `depends_on` the channels
     that it follows.

@@ -96,7 +96,7 @@ def _searched(first: Comparison, catalogue: Mapping[str, Effect]) -> tuple[Verdi
         findings, final = _one_by_one(first, initial, step, catalogue)
         form = _form(findings) if len(findings) > 1 else step.form
     if not findings and form in {"missing", "ambiguous"}:  # what would be named predicts worse than nothing
-        findings = _pair(first, initial, catalogue)  # alone it may: two effects of opposite signs hide each other
+        findings = _pair(first, initial, catalogue)  # a single effect may: two of opposite signs hide each other
         if findings and held_out_rises(first, tuple(finding.term for finding in findings), catalogue):
             findings = []
         form = _form(findings) if findings else "unexplained"
@@ -226,8 +226,8 @@ def _refined_findings(first: Comparison, findings: Sequence[Finding], catalogue:
 def _is_shape_error(before: Comparison, named: Step, after: Comparison, step: Step) -> bool:
     """Return whether the new leader may be the residue of a wrong shape of the effect that was just added.
 
-    Compared with what that effect did where the new one does most: the wrong shape of a wave within data sets leaves
-    waves, and hardly anything between them.
+    The two are compared where the new leader is largest, within data sets or between them: the wrong shape of a wave
+    within data sets leaves waves, and hardly anything between them.
     """
     if step.leader is None or named.leader is None or are_exact(step.leader, named.leader):
         return False

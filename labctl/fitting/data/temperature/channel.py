@@ -44,7 +44,7 @@ def with_temperature(recording: Recording) -> Recording:
 def with_stand_in(columns: Mapping[str, NDArray[np.generic]], n: int) -> dict[str, NDArray[np.generic]]:
     """Return the columns, n rows each, of channels: where no thermometer is known, one temperature for all rows.
 
-    A law of temperature then has nothing to be seen by (`TemperatureHistory.thermometer`), and all others go on.
+    A law of temperature then cannot be seen (`TemperatureHistory.thermometer`); all others can.
     """
     return dict(columns) if "temperature_c" in columns else {**columns, "temperature_c": np.full(n, STAND_IN_C)}
 

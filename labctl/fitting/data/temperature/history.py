@@ -102,7 +102,7 @@ class TemperatureHistory:
 
 
 def lag_shares(step_s: float, tau_s: float) -> tuple[float, float, float]:
-    """Return the shares of follower, last and new temperature in where a first-order follower is after a step.
+    """Return the weights of follower, last and new temperature in the value of a first-order follower after a step.
 
     Exact for a temperature that changes linearly through the step, however long it is.
     """
@@ -206,10 +206,10 @@ def _courses(source: Mapping[str, Any], columns: Mapping[str, Any]) -> dict[int,
 
 
 def _to_the_ends(times: Array, values: Array, durations_s: Array) -> tuple[Array, Array]:
-    """Return a course of means, (k,), with where it began and ended: the middle of a window is neither.
+    """Return a course of means, (k,), extended to the start of its first window and to the end of its last one.
 
-    A follower starts at rest. On a ramp that is measured window by window it would start half a window late. Only where
-    the first two and the last two windows follow one another, so that they tell the slope.
+    A follower starts at rest; on a ramp that is measured window by window it would otherwise start half a window late.
+    An end is extended only where its two windows follow one another, so that they show the slope.
     """
     parts_t, parts_c = [times], [values]
     for first, second, side in ((0, 1, -1.0), (-1, -2, 1.0)):

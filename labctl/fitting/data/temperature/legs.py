@@ -7,14 +7,14 @@ from numpy.typing import NDArray
 
 from labctl.fitting.numeric.arrays import Array
 
-#: A turn back by less than this share of the range, and by less than this, deg C, is none.
+#: A turn back by less than this share of the range, or by less than this, deg C, does not count.
 LEAST_SHARE, LEAST_K = 0.2, 2.0
 
 
 def legs_of(temperature_c: Array, run: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return the leg of each data set in order of time, (n,): 1, 2, 3 ... while it warms up, -1, -2 ... while it cools.
 
-    Legs are counted from the begin, over all powered runs; a turn counts when the temperature has gone back by a fifth
+    Legs are counted from the start, over all powered runs; a turn counts when the temperature has gone back by a fifth
     of its range and by 2 K. 0 where the temperature never moves by as much.
     """
     legs = np.zeros(len(temperature_c), dtype=np.int64)
@@ -29,7 +29,7 @@ def legs_of(temperature_c: Array, run: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def _stretches(temperature_c: Array, least: float) -> list[tuple[int, int, int]]:
-    """Return begin, end and direction of each leg of one run, (n,) in order of time."""
+    """Return start, end and direction of each leg of one run, (n,) in order of time."""
     found: list[tuple[int, int, int]] = []
     begin, direction, low, high = 0, 0, 0, 0
     for k, now in enumerate(temperature_c.tolist()):

@@ -56,7 +56,7 @@ def agreement_of(
 ) -> tuple[list[EffectAgreement], str]:
     """Return how well recordings agree on each effect of the unit's model, and why not where they cannot be compared.
 
-    Each is weighted by the noise of the fit to all of them, `together`: one alone may take its drift for too small.
+    Each is weighted by the noise of the fit to all of them, `together`: a fit to one alone may underestimate its drift.
     The chi2 of an effect that is shifted from recording to recording is given with and without what a shift explains.
     """
     fits: dict[int, Mapping[str, AxisFit]] = {}

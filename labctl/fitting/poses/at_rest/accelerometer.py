@@ -26,7 +26,7 @@ LEAST_POSES = 12
 SAME_POSE_DEG = 5.0
 #: A scale factor or misalignment that is less certain than this is not determined, and so a bias in g.
 LARGEST_U = 0.02
-#: A rest whose gravity is off by more than this many standard deviations was none.
+#: In a rest whose gravity is off by more than this many standard deviations the unit moved.
 WRONG = 5.0
 #: Rounds in which wrong rests are left out and taken in again.
 ROUNDS = 8
@@ -100,7 +100,7 @@ def _jacobian(theta: Array, accel_g: NDArray[np.float64]) -> NDArray[np.float64]
 def _fitted(
     accel_g: NDArray[np.float64], gravity: float, sigma: Array, *, robust: bool, start: Array | None = None
 ) -> Array:
-    """Return the nine parameters by least squares; robust: a rest that was none pulls with a bounded force."""
+    """Return the nine parameters by least squares; robust: a rest in which the unit moved has a bounded influence."""
     from scipy.optimize import least_squares
 
     begin = np.zeros(PARAMETERS) if start is None else start

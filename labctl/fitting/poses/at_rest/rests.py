@@ -24,7 +24,7 @@ FACTOR = 3.0
 NOISIEST_G, NOISIEST_DPS = 0.05, 3.0
 #: The quietest share of windows, from which the static noise is found first, and rounds in which it settles.
 QUIETEST, ROUNDS = 0.1, 6
-#: Half seconds at rest, beyond one in each rest, that tell the noise of a mean; with fewer, readings are independent.
+#: Half seconds at rest, beyond one per rest, that show the noise of a mean; with fewer, readings count as independent.
 LEAST_BLOCKS = 20
 #: Both ends of a quiet stretch are cut by this share of a window: the turn begins there.
 MARGIN = 0.5
