@@ -22,7 +22,8 @@ def campaign_terminal(*, quiet: bool) -> OpenTerminal:
             closing(TerminalOperator()) as operator,
             CampaignProgress(quiet=quiet) as progress,
         ):
-            yield CampaignTerminal(progress.update, operator.answer_prompts, _say, ask_bench_clear)
+            observe = progress.update if progress.is_shown else None
+            yield CampaignTerminal(observe, operator.answer_prompts, _say, ask_bench_clear)
 
     return opened
 

@@ -41,6 +41,11 @@ class CampaignProgress:
     ) -> None:
         self._progress.stop()
 
+    @property
+    def is_shown(self) -> bool:
+        """Whether anybody sees the bar."""
+        return not self._progress.disable
+
     def update(self, answer: CampaignResponse) -> None:
         """Show where the campaign is now."""
         text = turn_text(answer) or answer.step_text

@@ -196,10 +196,7 @@ def run_attended(
     if attend is not None:
         attend(prepared.operator, answers_noted(store, prepared))
 
-    def seen(progress: Progress) -> None:
-        if observe is not None:
-            observe(answer_of(row, progress))
-
+    seen = None if observe is None else lambda progress: observe(answer_of(row, progress))
     engine = _engine(store, prepared, control, seen)
     try:
         return _drive(store, prepared, engine)

@@ -111,8 +111,8 @@ class AxisUncertainty(ResponseModel):
         description="Expanded uncertainty U of the budget, deg/s; it covers with a probability of 95.45 %."
     )
     unknown: dict[str, str] = Field(
-        description="Contributions to the uncertainty (coefficients, model, repeatability) that could not be determined, "
-        "each with the reason."
+        description="Contributions to the uncertainty (coefficients, model, repeatability) that could not be "
+        "determined, each with the reason."
     )
 
 
