@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import multiprocessing
 import os
+import resource
 import socket
 import sqlite3
 import subprocess
@@ -15,6 +16,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, ExitStack, contextmanager, suppress
 from functools import partial
 from pathlib import Path
+from typing import TypeVar
 
 import httpx
 
@@ -22,6 +24,7 @@ from labctl.services.recordings.examples import example
 
 #: Everything that is asked has to be answered within this, s.
 WITHIN_S = 60.0
+ArgumentT = TypeVar("ArgumentT")
 FILES = ("recording.toml", "points.csv")
 
 
@@ -85,6 +88,18 @@ def _repeated(work: Callable[[], None], count: int = 1) -> Iterator[None]:
 
 
 @contextmanager
+def _from_another_process(attack: Callable[[ArgumentT], None], on: ArgumentT) -> Iterator[None]:
+    """Attack from a process of its own: its threads and files are not those of the process that measures."""
+    attacking = multiprocessing.get_context("spawn").Process(target=attack, args=(on,), daemon=True)
+    attacking.start()
+    try:
+        yield
+    finally:
+        attacking.kill()
+        attacking.join()
+
+
+@contextmanager
 def nothing(_: Target) -> Iterator[None]:
     """Nothing else is asked."""
     yield
@@ -102,30 +117,40 @@ def endless_headers(target: Target) -> AbstractContextManager[None]:
     return _repeated(send, 4)
 
 
-@contextmanager
-def half_sent(target: Target) -> Iterator[None]:
-    """1,200 requests are begun and never ended."""
-    with ExitStack() as opened, _repeated(lambda: _begin_one(target, opened)):
+def half_sent(target: Target) -> AbstractContextManager[None]:
+    """1,200 requests and more are begun and never ended."""
+    return _from_another_process(_begin_requests, target.address)
+
+
+def _begin_requests(address: tuple[str, int]) -> None:
+    most = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
+    resource.setrlimit(resource.RLIMIT_NOFILE, (min(4096, most), most))
+    with ExitStack() as opened, _repeated(lambda: _begin_one(address, opened)):
         for _ in range(1200):
             with suppress(OSError):
-                _begin_one(target, opened)
-        yield
+                _begin_one(address, opened)
+        threading.Event().wait()
 
 
-def _begin_one(target: Target, opened: ExitStack) -> None:
-    connection = opened.enter_context(socket.create_connection(target.address, timeout=5))
+def _begin_one(address: tuple[str, int], opened: ExitStack) -> None:
+    connection = opened.enter_context(socket.create_connection(address, timeout=5))
     connection.sendall(b"POST /api/recordings HTTP/1.1\r\nHost: x\r\nContent-Le")
 
 
 def criticisms(target: Target) -> AbstractContextManager[None]:
     """50 clients ask for criticisms that are not cached."""
+    return _from_another_process(_ask_for_criticisms, target.url)
+
+
+def _ask_for_criticisms(url: str) -> None:
     number = iter(range(10**9))
 
     def ask() -> None:
         formula = f"f{next(number)}: table_rate_dps*temperature_c*{1 + next(number) / 7}"
-        httpx.get(f"{target.url}{CRITICISM}", params={"formula": formula}, timeout=WITHIN_S)
+        httpx.get(f"{url}{CRITICISM}", params={"formula": formula}, timeout=WITHIN_S)
 
-    return _repeated(ask, 50)
+    with _repeated(ask, 50):
+        threading.Event().wait()
 
 
 CRITICISM = "/api/units/OSU-FOG-2024/calibrations/1/criticism"
