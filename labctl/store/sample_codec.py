@@ -79,7 +79,7 @@ def unpack(block: Block) -> dict[str, NDArray[np.generic]]:
 
 
 def load_compressor() -> None:
-    """Import what packs readings, for a process that may have no file left to open once they come."""
+    """Import the compression library now: a process may be able to open no further file once readings come."""
     import blosc2  # noqa: F401, PLC0415  0.1 s that only readings need
 
 
