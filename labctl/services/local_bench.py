@@ -74,7 +74,7 @@ class LocalBench:
                 self.scheduler.start()
 
     def stop_now(self, campaign: int | None, reason: str) -> bool:
-        """Ask for the end of the campaign that runs, or of this one if it is it; returns whether it was asked.
+        """Ask for the end of this campaign, with None of whatever runs; returns whether it was asked.
 
         Waits for no lock and for no database.
         """

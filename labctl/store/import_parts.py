@@ -17,7 +17,8 @@ from labctl.store.dataset_statistics import means_rows
 
 #: Number of the blocks that hold a whole table of points or coefficients.
 WHOLE_TABLE = 0
-#: What one part holds at most. Measured: a transaction of this size takes 20 ms of one core, of this many rows 33 ms.
+#: What one part holds at most. Measured: one transaction takes 20 ms of one core with this many bytes, 33 ms with this
+#: many rows.
 MOST_ROWS, MOST_BYTES = 2000, 1 << 21
 #: Readings of one block, before they are packed: of a long data set several blocks are made.
 BLOCK_BYTES = 2 << 20

@@ -103,7 +103,7 @@ class BenchRunner:
         return self._job is None and self._may_drive
 
     def runs_or_was_stopped(self, campaign: int) -> bool:
-        """Return whether a campaign runs, or ended after a stop whose abort has yet to come."""
+        """Return whether a campaign runs, or was the last one asked to stop: its abort may not be recorded yet."""
         return campaign == self._stop_requested or self.runs(campaign)
 
     def runs(self, campaign: int) -> bool:

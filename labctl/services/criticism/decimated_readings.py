@@ -20,7 +20,7 @@ Decimated = Callable[[RecordingRow], Columns]
 def is_decimated(row: RecordingRow) -> bool:
     """Return whether a criticism of a recording takes decimated readings; otherwise it takes means.
 
-    Turns are integrals over all readings, and of a rate that changes decimated readings are those of another one.
+    Turns are integrals over all readings, and decimated readings of a rate that changes would be those of another rate.
     """
     return row.kind == "samples" and motion_of(row) not in {"turns", "poses"} and not is_profile(row)
 
