@@ -27,7 +27,8 @@ REST_S, REST_BETWEEN_S = 3.0, 1.0
 BLOCK_S = 0.25
 #: How long a movement is waited for, and followed once it has begun, s.
 WITHIN_S, FOLLOW_S = 60.0, 2.0
-#: A unit moves when the root mean square of its rates about those at rest exceeds both: deg/s, times its scatter.
+#: A unit moves when the RMS of its rates, less those at rest, exceeds both limits: one in deg/s, and one as a multiple
+#: of its scatter at rest.
 LEAST_DPS, TIMES_SCATTER = 5.0, 10.0
 #: A further unit that moves more than this share of the fastest was turned too.
 ALSO_SHARE = 0.2
