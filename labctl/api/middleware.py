@@ -189,7 +189,7 @@ class _BoundedBody:
         return message
 
     def release(self) -> None:
-        """Count the body no more."""
+        """Count the body as held in memory no longer."""
         if self._held is not None:
             self._held.now -= self._taken
         self._taken = 0

@@ -40,7 +40,7 @@ RECONNECT_S = 0.5
 
 
 class RemoteWriter:
-    """Runs transactions in the bench process. Pickled, it is another one that reaches the same process."""
+    """Runs transactions in the bench process. It can be pickled: the copy reaches the same process."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -51,7 +51,7 @@ class RemoteWriter:
         return self._caller.call(f"store.{name}", args, kwargs)
 
     def __reduce__(self) -> tuple[type[RemoteWriter], tuple[Path]]:
-        """Return how it is made again in another process."""
+        """Return what unpickling calls in another process."""
         return RemoteWriter, (self._folder,)
 
     def close(self) -> None:
