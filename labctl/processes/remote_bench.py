@@ -188,7 +188,7 @@ class RemoteBench:
         return answer
 
     def listen(self, listener: Callable[[], None]) -> Callable[[], None]:
-        """Call `listener` whenever something has changed; returns what ends that. A listener may not block."""
+        """Call `listener` at every change; returns the function that ends this. A listener may not block."""
         return self._listeners.add(listener)
 
     def describe(self) -> BenchDescription | None:

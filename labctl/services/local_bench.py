@@ -54,7 +54,7 @@ class LocalBench:
         return None if self.runner is None else self.runner.status(campaign)
 
     def listen(self, listener: Callable[[], None]) -> Callable[[], None]:
-        """Call `listener` whenever something has changed; returns what ends that. A listener may not block."""
+        """Call `listener` at every change; returns the function that ends this. A listener may not block."""
         return (lambda: None) if self.runner is None else self.runner.listen(listener)
 
     def describe(self) -> BenchDescription | None:

@@ -235,7 +235,7 @@ class BenchRunner:
             self._listeners.notify()
 
     def listen(self, listener: Callable[[], None]) -> Callable[[], None]:
-        """Call `listener` whenever something has changed; returns what ends that. A listener may not block."""
+        """Call `listener` at every change; returns the function that ends this. A listener may not block."""
         return self._listeners.add(listener)
 
     def status(self, campaign: int) -> CampaignResponse | None:

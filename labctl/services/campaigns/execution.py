@@ -128,7 +128,7 @@ def _unwritten(store: Store, campaign: int, bench: str, engine: Engine, error: S
 
 
 def answers_noted(store: Store, prepared: Prepared) -> Callable[[str], None]:
-    """Return what writes an answer that was given at this terminal into the audit trail."""
+    """Return a function that writes an answer given at this terminal into the audit trail."""
 
     def note(said: str) -> None:
         at, subject = prepared.clock.utc(), f"campaign {prepared.id}"

@@ -50,7 +50,7 @@ def plan_of(store: Store, row: CampaignRow) -> Plan:
 def with_original_simulation(row: CampaignRow, bench_file: BenchFile) -> BenchFile:
     """Return a simulated bench with the simulation that a campaign was begun in: the same units, on the same day.
 
-    A real bench is what it is. Raises Conflict for a simulation that this version of labctl does not know any more.
+    A real bench is returned unchanged. Raises Conflict for a simulation whose settings this version does not know.
     """
     was = row.bench.get("simulation")
     if not bench_file.is_simulated or was is None:

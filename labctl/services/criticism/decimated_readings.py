@@ -34,7 +34,7 @@ def decimated_columns_of(store: Store, row: RecordingRow) -> Columns:
 
 @contextmanager
 def reading_beside(store: Store, rows: Sequence[RecordingRow]) -> Iterator[Decimated]:
-    """Begin to read the recordings; gives what returns the readings of each when they are needed."""
+    """Begin to read the recordings; gives the function that returns the readings of each when they are needed."""
     wanted = [row for row in rows if is_decimated(row)]
 
     def read() -> dict[int, Columns]:
