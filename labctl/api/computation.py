@@ -152,7 +152,7 @@ def _cached(call: Call, service: LabService) -> Any:
 
 
 async def _left(request: Request) -> None:
-    """Return when the client has left; the body of the request is read already, or there is none."""
+    """Wait until the client has left; the body of the request is read already, or there is none."""
     while (await request.receive())["type"] != "http.disconnect":
         pass
 

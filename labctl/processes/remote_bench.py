@@ -171,8 +171,10 @@ class RemoteBench:
             return self._last_live is not None and self._last_live.id == campaign
 
     def status(self, campaign: int) -> CampaignResponse | None:
-        """Return the live picture of a campaign that runs; the last one, and that it is old, while it does not
-        answer."""
+        """Return the live picture of a campaign that runs, else None.
+
+        While the bench process does not answer it is the last picture, which then says that the process is silent.
+        """
         try:
             running, live = self._ask("bench.live", campaign)
         except BenchSilent:
@@ -192,7 +194,7 @@ class RemoteBench:
         return self._listeners.add(listener)
 
     def describe(self) -> BenchDescription | None:
-        """Return the bench and what it is doing; while it does not answer what was last known, as unconfirmed."""
+        """Return the bench and what it is doing; what was last known, as unconfirmed, while its process is silent."""
         if self.bench is None:
             return None
         with contextlib.suppress(BenchSilent):

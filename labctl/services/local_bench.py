@@ -50,7 +50,7 @@ class LocalBench:
         return self.runner is not None and self.runner.runs(campaign)
 
     def status(self, campaign: int) -> CampaignResponse | None:
-        """Return the live picture of a campaign that runs here."""
+        """Return the live picture of a campaign that runs here; None for any other."""
         return None if self.runner is None else self.runner.status(campaign)
 
     def listen(self, listener: Callable[[], None]) -> Callable[[], None]:

@@ -239,7 +239,7 @@ class BenchRunner:
         return self._listeners.add(listener)
 
     def status(self, campaign: int) -> CampaignResponse | None:
-        """Return the live picture of a campaign that runs here."""
+        """Return the live picture of a campaign that runs here; None for any other."""
         job = self._job
         if job is None or job.row.id != campaign or job.progress is None:
             return None

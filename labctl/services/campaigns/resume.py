@@ -176,7 +176,7 @@ def resume_here(
 
 
 def _simulated_start(bench_file: BenchFile, speed: float | None, last_at: datetime) -> datetime | None:
-    """Return when simulated time goes on: where it stood, unless it follows this computer's, which is later."""
+    """Return where simulated time goes on; None for real instruments, and where it goes on at the present time."""
     if not bench_file.is_simulated:
         return None
     return last_at if speed is None or last_at > SystemClock().utc() else None
