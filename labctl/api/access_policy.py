@@ -13,7 +13,7 @@ from labctl.services.schemas.admin import Role
 
 LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "[::1]"})
 READING = frozenset({"GET", "HEAD", "OPTIONS"})
-#: Where computing begins; everything else that is read is a file or a few figures.
+#: Paths that may need a computation; everything else that is read is a file or a few figures.
 API = "/api/"
 #: Answered without a key: a load balancer asks the first, every open page the second.
 OPEN = frozenset({"/health", "/health/heartbeat"})

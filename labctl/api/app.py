@@ -64,7 +64,7 @@ MOST_FILES = 4
 def api_routes() -> tuple[BaseRoute, ...]:
     """Return the routes of the API, described once for all applications of this process: 0.15 s.
 
-    None of them holds anything of an application; they take the service from the request's.
+    They hold nothing of an application: each takes the service from the application of its request.
     """
     described = APIRouter()
     for each in ROUTERS:

@@ -40,10 +40,10 @@ T = TypeVar("T")
 
 
 class Threads:
-    """Threads of their own for what may take longer than a quick answer; more wait without one."""
+    """Limits on threads for work that may take longer than a quick answer; further work waits without a thread."""
 
     def __init__(self) -> None:
-        """Of one event loop."""
+        """Make the limits; they belong to the event loop that runs."""
         self.looking = anyio.CapacityLimiter(LOOKING)
         self.files = anyio.CapacityLimiter(FILES)
 
@@ -128,7 +128,7 @@ async def with_files(request: Request, work: Callable[ArgsT, T], *args: ArgsT.ar
 
 
 async def _result(request: Request, service: LabService, call: Call, progress: Progress) -> Any:
-    """Return the result of some work; where another client has it computed, or what it needs, wait for that."""
+    """Return the result of some work; where it, or what it needs, is computed for another client, wait for that."""
     looking = _threads(request).looking
     while True:
         try:
@@ -138,7 +138,7 @@ async def _result(request: Request, service: LabService, call: Call, progress: P
                 call.work, *call.args, named=call.named, progress=progress, key=miss.question or repr(call)
             )
         try:
-            with suppress(*(() if pending.same else (Exception,))):  # what fails there may be another question's
+            with suppress(*(() if pending.same else (Exception,))):  # an error there may be of other work
                 found = await asyncio.wrap_future(pending.future)
                 if pending.same:
                     return found
@@ -152,13 +152,13 @@ def _cached(call: Call, service: LabService) -> Any:
 
 
 async def _left(request: Request) -> None:
-    """Return when the client has left; the body of the request is read already, or there is none."""
+    """Wait until the client has left; the body of the request is read already, or there is none."""
     while (await request.receive())["type"] != "http.disconnect":
         pass
 
 
 async def _end(*tasks: asyncio.Future[Any]) -> None:
-    """Cancel what is not done yet, and wait until it no longer waits for anything."""
+    """Cancel the tasks that are not done yet, and wait until all have ended."""
     for task in tasks:
         task.cancel()
     await asyncio.gather(*tasks, return_exceptions=True)

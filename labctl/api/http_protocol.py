@@ -62,13 +62,13 @@ class BoundedHttpProtocol(HttpToolsProtocol):
             self.cut()
 
     def connection_lost(self, exc: Exception | None) -> None:
-        """Give the connection's place away; what is answered here learns that its client is gone."""
+        """Release the connection's place, and tell the request that is being answered that its client is gone."""
         self.table.release(self)
         self._disconnect()
         super().connection_lost(exc)
 
     def _disconnect(self) -> None:
-        """Tell the request that is being answered, which is not the last one where several were sent ahead."""
+        """Tell the request that is being answered, which is not the newest where several were sent ahead."""
         if self._answered is not None and not self._answered.response_complete:
             self._answered.disconnected = True
             self._answered.message_event.set()
@@ -181,7 +181,7 @@ class BoundedHttpProtocol(HttpToolsProtocol):
         self.phase, self.since = phase, self.loop.time()
 
     def _unsupported_upgrade_warning(self) -> None:
-        """Say nothing: a request for another protocol is answered in this one."""
+        """Log nothing: a request for another protocol is answered in this one."""
 
     # What is refused
 

@@ -14,7 +14,7 @@ from labctl.services.lab_service import LabService
 
 
 class ServiceCollector(Collector):
-    """Reads the figures of a service when they are asked for: counts of the database, nothing that it holds."""
+    """Reads the figures of a service when they are asked for: counts of rows, none of their content."""
 
     def __init__(self, service: LabService, requests: RequestFigures) -> None:
         self._service, self._requests = service, requests

@@ -105,7 +105,7 @@ class AccessMiddleware:
     def _refuse_foreign(self, scope: Scope, headers: Headers) -> None:
         """Raise NotAllowed for a request that another site or machine sent through this one.
 
-        Reading the API is refused to another site too: it cannot see the answer, but what computes it is kept busy.
+        Reading the API is refused to another site too: it cannot see the answer, but the service is kept busy.
         Pages and `/health` answer a link from anywhere.
         """
         if self._access.hosts is None:
@@ -190,7 +190,7 @@ class _BoundedBody:
         return message
 
     def release(self) -> None:
-        """Count the body no more."""
+        """Count the body as held in memory no longer."""
         if self._held is not None:
             self._held.now -= self._taken
         self._taken = 0

@@ -91,7 +91,7 @@ class RequestLogMiddleware:
         )  # fmt: skip
 
     def _level_of(self, scope: Scope, status: int) -> tuple[int, RepetitionLimit | None]:
-        """Return the level of a request's record, and the bound on records of its kind."""
+        """Return the level of a request's record, and the bound on records of its kind; None: no bound."""
         if status >= 400:
             return (logging.ERROR if status >= 500 else logging.INFO), self._refused
         if role_needed(scope["method"], scope["path"]) is Role.VIEWER:

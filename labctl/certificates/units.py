@@ -20,7 +20,7 @@ def readable(unit: str) -> str:
 
 
 def dsi(unit: str) -> str | None:
-    """Return a unit in D-SI form; None for one that D-SI has no word for, as a share of standard gravity."""
+    """Return a unit in D-SI form; None where D-SI has no word for it, such as a share of standard gravity."""
     above, *below = re.sub(r"/\(([^()/]+)/([^()/]+)\)", r"/\1*\2", unit).split("/")
     found = ""
     for text, sign in [(above, 1), *((part, -1) for part in below)]:

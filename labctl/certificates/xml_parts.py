@@ -15,7 +15,7 @@ DIGITS = 9
 
 
 def child(parent: ET.Element, name: str, text: str | None = None, **attributes: str) -> ET.Element:
-    """Add an element of the DCC; white space of its text is made single, as the schema asks."""
+    """Add an element of the DCC; each run of white space in its text becomes one space, as the schema asks."""
     made = ET.SubElement(parent, f"{{{DCC}}}{name}", attributes)
     if text is not None:
         made.text = " ".join(text.split())
@@ -23,7 +23,7 @@ def child(parent: ET.Element, name: str, text: str | None = None, **attributes: 
 
 
 def texts(parent: ET.Element, name: str, *said: str, **attributes: str) -> ET.Element:
-    """Add an element with a text in English: one of each language, as PTB's rules ask."""
+    """Add an element with its text in English; `said` is joined, as PTB's rules allow one text per language."""
     made = child(parent, name, **attributes)
     child(made, "content", " ".join(said), lang=ENGLISH)
     return made

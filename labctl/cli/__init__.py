@@ -2,7 +2,7 @@
 
 import os
 
-# Fits are many small solves, for which threads only get in each other's way; to be said before numpy is loaded.
+# Fits are many small solves, for which threads only get in each other's way; to be set before numpy is loaded.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from labctl.cli.app import main

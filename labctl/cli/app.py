@@ -97,7 +97,7 @@ def everywhere(
         bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
     ] = False,
 ) -> None:
-    """Take the options that need no command; whatever is done is done in the name of who typed it."""
+    """Take the options that need no command; whatever is done is done in the name of the user who typed it."""
     del show
     context.with_resource(acting(Actor(os_user(), "command line")))
     if context.invoked_subcommand != "serve":  # which has a log of its own
@@ -118,7 +118,7 @@ def open_missing_streams() -> None:
 
 
 def main() -> None:
-    """Run the command line, as the process that it is."""
+    """Run the command line; the process ends with the command."""
     open_missing_streams()
     with process_of_one_command():
         app()

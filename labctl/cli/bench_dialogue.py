@@ -24,7 +24,7 @@ def asking(section: str, key: str, what: str, proposal: object) -> object:
 
 
 def not_asking(section: str, key: str, what: str, proposal: object) -> object:  # noqa: ARG001  the proposal is enough
-    """Keep the proposal."""
+    """Ask nothing and keep the proposal."""
     return proposal
 
 

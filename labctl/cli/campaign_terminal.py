@@ -13,7 +13,7 @@ from labctl.services.commands.foreground_control import CampaignTerminal, OpenTe
 
 
 def campaign_terminal(*, quiet: bool) -> OpenTerminal:
-    """Return what opens the terminal for the time of one campaign; `quiet`: without a progress bar."""
+    """Return a function that opens the terminal for one campaign; `quiet`: without a progress bar."""
 
     @contextmanager
     def opened() -> Iterator[CampaignTerminal]:
@@ -29,5 +29,5 @@ def campaign_terminal(*, quiet: bool) -> OpenTerminal:
 
 
 def _say(text: str) -> None:
-    """Print a remark beside the answer."""
+    """Print a remark on standard error, beside the answer."""
     stderr.print(f"labctl: {text}", markup=False)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @contextmanager
 def one_clear_line() -> Iterator[None]:
-    """Turn what is wrong into one line on standard error and its exit status.
+    """Turn an error into one line on standard error and its exit status.
 
     Raises typer.Exit. The handlers of signals are restored, unless the process ends with this command.
     """
@@ -57,7 +57,7 @@ def _errors_as_lines() -> Iterator[None]:
         ) from error
     except KeyboardInterrupt as error:
         ignore_signals()
-        # further ones, while what the first one stopped was being closed, change nothing
+        # a further interrupt, while the work that the first one stopped was being closed, changes nothing
         stopped: BaseException | None = error
         while stopped is not None and not isinstance(stopped, Stopped):
             stopped = stopped.__context__

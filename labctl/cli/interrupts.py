@@ -21,8 +21,8 @@ _PROCESS_ENDS: ContextVar[bool] = ContextVar("_PROCESS_ENDS", default=False)
 def process_of_one_command() -> Iterator[None]:
     """Run the block as the last thing that this process does.
 
-    What an interrupted command ignores then stays ignored until the exit: Python ends by the signal, not by the exit
-    status, when one comes while it waits for its last threads.
+    Signals that an interrupted command ignores then stay ignored until the exit: else one that comes while Python waits
+    for its last threads would end the process by the signal, not with the exit status.
     """
     token = _PROCESS_ENDS.set(True)
     try:

@@ -59,7 +59,7 @@ SimulatedStart = Annotated[
 
 
 def simulated_start(given: str | None) -> datetime | None:
-    """Return the instant at which simulated time begins, UTC. Raises BadInput."""
+    """Return the instant at which simulated time begins, UTC; None where none was given. Raises BadInput."""
     try:
         moment = None if given is None else datetime.fromisoformat(given)
         if moment is None:

@@ -224,12 +224,12 @@ def _head(name: str, calibration: Calibration) -> str:
 
 
 def _number(value: float) -> str:
-    """Return a number in C; an infinite one is no limit."""
+    """Return a number in C; an infinite one stands for no limit."""
     return f"{value:.17g}" if math.isfinite(value) else ("INFINITY" if value > 0 else "-INFINITY")
 
 
 def _in_comment(text: str) -> str:
-    """Return text that ends no comment and no line."""
+    """Return text for a C comment: nothing in it ends the comment or the line."""
     return "".join(char if char.isprintable() else "?" for char in text).replace("*/", "* /").replace("\\", "/")
 
 

@@ -11,7 +11,7 @@ from labctl.fitting.numeric.rounding import at_most
 
 
 def plain(text: str) -> str:
-    """Return text that ends no line: printable ASCII."""
+    """Return text as printable ASCII: without line breaks."""
     return "".join(char if char.isascii() and char.isprintable() else "?" for char in text)
 
 
@@ -38,5 +38,5 @@ def head_lines(
 
 
 def commented(lines: Iterable[str], sign: str = "# ") -> str:
-    """Return lines as comments, each ended."""
+    """Return lines as comments, each with its line end."""
     return "".join(f"{sign}{line}".rstrip() + "\n" for line in lines)

@@ -9,7 +9,7 @@ from labctl.fitting.numeric.rounding import at_most
 
 
 def size_line(force: ForceSensitivity, function: str) -> str:
-    """Return that g-sensitivity is corrected by one function alone, with its size."""
+    """Return the line which says that only one function corrects g-sensitivity, with its size."""
     sizes = ", ".join(f"{a} {at_most(size):.3g}" for a, size in zip(force.axes, force.at_1_g_dps, strict=True))
     return f"g-sensitivity, at 1 g at most {sizes} deg/s, is corrected by {function} alone"
 

@@ -1,7 +1,7 @@
 """A calibration as a table to look the error up in, linear between its points in output and temperature.
 
-The error of an axis is the sum over all axes of what the table says at the output of each: what models whose axes act
-through a matrix are, exactly. What the sum misses in others is part of the stated difference.
+The error of an axis is the sum, over all axes, of the entry at the output of each: exact for models whose axes act
+through a matrix. What the sum misses in other models is part of the stated difference.
 """
 
 from __future__ import annotations

@@ -73,7 +73,7 @@ class StaticPart:
         return found
 
     def memory_losses(self) -> tuple[Loss, ...]:
-        """Return what is lost where lag and hysteresis are not carried."""
+        """Return what is lost where a format carries neither lag nor hysteresis."""
         return follower_losses(self.memory)
 
     def losses(self) -> tuple[Loss, ...]:
@@ -82,7 +82,7 @@ class StaticPart:
 
 
 def follower_losses(memory: Memory | None) -> tuple[Loss, ...]:
-    """Return what is lost where a memory, if there is one, is not carried."""
+    """Return what is lost where a format does not carry the memory; nothing without one."""
     found: dict[str, float] = {}
     for each in memory.followers if memory is not None else ():
         size = float(np.abs(each.size).max())
@@ -129,7 +129,7 @@ class Differences:
 
     @property
     def together(self) -> float:
-        """The largest, at all rates of all axes together."""
+        """The largest difference of any axis, with all axes turning at any of their rates."""
         return float(np.maximum(np.maximum(self.own, self.at_rest) + self.cross, self.corners).max())
 
 

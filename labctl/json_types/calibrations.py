@@ -66,7 +66,7 @@ class CertificationJson(TypedDict):
 
 
 class CalibrationJson(TypedDict):
-    """A calibration file. A file of another program is none until its hash and its parts were checked."""
+    """A calibration file. A file that was read counts as one only once its hash and its parts were checked."""
 
     schema: str
     serial: str

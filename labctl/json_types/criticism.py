@@ -23,7 +23,7 @@ class CriticisedErrors(TypedDict):
 
 
 class CriticisedNoise(TypedDict):
-    """Noise of the recording; `vs_datasheet`: the drift over what the data sheet lets expect."""
+    """Noise of the recording; `vs_datasheet`: the drift divided by what the data sheet lets expect."""
 
     white_dps: float | None
     drift_dps: float | None

@@ -34,7 +34,7 @@ class RepeatabilityJson(TypedDict):
 
 
 class EffectAgreement(TypedDict):
-    """Whether recordings, each fitted alone, agree on an effect: chi2 of the differences; null without freedom."""
+    """Whether recordings, each fitted alone, agree on an effect: chi2 of the differences; null: no freedom left."""
 
     effect: str
     chi2: float

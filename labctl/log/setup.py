@@ -72,7 +72,7 @@ class _ForeignRecords(logging.Handler):
 
 
 _stack: list[Log] = []
-#: What is never left: a log that lasts as long as its process.
+#: Contexts that are closed only at the end of the process: a log that lasts as long.
 _to_the_end = ExitStack()
 
 
@@ -88,7 +88,7 @@ def held_back() -> tuple[int, int]:
 
 @contextmanager
 def running_log(process: str, level: int, *, locations: Iterable[str] = (), descriptor: int = STDERR) -> Iterator[Log]:
-    """Log in the name of a process while the block runs; what is not written at its end is waited for a moment.
+    """Log in the name of a process while the block runs; its end waits a moment for what is not written yet.
 
     The passwords of `locations`, addresses of databases, are removed from every record.
     """
@@ -104,9 +104,9 @@ def begin_log(process: str, level: int, *, locations: Iterable[str] = (), descri
 
 
 def _own(descriptor: int) -> int | None:
-    """Return a descriptor that stays what it is; None where there is no such output.
+    """Return a duplicate of a descriptor, which stays the same output; None where there is no such output.
 
-    A process that was started without standard error has another file by that number.
+    In a process that was started without standard error, its number may belong to another file.
     """
     if descriptor == STDERR and sys.__stderr__ is None:
         return None

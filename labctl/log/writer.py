@@ -15,7 +15,7 @@ from queue import Empty, SimpleQueue
 CAPACITY = 2048
 #: A descriptor that takes nothing for so long loses the line, s; only where it does not block by itself.
 TAKES_WITHIN_S = 5.0
-#: How often it is asked what else there is to say, s.
+#: How often `notes` is called at least, s.
 NOTES_EVERY_S = 60.0
 #: How long the end of a process waits for what has not been written, s.
 END_WITHIN_S = 2.0
@@ -24,7 +24,7 @@ _Item = str | threading.Event | None  #: a line, a waiting thread, the end
 
 
 class LogWriter:
-    """One output of one process. `put` is for any thread, also for one that a signal interrupts."""
+    """One output of one process. `put` may be called by any thread, also by one that a signal interrupts."""
 
     def __init__(
         self,

@@ -41,7 +41,7 @@ def paper_html(page: PaperPage) -> str:
 
 
 def _numbers(numbers: Sequence[PaperNumber]) -> Iterator[str]:
-    """Return a table for each place, in the paper's order."""
+    """Yield a title and a table for each place, in the paper's order."""
     for at in dict.fromkeys(number["place"] for number in numbers):
         rows = [
             (

@@ -80,7 +80,7 @@ def _dots(
 def time(answer: CriticismJson) -> go.Figure | None:
     """Return the residual of each axis against time, power-ons as lines, and the temperature below.
 
-    Where no time is known it is against the order of the data sets.
+    Where no time is known it is against the order of the data sets. None where there is nothing to draw.
     """
     views = answer.get("views") or Views()
     lines, sets = views.get("time") or [], views.get("sets") or DataSetColumns()

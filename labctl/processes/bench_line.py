@@ -125,9 +125,9 @@ class BenchLine:
 
 
 def bench_process_of(request: ServeRequest) -> Holder | None:
-    """Return who holds the database; of one that several processes hold: who drives the bench from this machine.
+    """Return who holds the database; on a server, which no process holds, who drives the bench from this machine.
 
-    Raises BadBench, StoreError.
+    None where no process does. Raises BadBench, StoreError.
     """
     if not is_url(request.location):
         return holder_of(request.location)

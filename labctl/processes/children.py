@@ -36,7 +36,7 @@ class Child:
     """A process that this one has started. It loads its modules, then waits for its settings."""
 
     def __init__(self, module: str, pass_fds: Sequence[int] = ()) -> None:
-        """Start `python -m module` in a session of its own: what happens to the terminal is not for it."""
+        """Start `python -m module` in a session of its own: signals of the terminal do not reach it."""
         ours, theirs = socket.socketpair()
         with theirs:
             self._process = subprocess.Popen(  # noqa: S603  this very program

@@ -12,7 +12,7 @@ ENGINE_SILENT_S = 180.0
 
 
 class Elapsed:
-    """Seconds since it was made or last restarted; any thread may do either."""
+    """Seconds since it was made or last restarted; any thread may read or restart it."""
 
     def __init__(self, clock: Clock | None = None) -> None:
         self._clock = clock or SystemClock()
@@ -29,7 +29,7 @@ class Elapsed:
 
 
 class EngineWatch:
-    """Follows how often the engine has asked: `polls` returns campaign and count, None while none runs.
+    """Follows how often the engine has asked for requests: `polls` returns campaign and count, None while none runs.
 
     A driver call that never returns leaves its process alive and its table turning.
     """
@@ -40,7 +40,7 @@ class EngineWatch:
         self._since = Elapsed(clock)
 
     def is_stuck(self) -> bool:
-        """Return whether a campaign runs whose engine has not asked for `ENGINE_SILENT_S`."""
+        """Return whether a campaign runs whose engine has not asked for requests during `ENGINE_SILENT_S`."""
         polls = self._polls()
         if polls is None or polls != self._seen:
             self._seen = polls

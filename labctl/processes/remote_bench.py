@@ -40,7 +40,7 @@ RECONNECT_S = 0.5
 
 
 class RemoteWriter:
-    """Runs transactions in the bench process. Pickled, it is another one that reaches the same process."""
+    """Runs transactions in the bench process. It can be pickled: the copy reaches the same process."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -51,7 +51,7 @@ class RemoteWriter:
         return self._caller.call(f"store.{name}", args, kwargs)
 
     def __reduce__(self) -> tuple[type[RemoteWriter], tuple[Path]]:
-        """Return how it is made again in another process."""
+        """Return what unpickling calls in another process."""
         return RemoteWriter, (self._folder,)
 
     def close(self) -> None:
@@ -171,8 +171,10 @@ class RemoteBench:
             return self._last_live is not None and self._last_live.id == campaign
 
     def status(self, campaign: int) -> CampaignResponse | None:
-        """Return the live picture of a campaign that runs; the last one, and that it is old, while it does not
-        answer."""
+        """Return the live picture of a campaign that runs, else None.
+
+        While the bench process does not answer it is the last picture, which then says that the process is silent.
+        """
         try:
             running, live = self._ask("bench.live", campaign)
         except BenchSilent:
@@ -188,11 +190,11 @@ class RemoteBench:
         return answer
 
     def listen(self, listener: Callable[[], None]) -> Callable[[], None]:
-        """Call `listener` whenever something has changed; returns what ends that. A listener may not block."""
+        """Call `listener` at every change; returns the function that ends this. A listener may not block."""
         return self._listeners.add(listener)
 
     def describe(self) -> BenchDescription | None:
-        """Return the bench and what it is doing; while it does not answer what was last known, as unconfirmed."""
+        """Return the bench and what it is doing; what was last known, as unconfirmed, while its process is silent."""
         if self.bench is None:
             return None
         with contextlib.suppress(BenchSilent):

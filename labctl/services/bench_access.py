@@ -54,7 +54,7 @@ class BenchAccess(Protocol):
         ...
 
     def listen(self, listener: Callable[[], None]) -> Callable[[], None]:
-        """Call `listener` whenever something has changed; returns what ends that. A listener may not block."""
+        """Call `listener` at every change; returns the function that ends this. A listener may not block."""
         ...
 
     def describe(self) -> BenchDescription | None:

@@ -53,7 +53,7 @@ _cached_only: ContextVar[bool] = ContextVar("cached_only", default=False)
 
 @contextmanager
 def cached_only() -> Iterator[None]:
-    """Compute nothing inside that takes long: it raises NotCached there."""
+    """Start no long computation while the block runs: it raises NotCached instead."""
     token = _cached_only.set(True)
     try:
         yield
@@ -127,7 +127,7 @@ def cached(kind: type[ResponseT], question: Mapping[str, object], work: Callable
 def cached_group(
     kind: type[ResponseT], question: Mapping[str, object], work: Callable[[], Sequence[ResponseModel]]
 ) -> ResponseT:
-    """Return the response of one kind where one work gives responses of several: all of them are cached.
+    """Return the response of one kind where `work` makes responses of several kinds at once; all are cached.
 
     A thread that asks the same question meanwhile, also for another kind, waits for that work.
     """

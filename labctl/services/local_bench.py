@@ -50,11 +50,11 @@ class LocalBench:
         return self.runner is not None and self.runner.runs(campaign)
 
     def status(self, campaign: int) -> CampaignResponse | None:
-        """Return the live picture of a campaign that runs here."""
+        """Return the live picture of a campaign that runs here; None for any other."""
         return None if self.runner is None else self.runner.status(campaign)
 
     def listen(self, listener: Callable[[], None]) -> Callable[[], None]:
-        """Call `listener` whenever something has changed; returns what ends that. A listener may not block."""
+        """Call `listener` at every change; returns the function that ends this. A listener may not block."""
         return (lambda: None) if self.runner is None else self.runner.listen(listener)
 
     def describe(self) -> BenchDescription | None:
@@ -74,7 +74,7 @@ class LocalBench:
                 self.scheduler.start()
 
     def stop_now(self, campaign: int | None, reason: str) -> bool:
-        """Ask for the end of the campaign that runs, or of this one if it is it; returns whether it was asked.
+        """Ask for the end of this campaign, with None of whatever runs; returns whether it was asked.
 
         Waits for no lock and for no database.
         """

@@ -14,7 +14,7 @@ LOOK_S = 0.1
 
 
 class _Flight:
-    """One question that threads work at in turn; forgotten when no thread holds it. Each thread reports to its own."""
+    """One question that threads work at in turn; forgotten when no thread holds it."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()

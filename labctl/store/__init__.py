@@ -146,7 +146,7 @@ class Store:
 
     @property
     def address(self) -> StoreAddress:
-        """By which another process opens the same database."""
+        """The address by which another process opens the same database."""
         return StoreAddress(self.location, self._database.writer)
 
     def note_address(self, address: ServiceAddress) -> None:
@@ -154,7 +154,7 @@ class Store:
         self._database.note_address(address)
 
     def run(self, name: str, args: tuple[object, ...], kwargs: Mapping[str, object]) -> object:
-        """Run a transaction that another process sent. Raises KeyError for an unknown name, and what it raises."""
+        """Run a transaction that another process sent; raises what it raises, and KeyError for an unknown name."""
         return run_transaction({type(each).__name__: each for each in vars(self).values()}, name, args, kwargs)
 
     def close(self) -> None:
@@ -183,14 +183,14 @@ def open_store(
 
 @dataclass(frozen=True)
 class StoreAddress:
-    """By which a process opens a store that another one has; it can be pickled, as its writer can."""
+    """The address by which a process opens a store that another one has; like its writer it can be pickled."""
 
     location: str  #: path or URL
     writer: Writer | None = None  #: the process that writes for others
 
     @property
     def can_write(self) -> bool:
-        """Whether a store opened by it can be written to while another process has the database."""
+        """Whether a store opened by this address can be written to while another process has the database."""
         return self.writer is not None or is_url(self.location)
 
     @contextmanager

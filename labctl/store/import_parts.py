@@ -17,7 +17,8 @@ from labctl.store.dataset_statistics import means_rows
 
 #: Number of the blocks that hold a whole table of points or coefficients.
 WHOLE_TABLE = 0
-#: What one part holds at most: measured, a transaction takes 20 ms of one core with the bytes, 33 ms with the rows.
+#: What one part holds at most. Measured: one transaction takes 20 ms of one core with this many bytes, 33 ms with this
+#: many rows.
 MOST_ROWS, MOST_BYTES = 2000, 1 << 21
 #: Readings of one block, before they are packed: of a long data set several blocks are made.
 BLOCK_BYTES = 2 << 20
@@ -39,7 +40,7 @@ class ImportPart:
     bytes: int = 0  #: of packed blocks
 
     def takes(self, n: int, size: int) -> bool:
-        """Whether so many rows more, with blocks of so many bytes, still fit; an empty part takes anything."""
+        """Whether `n` more rows, with blocks of `size` bytes, still fit; an empty part takes anything."""
         return not self.n or (self.n + n <= MOST_ROWS and self.bytes + size <= MOST_BYTES)
 
 
@@ -119,7 +120,7 @@ def _head(recording: int, number: int, part: Columns, n: int) -> Row:
         "position": str(part["position"][0]),
         "run": int(part["run"][0]) if "run" in part else 1,
         "mounting": int(part["mounting"][0]) if "mounting" in part else 1,
-        # of a motion that no table made there is none; its readings hold no such column
+        # 0 for a motion that no rate table made: its readings have no such column
         "table_rate_dps": float(part["table_rate_dps"].mean()) if "table_rate_dps" in part else 0.0,
         "table_angle_deg": None if angle is None else float(angle[0]),
         "chamber_setpoint_c": None if setpoint is None else float(setpoint[0]),

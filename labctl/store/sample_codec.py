@@ -79,7 +79,7 @@ def unpack(block: Block) -> dict[str, NDArray[np.generic]]:
 
 
 def load_compressor() -> None:
-    """Import what packs readings, for a process that may have no file left to open once they come."""
+    """Import the compression library now: a process may be able to open no further file once readings come."""
     import blosc2  # noqa: F401, PLC0415  0.1 s that only readings need
 
 
@@ -123,7 +123,7 @@ def _shrink(values: NDArray[np.int64]) -> tuple[list[Any], NDArray[np.generic] |
 
 
 def _even_ramp(values: NDArray[np.int64]) -> tuple[int, int, int] | None:
-    """Return (first, numerator, denominator) when values are first + i * numerator // denominator throughout."""
+    """Return (first, numerator, denominator) when all values are first + i * numerator // denominator."""
     steps = len(values) - 1
     first, span = int(values[0]), int(values[-1]) - int(values[0])
     if abs(span) >= 2**62 // max(steps, 1):

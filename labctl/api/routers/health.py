@@ -1,4 +1,4 @@
-"""Is the service well, and its figures for a monitor."""
+"""Whether the service is well, and its figures for a monitor."""
 
 from __future__ import annotations
 

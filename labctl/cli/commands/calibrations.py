@@ -1,4 +1,4 @@
-"""`labctl fit`, `certify`, `revoke`, `certifications`, `calibration`, `compensate`: to a corrected rate."""
+"""`labctl fit`, `certify`, `revoke`, `certifications`, `calibration`, `compensate`: up to a corrected rate."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`labctl verify`, `criticise`, `improve`, `ladder`: hold the model against the measurements, add what is missing."""
+"""`labctl verify`, `criticise`, `improve`, `ladder`: compare the model with the measurements, add what is missing."""
 
 from __future__ import annotations
 

@@ -16,7 +16,7 @@ HIDDEN = {"scale_factor_asymmetry": 2e-4}
 
 
 def play(demo: DemoRunner, real_serial: str) -> None:
-    """Tell both walks; what is said comes from the criticism alone."""
+    """Show it on both gyros; every sentence about a gyro comes from its criticism alone."""
     demo.title("(e) Which effect is missing? A gyro with a hidden effect")
     campaign = demo.campaign("ojeda2000-121", "single-axis-sim", hidden=HIDDEN, serial=SERIAL)
     demo.fit(SERIAL, "ojeda2000", campaign.recordings[SERIAL])

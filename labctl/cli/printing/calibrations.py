@@ -123,7 +123,7 @@ def _cell(entry: Entry, index: int) -> str:
 
 
 def _at_nodes(entry: Entry) -> tuple[list[float], list[float | None], str]:
-    """Return values and uncertainties, one or one at each node of a temperature table, and the unit."""
+    """Return values and uncertainties, a single one or one per node of a temperature table, and the unit."""
     if isinstance(entry, list):
         return entry, [None] * len(entry), "deg C"
     value, u = entry["value"], entry["u"]

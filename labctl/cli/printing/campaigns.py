@@ -54,7 +54,7 @@ def hours(seconds: float) -> str:
 
 
 def print_end(answer: CampaignResponse, *, as_json: bool) -> None:
-    """Print how a campaign ended; exit 1 when that is not as it was meant."""
+    """Print how a campaign ended; exit 1 when it did not end as planned."""
     print_json(answer) if as_json else print_campaign(answer)
     if answer.state in STOPPED_EARLY:
         raise typer.Exit(1)

@@ -86,7 +86,7 @@ def _print_applied(answer: CriticismResponse, *, whole: bool) -> None:
 
 
 def _not_testable(answer: CriticismResponse) -> list[str]:
-    """Return what a recording says nothing of: what its schedule hides, and what is for want of a channel."""
+    """Return what a recording cannot test: effects that its schedule hides, and those that need a missing channel."""
     hidden = [line["effect"] for line in answer.not_testable if line["why"] != "channel"]
     lacking: dict[str, list[str]] = {}
     for line in answer.not_testable:
@@ -97,7 +97,7 @@ def _not_testable(answer: CriticismResponse) -> list[str]:
 
 
 def _channel_in_words(name: str) -> str:
-    """Return the name of a column; of turns the rate is known on average alone."""
+    """Return the name of a column in words: of turns the table rate is the mean, so it is that at each instant."""
     return "the rate at each instant (table_rate_dps)" if name == "table_rate_dps" else name
 
 
@@ -172,13 +172,13 @@ def print_improvement(answer: ImproveResponse) -> None:
 
 
 def print_ladder(answer: LadderResponse) -> None:
-    """Draw the fall."""
+    """Print how the error falls from version to version, as bars."""
     for line in ladder_lines(answer):
         console.print(line, markup=False, highlight=False, soft_wrap=True)
 
 
 def ladder_lines(answer: LadderResponse, width: int = 40) -> list[str]:
-    """Return the fall on a logarithmic scale, a line per version, the floor as a line down."""
+    """Return the errors as bars on a logarithmic scale, a line per version; `|` marks the noise floor in each."""
     known = [e for s in answer.steps for e in (s.rms_dps, s.heldout_rms_dps) if e]
     if not known:
         return [f"{answer.serial}: no version has an error figure"]

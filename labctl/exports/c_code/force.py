@@ -40,7 +40,7 @@ static inline int {name}_{function}_with_force(
     {after}return outside;
 }}
 """
-#: Where the error is taken off a direct law's rate, one that is no number has to reach the output, which is flagged.
+#: A direct law has the error taken off its rate. An error that is not a number must reach the output, to be flagged.
 DIRECT_LEFT, DIRECT_AFTER = "error[a] == error[a] ? w[a] : error[a]", "rate[a] -= error[a]"
 
 
@@ -72,5 +72,5 @@ def force_body(name: str, force: ForceSensitivity, *, is_direct: bool, remembers
 
 
 def force_head(name: str, force: ForceSensitivity | None) -> str:
-    """Return the line at the head of a header, as a comment goes on; empty for a calibration without g-sensitivity."""
+    """Return the line at the head of a header, inside of its comment; empty for a calibration without g-sensitivity."""
     return "" if force is None else f" * {size_line(force, f'{name}_correct_with_force')}.\n"

@@ -118,8 +118,8 @@ def _of_surface(surface: Surface, over: Range, roundoff: float) -> tuple[float, 
 def _of_solution(part: StaticPart, over: Range, roundoff: float, roundings: tuple[float, float]) -> tuple[float, float]:
     """Return the bound of a law that is solved for the rate, and the largest slope of a rate along all outputs.
 
-    What is rounded is as if the output were another by so many roundoffs of its largest size, and the temperature by
-    some of its own.
+    Rounding acts as if the output were off by as many roundoffs of its largest size as there are roundings, and the
+    temperature by some roundoffs of its own.
     """
     raw, warm = _corners(part, over)
     rate = part.rate(raw, warm)

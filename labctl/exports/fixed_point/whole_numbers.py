@@ -1,7 +1,7 @@
 """A calibration in whole numbers: polynomials in the output, their coefficients tabulated over temperature.
 
-The numbers here are those of the C code (`c_fixed_point`), step by step and bit by bit, so that what is stated of the
-C code is measured on them. Rates are Q31 of a full scale, temperatures Q16 (1/65536 K).
+The numbers here are those of the C code (`c_q31`), step by step and bit by bit, so that what is stated of the C code is
+measured on them. Rates are Q31 of a full scale, temperatures Q16 (1/65536 K).
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ from labctl.fitting.numeric.arrays import Array
 Whole = NDArray[np.int64]
 Q31, Q16, POSITION_BITS, RECIPROCAL_BITS = 31, 16, 24, 32
 MOST_Q31 = 2**31 - 1
-#: Orders of the polynomials; how near the least one that is taken is, and how near the last has to be, as shares of the
-#: full scale.
+#: Highest order of the polynomials; the lowest order that is within NEAR of the calibration is taken, and the highest
+#: has to be within NEAR_ENOUGH, both as shares of the full scale.
 MOST_ORDER, NEAR, NEAR_ENOUGH = 11, 2.0**-30, 2.0**-18
 #: Coefficients of an axis may add up to this share of the full scale: no sum and no product leaves its 64 bits.
 FILLED = 0.99

@@ -1,1 +1,1 @@
-"""Noise of a gyro for estimators that correct nothing by it."""
+"""Formats that give an estimator the noise of a gyro, and no correction."""

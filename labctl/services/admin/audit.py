@@ -30,7 +30,7 @@ def anchor_of(text: str) -> Head:
 
 
 def verify_audit(store: Store, anchor: str | None = None) -> AuditVerificationResponse:
-    """Hold every row of the trail against its hash, the row before, the head and, if given, an anchor."""
+    """Check every row of the trail by its hash, the row before, the head and, if given, an anchor."""
     broken = store.audit.first_broken(anchor_of(anchor) if anchor else None)
     head = store.audit.head()
     rows = head.length if head is not None else 0

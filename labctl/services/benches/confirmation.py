@@ -1,8 +1,8 @@
 """Benches that are not confirmed safe: the safe state is tried again until it is confirmed, and a person still looks.
 
-A confirmation by labctl ends the attempts, and that a process ends with a failure because of the bench. It does not
-replace `labctl bench clear`: a link mostly comes back because a person put the cable in again, and nothing may move on
-its own while that person stands at the table.
+Once labctl has confirmed the safe state, the attempts end, and a process no longer ends with a failure because of the
+bench. That does not replace `labctl bench clear`: a link mostly comes back because a person put the cable in again, and
+nothing may move on its own while that person stands at the table.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class SafeStateRetry:
         self._store, self._bench, self._make_clock = store, bench, make_clock
         self._guard = guard or threading.Lock()
         self._is_idle = is_idle
-        self._unconfirmed = False  #: at the last look
+        self._unconfirmed = False  #: whether the safe state was unconfirmed when it was last read
         self._over = threading.Event()
         self._thread: threading.Thread | None = None
 
@@ -93,7 +93,7 @@ class SafeStateRetry:
                     self._store.benches.attempted(self._bench.name, unconfirmed, clock.utc())
 
     def _is_unconfirmed(self) -> bool:
-        with suppress(LabctlError):  # a database that cannot be read: as it was at the last look
+        with suppress(LabctlError):  # a database that cannot be read: the last known state counts
             row = self._store.benches.get(self._bench.name)
             self._unconfirmed = row is not None and row.is_unconfirmed
         return self._unconfirmed

@@ -33,7 +33,7 @@ def reported_of(bench: BenchFile, said: Reported) -> dict[str, dict[str, str]]:
 
 
 def reported_in(campaign: CampaignRow) -> dict[str, dict[str, str]]:
-    """Return device -> what it said of itself when a campaign began; empty for one of before that was kept."""
+    """Return device -> what it said of itself when a campaign began; empty for one before this was recorded."""
     return _REPORTED.validate_python(campaign.bench.get("reported") or {})
 
 

@@ -5,7 +5,8 @@ its campaign interrupts: the engine polls the control before each step and once 
 the lease ends after `TERM_S` and another process may take the bench. The campaign is to be resumed.
 
 Clocks of two computers differ and may jump. A lease that seems to have ended is therefore taken only after a whole term
-in which its beat did not change, measured by the own monotonic time; the written expiry only spares that wait.
+in which its beat did not change, by this process's monotonic clock; a lease whose written expiry is not over yet is
+not even watched.
 """
 
 from __future__ import annotations

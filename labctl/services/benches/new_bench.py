@@ -36,7 +36,7 @@ class Section:
 def new_bench(
     file: Path, request: NewBenchRequest, ask: Ask, seen: Callable[[FoundResponse], None], *, force: bool
 ) -> NewBenchResponse:
-    """Find instruments, ask for what they do not say, and write a bench file; `seen` gets each address as it is done.
+    """Find instruments, ask for what they do not say, and write a bench file; `seen` gets each address once searched.
 
     Raises BadInput where the file exists and `force` is not given, where no gyro answers, and for a value that is
     missing or wrong.

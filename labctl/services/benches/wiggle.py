@@ -27,9 +27,10 @@ REST_S, REST_BETWEEN_S = 3.0, 1.0
 BLOCK_S = 0.25
 #: How long a movement is waited for, and followed once it has begun, s.
 WITHIN_S, FOLLOW_S = 60.0, 2.0
-#: A unit moves when the root mean square of its rates about those at rest exceeds both: deg/s, times its scatter.
+#: A unit moves when the RMS of its rates, less those at rest, exceeds both limits: one in deg/s, and one as a multiple
+#: of its scatter at rest.
 LEAST_DPS, TIMES_SCATTER = 5.0, 10.0
-#: Another one that moves more than this share of the fastest was turned too.
+#: A further unit that moves more than this share of the fastest was turned too.
 ALSO_SHARE = 0.2
 
 Say = Callable[[str], None]
@@ -45,7 +46,7 @@ class AtRest:
 
     @property
     def limit_dps(self) -> float:
-        """Root mean square from which on the unit moves."""
+        """Root mean square of the rates, less those at rest, above which the unit counts as moving, deg/s."""
         return max(LEAST_DPS, TIMES_SCATTER * self.scatter_dps)
 
 
@@ -137,7 +138,7 @@ class _Test:
         return found
 
     def _shares(self, rates: Mapping[str, Rates]) -> dict[str, float]:
-        """Return how fast each unit moves as a share of the limit from which on it moves."""
+        """Return the root mean square of each unit's rates, less those at rest, as a share of its limit."""
         return {
             name: float(np.sqrt(np.mean(np.sum((each - self._rest[name].mean_dps) ** 2, axis=1))))
             / self._rest[name].limit_dps

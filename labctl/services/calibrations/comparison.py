@@ -1,4 +1,4 @@
-"""Comparison of a fit's errors with those before it: a fit that makes things worse is said, or refused."""
+"""Comparison of a fit's errors with those before it: a fit that makes things worse is reported, or refused."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from labctl.recording.sanity import Finding
 
 #: Errors that differ by less than this share are the same: what the rounding of a refit leaves.
 ROUNDING = 1e-6
-#: A changed model's error of its own data rises by more than this share: said.
+#: A changed model whose error on its own data is more than this many times the error before is reported.
 WORSE = 1.01
 #: A version is worse than another one of the same recording from this ratio of their errors on.
 WORSE_VERSION = 1.01
@@ -19,15 +19,15 @@ class Errors(Protocol):
 
     @property
     def raw_rms_dps(self) -> float | None:
-        """Of the output without correction."""
+        """RMS error of the output without correction."""
 
     @property
     def rms_dps(self) -> float | None:
-        """On the data of the fit."""
+        """RMS error on the data of the fit."""
 
     @property
     def heldout_rms_dps(self) -> float | None:
-        """On temperatures left out of the fit."""
+        """RMS error on temperatures left out of the fit."""
 
 
 def worse_than_raw(error: Errors, *, late: bool = False) -> list[Finding]:

@@ -1,4 +1,4 @@
-"""Calibrations as files for consumers, with the certification in them and what HTTP says beside them."""
+"""Calibrations as files for consumers, with the certification in them and the HTTP headers beside them."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class CalibrationFile:
     losses: tuple[Loss, ...] = ()  #: what the format does not carry
 
     def headers(self, now: datetime) -> dict[str, str]:
-        """Return what HTTP says beside the bytes at an aware time: tag, state, due date, and a warning."""
+        """Return the HTTP headers beside the bytes at an aware time: tag, state, due date, and a warning."""
         known = self.certification
         found = {"ETag": f'"{self.etag}"', "Cache-Control": "no-cache", "X-Labctl-State": NOT_CERTIFIED}
         if known is None:

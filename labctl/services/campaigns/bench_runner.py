@@ -103,7 +103,7 @@ class BenchRunner:
         return self._job is None and self._may_drive
 
     def runs_or_was_stopped(self, campaign: int) -> bool:
-        """Return whether a campaign runs, or ended after a stop whose abort has yet to come."""
+        """Return whether a campaign runs, or was the last one asked to stop: its abort may not be recorded yet."""
         return campaign == self._stop_requested or self.runs(campaign)
 
     def runs(self, campaign: int) -> bool:
@@ -237,11 +237,11 @@ class BenchRunner:
             self._listeners.notify()
 
     def listen(self, listener: Callable[[], None]) -> Callable[[], None]:
-        """Call `listener` whenever something has changed; returns what ends that. A listener may not block."""
+        """Call `listener` at every change; returns the function that ends this. A listener may not block."""
         return self._listeners.add(listener)
 
     def status(self, campaign: int) -> CampaignResponse | None:
-        """Return the live picture of a campaign that runs here."""
+        """Return the live picture of a campaign that runs here; None for any other."""
         job = self._job
         if job is None or job.row.id != campaign or job.progress is None:
             return None

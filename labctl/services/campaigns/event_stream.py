@@ -86,7 +86,7 @@ class CampaignEventStream:
         self._listen = listen
         self._status_cache = StatusCache()
         if listen is not None:
-            listen(self._status_cache.ring)  # the first to hear: who is woken by the bell looks anew
+            listen(self._status_cache.ring)  # first of all: a client that is woken reads anew
 
     async def follow(
         self, campaign: int, after: int, over: Callable[[], bool]

@@ -87,7 +87,7 @@ def _engine(
 
 
 def _drive(store: Store, prepared: Prepared, engine: Engine) -> CampaignResponse:
-    """Run the engine and close the bench; once it ends, further signals take nothing from what is to be said."""
+    """Run the engine and close the bench; once the engine ends, no further signal keeps its end from being reported."""
     bench = store.campaigns.get(prepared.id).bench_name
     with ExitStack() as until_reported:
         until_reported.enter_context(for_campaign(prepared.id, bench))
@@ -128,7 +128,7 @@ def _unwritten(store: Store, campaign: int, bench: str, engine: Engine, error: S
 
 
 def answers_noted(store: Store, prepared: Prepared) -> Callable[[str], None]:
-    """Return what writes an answer that was given at this terminal into the audit trail."""
+    """Return a function that writes an answer given at this terminal into the audit trail."""
 
     def note(said: str) -> None:
         at, subject = prepared.clock.utc(), f"campaign {prepared.id}"
@@ -145,12 +145,12 @@ def run_here(
     say: Callable[[str], None] | None = None,
     ask_clear: AskClear | None = None,
 ) -> CampaignResponse:
-    """Run a campaign in this process, until it is over; `attend` is given whom the campaign asks.
+    """Run a campaign in this process, until it is over; `attend` is given the operator that it asks.
 
     `say` is called with the text about a campaign that was left on a simulated bench. `ask_clear` is given the
-    questions about a real
-    bench that is not confirmed yet, and returns who has. Raises Conflict for a campaign that was left on a real
-    bench, StartNotConfirmed where no person has confirmed that it is clear.
+    questions about a real bench that is not confirmed to be clear yet, and returns who has confirmed it. Raises
+    Conflict for a campaign that was left on a real bench, StartNotConfirmed where no person has confirmed that it is
+    clear.
     """
     bench_file = seeded(load_bench(request.bench or bench_for(load_recipe(request.recipe))), request.seed)
     bench_file = with_hidden_effects(on_date(bench_file, request.simulated_start), request.hide)

@@ -44,7 +44,7 @@ def campaign_plan(store: Store, campaign: int) -> CampaignPlanResponse:
 
 
 def recipe_text(recipe: JsonObject) -> str:
-    """Return a recipe as text; nothing where it was written by a labctl whose recipes had other keys."""
+    """Return a recipe as text; nothing where it is of a release of labctl whose recipes had other keys."""
     try:
         return tomli_w.dumps(recipe_document(Recipe.model_validate(dict(recipe))))
     except ValidationError:

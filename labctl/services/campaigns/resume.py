@@ -50,7 +50,7 @@ def plan_of(store: Store, row: CampaignRow) -> Plan:
 def with_original_simulation(row: CampaignRow, bench_file: BenchFile) -> BenchFile:
     """Return a simulated bench with the simulation that a campaign was begun in: the same units, on the same day.
 
-    A real bench is what it is. Raises Conflict for a simulation that this version of labctl does not know any more.
+    A real bench is returned unchanged. Raises Conflict for a simulation whose settings this version does not know.
     """
     was = row.bench.get("simulation")
     if not bench_file.is_simulated or was is None:
@@ -176,7 +176,7 @@ def resume_here(
 
 
 def _simulated_start(bench_file: BenchFile, speed: float | None, last_at: datetime) -> datetime | None:
-    """Return when simulated time goes on: where it stood, unless it follows this computer's, which is later."""
+    """Return where simulated time goes on; None for real instruments, and where it goes on at the present time."""
     if not bench_file.is_simulated:
         return None
     return last_at if speed is None or last_at > SystemClock().utc() else None

@@ -66,7 +66,7 @@ def answer_of(row: CampaignRow, progress: Progress, request: ControlRequest | No
 
 
 def _drivers(row: CampaignRow) -> dict[str, DriverResponse]:
-    """Return which release drove each instrument; empty for a campaign of before they were kept."""
+    """Return which release drove each instrument; empty for a campaign before drivers were recorded."""
     return _DRIVERS.validate_python(row.bench.get("drivers", {}))
 
 

@@ -52,7 +52,7 @@ class Facts:
 
     @property
     def manufacturer(self) -> str:
-        """Of the item, by the order."""
+        """The manufacturer of the item, as the order states it."""
         return self.order.item.manufacturer
 
     def missing(self) -> Iterator[tuple[str, str]]:

@@ -22,7 +22,7 @@ class Found:
 
     @staticmethod
     def of(store: Store, facts: Facts) -> Found:
-        """Return it for a version; nothing where no recording holds measurements."""
+        """Return what the recordings of a version show; nothing where none of them holds measurements."""
         if not facts.recordings:
             return Found()
         measurements = Measurements(store, facts.recordings)

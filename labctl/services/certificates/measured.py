@@ -68,7 +68,7 @@ class Results:
 
 
 def performed(store: Store, row: RecordingRow) -> tuple[date, date | None]:
-    """Return the first and the last day of a campaign, or of an imported recording as far as it tells. UTC."""
+    """Return the first and the last day (UTC) of a campaign or of an imported recording; None: the last is unknown."""
     if row.campaign is not None:
         campaign = store.campaigns.get(row.campaign)
         begun = campaign.started_at or campaign.created_at

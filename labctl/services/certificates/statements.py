@@ -18,6 +18,6 @@ SIMULATED = (
 
 
 def statements(facts: Facts) -> tuple[str, ...]:
-    """Return them in order; a simulated bench first."""
+    """Return the statements in order; of a simulated bench that it is simulated first, and none on traceability."""
     found = [ITEM_ONLY, TRACEABLE, NOISE, BY_CUSTOMER, WHOLE]
     return (SIMULATED, *found[:1], *found[2:]) if facts.simulated else tuple(found)

@@ -31,7 +31,7 @@ def open_readonly(database: str | None) -> Iterator[Store]:
 def service_url(database: str | None, campaign: int | None = None) -> str | None:
     """Return the address of the service that holds the database; None when no service does.
 
-    A database to which several processes write has a service for each bench: of that on which the campaign runs.
+    A database to which several processes write has a service for each bench: here that of the campaign's bench.
     """
     location = database or default_database()
     if is_url(location):

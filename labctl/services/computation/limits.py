@@ -20,5 +20,5 @@ class Limits:
     #: Address space beside what is loaded already, MiB. The largest criticism takes some 500, the largest import that
     #: is allowed some 2,600.
     memory_mib: int = 4096
-    deadline_s: float = 900.0  #: from its begin
+    deadline_s: float = 900.0  #: from the start of the work
     niceness: int = 10  #: above that of the service: the bench and pages come first

@@ -73,7 +73,7 @@ def carry_out(connection: Connection, task: Task) -> None:
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     threading.Thread(target=_end_with_the_service, daemon=True).start()
     os.nice(task.limits.niceness)
-    with _log_of(task):  # which is written when this ends: who has got the outcome kills the worker
+    with _log_of(task):  # written out before the outcome is sent: the service that has it kills the worker
         _bound_memory(task.limits.memory_mib)
         outcome = _outcome(connection, task)
     with suppress(BrokenPipeError):

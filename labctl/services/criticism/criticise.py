@@ -31,7 +31,7 @@ def criticise_unit(
     recordings: Sequence[int] = (),
     other_unit: bool = False,
 ) -> CriticismResponse:
-    """Hold a version (default: the newest) against a recording (default: the unit's newest), or several as one.
+    """Compare a version (default: the newest) with a recording (default: the unit's newest), or several as one.
 
     `other_unit` allows a recording of another unit. Raises NotFound, BadInput.
     """

@@ -20,7 +20,7 @@ Decimated = Callable[[RecordingRow], Columns]
 def is_decimated(row: RecordingRow) -> bool:
     """Return whether a criticism of a recording takes decimated readings; otherwise it takes means.
 
-    Turns are integrals over all readings, and of a rate that changes decimated readings are those of another one.
+    Turns are integrals over all readings, and decimated readings of a rate that changes would be those of another rate.
     """
     return row.kind == "samples" and motion_of(row) not in {"turns", "poses"} and not is_profile(row)
 
@@ -34,7 +34,7 @@ def decimated_columns_of(store: Store, row: RecordingRow) -> Columns:
 
 @contextmanager
 def reading_beside(store: Store, rows: Sequence[RecordingRow]) -> Iterator[Decimated]:
-    """Begin to read the recordings; gives what returns the readings of each when they are needed."""
+    """Begin to read the recordings; gives the function that returns the readings of each when they are needed."""
     wanted = [row for row in rows if is_decimated(row)]
 
     def read() -> dict[int, Columns]:

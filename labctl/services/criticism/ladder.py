@@ -84,7 +84,7 @@ def _step(row: CalibrationRecord, applied_rms_dps: float | None = None) -> Ladde
 
 
 def _applied_here(store: Store, others: Sequence[CalibrationRecord], recording: int | None) -> list[LadderRow]:
-    """Return versions of other recordings, each with its error on this one; None where it cannot be applied."""
+    """Return versions of other recordings, each with its error on this one (None where it cannot be applied)."""
     if not others or recording is None:
         return [_step(row) for row in others]
     if len(others) > QUICK_VERSIONS:

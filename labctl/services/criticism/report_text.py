@@ -28,12 +28,13 @@ DATA_FIRST = {"certain": "The data are wrong", "likely": "Check the data"}
 
 
 def with_warnings(answer: CriticismResponse, warnings: list[DataWarning]) -> CriticismResponse:
-    """Return an answer that says first what is wrong with the data: a verdict on wrong data is none."""
+    """Return an answer that says first what is wrong with the data: a verdict on wrong data means nothing."""
     said = [f"{DATA_FIRST[warning.severity]}: {warning.text}." for warning in warnings]
     return answer.model_copy(update={"warnings": warnings, "text": [*said, *answer.text]})
 
 
-#: Up to this many noise floors an error counts as noise: a model follows no drift, and repeats share some of it.
+#: Up to this many noise floors an error counts as noise: a model does not follow drift, and points that are measured
+#: again, from which a noise floor may come, share some of the drift.
 AT_FLOOR = 1.25
 #: Of a recording whose rates were commanded, and not measured.
 UNMEASURED = (
@@ -204,7 +205,7 @@ def _further(found: Criticism) -> list[str]:
 
 
 def _leg(found: Criticism) -> bool:
-    """Return whether temperatures only rose, and the verdict hangs on what that cannot tell from time."""
+    """Return whether temperatures only rose, and the verdict names what such a schedule cannot tell from time."""
     kinds = [CATALOGUE[name] for name in found.verdict.named if name in CATALOGUE]
     of_time = any(HISTORY & set(kind.needs) for kind in kinds) or bool(HISTORY & set(found.verdict.depends_on[:1]))
     if not of_time and "temperature_c" not in found.verdict.depends_on[:1]:

@@ -22,7 +22,7 @@ def version_of(store: Store, serial: str, version: int | None) -> CalibrationRec
 def content_digest(row: CalibrationRecord) -> str:
     """Return a digest of a version's file without the instant of its issue, on which no criticism depends.
 
-    The hash of the file itself is another one for each fit, of the same recording too.
+    The hash of the file itself differs from fit to fit, even of the same recording.
     """
     content = {key: value for key, value in json.loads(row.document).items() if key not in {"issued_at", "hash"}}
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

@@ -80,7 +80,7 @@ def fail_draft(store: Store, draft: DraftRow, rules: FitRules, why: str, at: dat
 
 
 def _without_insisting(error: LabctlError) -> str:
-    """Return an error in words, without the option that only a fit by hand has."""
+    """Return an error in words, without the hint to an option that a draft does not have."""
     return (
         str(error).replace("; to do it nevertheless: --accept-warnings", "")
         if isinstance(error, DataRefused)

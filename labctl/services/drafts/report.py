@@ -72,7 +72,7 @@ def _smallest_heldout(compared: list[ComparedModel]) -> str | None:
 def _as_found(
     store: Store, draft: CalibrationRecord, measured: Measurements, rules: FitRules
 ) -> tuple[AppliedDraft | None, str, DriftFromVersion | None]:
-    """Return the version in force applied to the recording, why not, and the drift of the draft against it."""
+    """Return the version in force applied to the recording, why it or the drift is missing, and the drift from it."""
     if not rules.against:
         return None, NOT_ASKED, None
     version = version_in_force(store, draft.serial)

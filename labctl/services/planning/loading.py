@@ -56,7 +56,7 @@ def own_text(source: str) -> str:
 
 
 def recipe_document(recipe: Recipe) -> dict[str, JsonValue]:
-    """Return a recipe as a recipe file says it: what it leaves as usual is left out."""
+    """Return a recipe as a recipe file says it; keys that have their default are left out."""
     document = recipe.model_dump(mode="json", exclude_none=True, exclude_defaults=True)
     if recipe.turns is not None:
         document = {key: value for key, value in document.items() if value != []}  # it has no rates
@@ -85,7 +85,7 @@ def with_drivers(bench: BenchFile) -> BenchFile:
 
 
 def _first(error: ValidationError) -> str:
-    """Say the first thing that is wrong: its place, what is wrong, and what is given."""
+    """Say the first thing that is wrong: its place, what is wrong there, and the value that was given."""
     first = error.errors()[0]
     place = ".".join(str(part) for part in first["loc"])[:LONGEST_PLACE]
     given = "" if first["type"] == "missing" else f" (is {shown(first['input'])})"

@@ -28,7 +28,7 @@ def list_recordings(store: Store) -> list[RecordingResponse]:
 
 
 def _of_simulated_time(store: Store, rows: Sequence[RecordingRow]) -> set[int | None]:
-    """Return the campaigns of these recordings whose times are of a simulated bench's clock."""
+    """Return all campaigns whose times are of a simulated clock; none where no recording is of a campaign."""
     if all(row.campaign is None for row in rows):
         return set()
     return {campaign.id for campaign in store.campaigns.all() if has_simulated_time(campaign.bench)}

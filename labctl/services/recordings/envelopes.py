@@ -18,7 +18,7 @@ from labctl.store import Store
 LEAST_BINS, READINGS_A_BIN, MOST_BINS = 64, 128, 4096
 #: A file has some 24 bytes a bin, and a recording up to a dozen files.
 ENVELOPES = FileCache("envelopes", ".npz", most=200)
-#: Columns that are no measured course.
+#: Columns that are no measured channel over time.
 NO_COURSE = frozenset({"dataset", "t_s", "run", "mounting", "valid"})
 
 Array = NDArray[np.float64]

@@ -75,7 +75,7 @@ INSIST = "; to do it nevertheless: --accept-warnings"
 
 
 def refuse_wrong(warnings: list[DataWarning], what: str, *, accepted: bool, insist: str = INSIST) -> None:
-    """Raise DataRefused for the first certain warning, unless it is accepted; `what` would be done."""
+    """Raise DataRefused for the first certain warning, unless it is accepted; `what` names what is refused."""
     sure = [warning for warning in warnings if warning.severity == "certain"]
     if sure and not accepted:
         more = f" (and {len(sure) - 1} more)" if len(sure) > 1 else ""

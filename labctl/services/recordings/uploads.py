@@ -52,6 +52,6 @@ def sent_map(text: str) -> ColumnMap | None:
 
 
 def _plain(name: str) -> str:
-    """Return a name that is a file's in any folder."""
+    """Return a file name that is safe in any folder: no path, no special characters."""
     kept = re.sub(r"[^\w.+# -]", "_", Path(name.replace("\\", "/")).name)[-LONGEST_NAME:].lstrip(". ")
     return kept or "log"

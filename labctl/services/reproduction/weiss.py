@@ -107,7 +107,10 @@ def _tables(measured: Measured, axis: str) -> Findings:
 
 
 def _in_report_units(result: FitResult, recording: Recording, axis: str) -> tuple[Array, Array]:
-    """Return scale factors, mV per deg/s, and offsets, V, at the nodes; the report's unit unless volts."""
+    """Return scale factors, mV per deg/s, and offsets, V, at the nodes.
+
+    The nominal values are the recording's where its output is in V, else those of the report.
+    """
     axis_fit = result.fitted.axes[axis]
     unit = next((unit for name, unit in recording.info.output.items() if name == axis), OutputUnit())
     volts = unit.scale if unit.unit == "V" else paper.NOMINAL_MV / 1000.0

@@ -41,7 +41,7 @@ def raw_errors(data: FitData) -> dict[str, Array]:
 
 
 def left_out_errors(measured: Measured, data: FitData, result: FitResult) -> Judged:
-    """Return the errors of each temperature by a fit without it; where that cannot be, those of the fit."""
+    """Return the errors at each temperature by a fit without it; where that is impossible, those of the whole fit."""
     traditional = None
     with suppress(LabctlError):  # said by the numbers that are missing
         traditional = fit(measured.recording, "single_temperature")

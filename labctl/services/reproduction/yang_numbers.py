@@ -143,7 +143,7 @@ def _cell(name: str, of: str, value: float, why: str) -> Value:
 
 
 def own_axis(judged: Judged) -> Iterator[Value]:
-    """Return what K and B leave, by the printed numbers alone and by this unit."""
+    """Yield the error that K and B leave, by the printed numbers alone and by this unit, deg/s."""
     for axis in paper.AXES:
         left, low, high = paper.unexplained_dps(axis)
         why = f"root of RMS before^2 - (K - 1)^2 RMS(rates)^2 - B^2; {low:.3f} to {high:.3f} by the rounding of K"

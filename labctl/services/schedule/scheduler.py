@@ -126,7 +126,7 @@ class Scheduler:
 
     @staticmethod
     def _last_due(row: StartRow, cron: str, now: datetime) -> datetime:
-        """Return the newest of the times that came; earlier ones that were missed are one with it."""
+        """Return the newest due time that has come; earlier ones that were missed count as one start with it."""
         return times.last_due(cron, times.time_zone(row.time_zone), row.due_at, now)
 
     @staticmethod

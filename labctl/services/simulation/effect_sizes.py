@@ -55,7 +55,7 @@ def sizes_on_plan(texts: list[str], plan: Plan, bench: BenchFile, gyro: GyroSett
 
 
 def with_sizes(asked: CampaignRequest, bench: BenchFile) -> CampaignRequest:
-    """Return a start whose sizes in noise units are in those of their effects, as on the first unit of its bench.
+    """Return a start with sizes in noise units converted to those of the effects, for the first unit of its bench.
 
     Raises BadInput, RecipeError, PlanRefused.
     """

@@ -16,7 +16,7 @@ class Backend(Protocol):
     patience_s: float  #: for how long a database that does not answer is asked again, s
 
     def engines(self) -> tuple[sa.Engine, sa.Engine]:
-        """Return what writes, and what reads."""
+        """Return the engine that writes and the engine that reads."""
         ...
 
     def before_opening(self, connection: sa.Connection) -> None:
@@ -48,7 +48,7 @@ class Backend(Protocol):
         ...
 
     def committed(self, commits: int) -> None:
-        """Take note of what `before_commit` returned."""
+        """Note the count that `before_commit` returned, once the transaction is committed."""
         ...
 
     def is_unreachable(self, error: exc.DatabaseError) -> bool:
@@ -60,7 +60,7 @@ class Backend(Protocol):
         ...
 
     def words_for(self, error: exc.DatabaseError) -> str:
-        """Return an error in words of its own; empty for one that the database's own words say."""
+        """Return labctl's own message for an error; empty where the database's own message is enough."""
         ...
 
     def was_committed(self, number: int) -> bool:

@@ -13,7 +13,7 @@ from labctl.errors import BadInput
 from labctl.store.connection.location import shown
 
 BUSY_MS = 5000
-#: Of libpq: how long a server may take to answer, and after how long without an answer a connection is lost.
+#: Options of libpq: how long a connection may take to open, and after how long without an answer it counts as lost.
 CONNECTION = {
     "connect_timeout": 5,
     "keepalives_idle": 5,
@@ -51,10 +51,11 @@ def sqlite_engine(location: str, *, write: bool) -> sa.Engine:
 
 
 def server_engine(url: str, *, lock_timeout_s: float, idle_timeout_s: float) -> sa.Engine:
-    """Return an engine for a database by URL, whose server ends what waits or idles in a transaction for so long.
+    """Return an engine for a database by URL. Raises BadInput for a URL that cannot be used.
 
-    A connection is tried before it is used, and one whose other end is gone is noticed within 20 s. Raises BadInput
-    for a URL that is not known here.
+    The server ends a statement that waits longer than `lock_timeout_s` for a lock, and a connection that is idle in a
+    transaction for longer than `idle_timeout_s`. A connection is tried before it is used, and one whose other end is
+    gone is noticed within 20 s.
     """
     known = "name the path of an SQLite file, or postgresql+psycopg://user:password@host/name"
     limits = {"lock_timeout": lock_timeout_s, "idle_in_transaction_session_timeout": idle_timeout_s}

@@ -2,7 +2,7 @@
 
 SQLite goes on writing into a file that has no name any more, and reports success. So the writer remembers device and
 inode of the database and, as soon as it is there, of its write-ahead log, and compares them before every commit: two
-calls of the system, some microseconds.
+system calls, some microseconds.
 """
 
 from __future__ import annotations

@@ -17,18 +17,18 @@ from labctl.store.connection.writer_lock import ServiceAddress
 
 #: "labctl" in ASCII: the lock that a writing transaction has.
 WRITER_KEY = int.from_bytes(b"labctl", "big")
-#: A transaction waits so long for the one before, and one that does nothing is ended by the server after it, s.
+#: How long a transaction waits for the one before it; the server ends a transaction that is idle for as long, s.
 LOCK_TIMEOUT_S = IDLE_TIMEOUT_S = 20
-#: A server that is restarted within 30 s ends no campaign; a reading request is answered soon that it does not answer,
-#: s.
+#: For how long a server that does not answer is asked again, s: a campaign survives a restart of the server within
+#: 30 s, and a request that only reads soon gets the answer that the server cannot be reached.
 WRITER_PATIENCE_S, READER_PATIENCE_S = 45.0, 2.0
-#: A disk without room, and a lock that was given to no one in time.
+#: SQLSTATEs of a full disk, and of a lock that was not granted in time.
 DISK_FULL, LOCK_NOT_AVAILABLE = "53100", "55P03"
-#: The classes of errors that are about the connection and not about the statement, and what a server says that is
-#: shut down, was killed, starts, or drops its database. The codes are SQLSTATEs.
+#: The class of errors that are about the connection and not about the statement, and the errors of a server that is
+#: shut down, was killed, is starting, drops its database, or has no connection left. The codes are SQLSTATEs.
 CONNECTION_CLASS = "08"
 SERVER_AWAY = frozenset({"57P01", "57P02", "57P03", "57P05", "25P03", "53300"})
-#: What a server says that refuses a connection, which does not end by waiting. The client library gives no SQLSTATE.
+#: Messages of a server that refuses a connection; waiting does not help. The client library gives no SQLSTATE.
 REFUSALS = ("authentication failed", "does not exist", "no pg_hba.conf entry", "permission denied", "not permitted")
 
 _BEGIN = sa.text("SELECT pg_current_xact_id()::text FROM (SELECT pg_advisory_xact_lock(:key)) AS turn")
@@ -36,7 +36,7 @@ _STATUS = sa.text("SELECT pg_xact_status(CAST(:number AS xid8))")
 
 
 class PostgresqlServer:
-    """The backend of a database by URL. It is held by no process; `write` says whether this one may wait for it."""
+    """The backend of a database by URL. No process holds it; with `write` an absent server is waited for longer."""
 
     def __init__(self, url: str, *, write: bool) -> None:
         """Raise BadInput for a URL that is not known here."""
@@ -44,7 +44,7 @@ class PostgresqlServer:
         self._engine = server_engine(url, lock_timeout_s=LOCK_TIMEOUT_S, idle_timeout_s=IDLE_TIMEOUT_S)
 
     def engines(self) -> tuple[sa.Engine, sa.Engine]:
-        """Return two that share their connections; a reader sees one state of the database and changes nothing."""
+        """Return two engines that share connections; a reader sees one state of the database and changes nothing."""
         reader = self._engine.execution_options(isolation_level="REPEATABLE READ", postgresql_readonly=True)
         return self._engine, reader
 
@@ -71,7 +71,7 @@ class PostgresqlServer:
         return int(connection.scalar(_BEGIN, {"key": WRITER_KEY}))
 
     def before_commit(self, connection: sa.Connection, *, synced: bool) -> int:  # noqa: ARG002
-        """Return that no commits are counted."""
+        """Return 0: no commits are counted."""
         return 0
 
     def committed(self, commits: int) -> None:
@@ -89,7 +89,7 @@ class PostgresqlServer:
         return getattr(error.orig, "sqlstate", None) == DISK_FULL
 
     def words_for(self, error: exc.DatabaseError) -> str:
-        """Return what a refused connection means, and a lock that the server gave to no one in time."""
+        """Return the message for a refused connection, or for a lock that was not granted in time; else empty."""
         state = getattr(error.orig, "sqlstate", None)
         if state is None and _is_refusal(error):
             said = " ".join(str(error.orig).split())
@@ -102,7 +102,7 @@ class PostgresqlServer:
         )
 
     def was_committed(self, number: int) -> bool:
-        """Ask the server what became of a transaction, once it is over: it had the turn until then."""
+        """Ask the server whether a transaction was committed, once it is over and no longer has the writer's lock."""
         with self._engine.connect() as connection:
             self.begun(connection, synced=True)
             return connection.scalar(_STATUS, {"number": str(number)}) == "committed"

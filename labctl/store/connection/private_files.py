@@ -29,7 +29,7 @@ def write_private(path: Path, text: str) -> None:
 
 
 def close_to_others(*paths: Path) -> None:
-    """Take the rights of others off files that an earlier version made; those of another owner stay as they are."""
+    """Remove the access of others to files that an earlier version made; files of another owner stay as they are."""
     for path in paths:
         with suppress(OSError):
             if path.stat().st_mode & 0o777 != FILE:

@@ -25,7 +25,7 @@ from labctl.store.connection.writer_lock import ServiceAddress, WriterLock
 
 
 class SqliteFile:
-    """The backend of a database by path. `address` given: it is held for writing, to be reached there."""
+    """The backend of a database by path. With `address` it is held for writing, by a process that is reached there."""
 
     patience_s = 0.0  #: a file is there, or it is not
 
@@ -44,7 +44,7 @@ class SqliteFile:
             raise
 
     def engines(self) -> tuple[sa.Engine, sa.Engine]:
-        """Return two: reading has connections of its own, so it neither waits for the writer nor makes it wait."""
+        """Return two engines: a reader has connections of its own, and neither waits for the writer nor delays it."""
         if self._lock is None:
             engine = sqlite_engine(self._location, write=False)
             return engine, engine
@@ -92,7 +92,7 @@ class SqliteFile:
             raise StoreError(f"{text}. Nothing was stored; try again", cause=text)
 
     def before_begin(self, engine: sa.Engine, *, synced: bool) -> None:
-        """Let the next commits reach the disk before they are answered, or with a later one: a log is in order."""
+        """Let the next commits reach the disk before they return, or with a later one: the log is written in order."""
         if synced == self._synced:
             return
         driver = engine.raw_connection()
@@ -117,7 +117,7 @@ class SqliteFile:
             seal(self._location, commits)
 
     def is_unreachable(self, error: exc.DatabaseError) -> bool:  # noqa: ARG002
-        """Return that every error is about the file itself."""
+        """Return False: every error is about the file itself."""
         return False
 
     def is_disk_full(self, error: exc.DatabaseError) -> bool:
@@ -125,11 +125,11 @@ class SqliteFile:
         return getattr(error.orig, "sqlite_errorcode", None) == sqlite3.SQLITE_FULL
 
     def words_for(self, error: exc.DatabaseError) -> str:  # noqa: ARG002
-        """Return that SQLite's own words do."""
+        """Return an empty text: SQLite's own message is enough."""
         return ""
 
     def was_committed(self, number: int) -> bool:  # noqa: ARG002
-        """Return that a commit that failed was not made."""
+        """Return False: a commit that failed was not made."""
         return False
 
     def note_address(self, address: ServiceAddress) -> None:

@@ -48,9 +48,9 @@ def transaction(
 def outlasting(
     method: Callable[Concatenate[RepositoryT, ArgumentsP], ResultT],
 ) -> Callable[Concatenate[RepositoryT, ArgumentsP], ResultT]:
-    """Mark a method that writes in this process: it is done again where the server did not answer, nothing being kept.
+    """Mark a method that writes in this process: it is repeated where the server did not answer and nothing was stored.
 
-    So it may change nothing of its own object before its transaction is committed.
+    So it may not change its own object before its transaction is committed.
     """
 
     @functools.wraps(method)

@@ -12,8 +12,7 @@ from instruments.clock import Clock, WallClock
 from labctl.errors import StoreError
 
 #: How long a writer waits for the one before, s of wall time. Transactions are short (some 50 ms): a process that
-#: holds the
-#: connection for so long is at fault, and an engine that cannot write down what it measures stops its table.
+#: holds the connection for so long is at fault, and an engine that cannot write down what it measures stops its table.
 WRITER_DEADLINE_S = 20.0
 #: How long it waits where the one before is overdue already, so that what must still be tried is tried at once.
 OVERDUE_DEADLINE_S = 0.5
@@ -72,7 +71,7 @@ class WriterTurn:
 
 
 def _caller() -> str:
-    """Return the function that asked for the connection: the first that only the outside calls."""
+    """Return the function that asked for the connection: the innermost public one outside of the database code."""
     frame = inspect.currentframe()
     while frame is not None and (frame.f_code.co_name.startswith("_") or frame.f_globals["__name__"] in PASSED_THROUGH):
         frame = frame.f_back

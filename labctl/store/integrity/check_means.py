@@ -18,7 +18,7 @@ ROUNDING = 1e-9
 
 
 class MeansCheck:
-    """Holds what is kept of each data set against its readings, whose blocks come in order."""
+    """Compares what is kept of each data set with its readings, whose blocks come in order."""
 
     def __init__(self, connection: sa.Connection) -> None:
         self._connection = connection

@@ -81,7 +81,7 @@ def _hash(previous: str, at: datetime, who: str, action: str, subject: str, deta
 
 
 def _hash_of_row(previous: str, at_us: Any, who: Any, action: Any, subject: Any, detail: Any) -> str | None:
-    """Return the hash that belongs to a row as it lies in the table; None when nothing of ours is there."""
+    """Return the hash of a row as it is in the table; None when its content is nothing that labctl writes."""
     try:
         at = EPOCH + timedelta(microseconds=int(at_us))
         return _hash(previous, at, who, action, subject, json.loads(detail))

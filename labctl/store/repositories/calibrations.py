@@ -82,7 +82,7 @@ def _add_recordings(connection: sa.Connection, calibration: int | None, recordin
         connection.execute(sa.insert(tables.calibration_recordings), values)
 
 
-#: Made once: what every GET asks.
+#: Built once: the queries behind every GET.
 _DOCUMENT = _document_query().where(tables.calibrations.c.version == sa.bindparam("version"))
 _IN_FORCE = _in_force_query()
 
@@ -219,8 +219,8 @@ class Calibrations:
     ) -> CertificationRow:
         """Put a version in force, or take the one in force out of it. Raises NotFound, Conflict.
 
-        `by` is the person who answers for it; `who` did it, where that is known better than by whose word;
-        `judgement` is what was known of the version.
+        `by` is the person who answers for it; `who` is the one who did it, where that is known otherwise than from
+        `by`; `judgement` is what was known of the version.
         """
         self.get(serial, version)
         last = self._last_act(serial)

@@ -29,7 +29,7 @@ from procedures.contracts.journal import NOT_SAFE, DataSetHeader, DataSetState, 
 from procedures.contracts.steps import StepResult
 from procedures.execution.signals import defer_signals
 
-#: Made once: a statement that is built anew for every second of a campaign costs more than writing it.
+#: Built once: a statement that is built anew for every second of a campaign costs more than writing it.
 _ADD_ENVIRONMENT = sa.insert(tables.environment)
 #: Of a turn by hand: what is known at its end, and the column of the readings that says it.
 KNOWN_LATE = {"table_rate_dps": "table_rate_dps", "gate_until_s": "t_s"}
@@ -262,7 +262,7 @@ class StoreJournal:
 
     @outlasting
     def event(self, event: Event, t_s: float, at: datetime) -> None:
-        """Record something worth telling a person; what is not safe not part of a calibration's status from then on."""
+        """Record something worth telling a person; a safe state that was not confirmed is also marked on the bench."""
         with self._writing() as connection:
             self._add_event(connection, event, t_s, at)
             if event.kind == "safe_state" and event.level == "error":

@@ -15,7 +15,7 @@ from labctl.store.schema import tables
 
 _k = tables.api_keys.c
 _ALL = sa.select(_k.name, _k.role, _k.digest, _k.created_at, _k.revoked_at)
-#: Made once: asked by every request that carries a key.
+#: Built once: the query behind every request that carries a key.
 _BY_DIGEST = _ALL.where(_k.digest == sa.bindparam("digest"))
 
 

@@ -146,7 +146,7 @@ class Imports:
                     return True
             r = tables.recordings
             serial = connection.scalar(sa.delete(r).where(r.c.id == number).returning(r.c.serial))
-        # nothing but a recording brings a unit in; another import that begins now may need the row: then it stays
+        # a unit is only ever added by a recording; where an import that begins just now needs the row, it stays
         with suppress(exc.IntegrityError), self._database.writing(synced=False) as connection:
             u = tables.units.c
             unused = ~sa.exists().where(r.c.serial == u.serial)

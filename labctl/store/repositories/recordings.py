@@ -59,7 +59,7 @@ class Recordings:
             what = {"serial": info.serial, "kind": info.kind, "rows": len(recording), **(simulated or {})}
             return imports.finish(ticket, at, "import" if simulated is None else "simulate", what)
         except BaseException:
-            with suppress(LabctlError):  # what cannot be discarded now is, when the database is opened for writing
+            with suppress(LabctlError):  # what is left is discarded when the database is next opened for writing
                 imports.discard(ticket)
             raise
 

@@ -19,7 +19,7 @@ from procedures.contracts.campaign_state import CampaignState
 from procedures.contracts.journal import DataSetState
 from procedures.contracts.steps import StepResult
 
-#: Events after which a temperature has to be soaked again, and those that say that it was.
+#: Events after which a temperature has to be soaked again, and events after which it has been.
 OWED, PAID = ("taken_up", "soak_owed"), ("lead_in_done", "soaked_again")
 FINISHED = frozenset({"done", "skipped"})
 
@@ -29,7 +29,7 @@ class ResumePoint:
     """Where a campaign resumes that no process runs."""
 
     start_at: int  #: the first step that has to be run
-    complete: frozenset[int]  #: steps whose data set was complete when the process ended, before it was said
+    complete: frozenset[int]  #: steps whose data set was complete when the process ended, before their end was recorded
     skipped: frozenset[int]
     last_t_s: float  #: campaign time of the last sign of life
     last_at: datetime

@@ -22,7 +22,7 @@ def _blocks_query() -> sa.Select[int, int, int, int, bytes]:
     return sa.select(b.number, b.n, b.codec, b.crc32, b.data).where(*ours).order_by(b.number, b.seq)
 
 
-#: Made once: all data sets of a recording are asked by it, some at a time.
+#: Built once: it is run for all data sets of a recording, some at a time.
 _BLOCKS = _blocks_query()
 _ADD_BLOCK = sa.insert(tables.sample_blocks)
 

@@ -52,7 +52,7 @@ class Units:
         self._database = database
 
     def get(self, serial: str) -> Unit:
-        """Return a unit; raises NotFound naming the nearest things to do."""
+        """Return a unit; raises NotFound, which says how a unit is added."""
         with self._database.reading() as connection:
             row = connection.execute(sa.select(tables.units).where(tables.units.c.serial == serial, SEEN)).first()
         if row is None:
@@ -101,7 +101,7 @@ def _served_version() -> sa.Select[*tuple[Any, ...]]:
     )
 
 
-#: Made once: what every GET of a calibration asks.
+#: Built once: the queries behind every GET of a calibration.
 _IN_FORCE, _VERSION = _served_in_force(), _served_version()
 
 
@@ -125,7 +125,7 @@ class Certifications:
         return ServedCalibration(bytes(row.document), str(row.hash), act, in_force)
 
     def in_force(self) -> dict[str, CertificationRow]:
-        """Return the act that put the version in force there, by serial number of every unit that has one."""
+        """Return serial number -> the act that put its version in force, for every unit that has a version in force."""
         last = sa.select(sa.func.max(_X.id)).group_by(_X.serial)
         query = sa.select(_X.serial, *_ACT).where(_X.id.in_(last), _X.act == "certify")
         with self._database.reading() as connection:

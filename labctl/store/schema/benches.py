@@ -14,11 +14,11 @@ benches = sa.Table(
     sa.Column("last_used_at", Instant, nullable=False),
     sa.Column(
         "unconfirmed", sa.Text, nullable=False, server_default=""
-    ),  #: of the safe state; until a person clears it
+    ),  #: what the safe state could not confirm; until a person clears it
     sa.Column("unconfirmed_at", Instant),
-    sa.Column("attempts", sa.Integer, nullable=False, server_default="0"),  #: of the safe state, since then
+    sa.Column("attempts", sa.Integer, nullable=False, server_default="0"),  #: at the safe state, since then
     sa.Column("attempted_at", Instant),
-    sa.Column("confirmed_at", Instant),  #: by such an attempt; a person has still to look
+    sa.Column("confirmed_at", Instant),  #: when such an attempt confirmed it; a person has still to look
 )
 
 leases = sa.Table(

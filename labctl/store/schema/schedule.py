@@ -6,7 +6,7 @@ import sqlalchemy as sa
 
 from labctl.store.schema.types import Instant, RowId, id_column, metadata
 
-#: Campaigns that are to begin later. `due_at` is the next start that waits; a single start keeps its own when it ended.
+#: Campaigns that are to begin later. `due_at` is the next start; a single start keeps its time once it is over.
 scheduled_starts = sa.Table(
     "scheduled_starts",
     metadata,

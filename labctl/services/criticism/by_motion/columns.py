@@ -14,7 +14,7 @@ from labctl.fitting.data.temperature.legs import legs_of
 from labctl.fitting.numeric.arrays import Array
 from labctl.services.schemas.comparison import ProfileColumns, RestColumns, TurnColumns
 
-#: _Rows of one axis that a picture of a profile takes.
+#: Rows of one axis that a picture of a profile takes.
 MOST_ROWS = 6000
 #: axis -> (m,) corrected minus true rate, deg/s; None without a version.
 Errors = Mapping[str, Array] | None

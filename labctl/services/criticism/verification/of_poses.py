@@ -20,7 +20,7 @@ ANY_C = 25.0
 def errors_in_poses(
     calibration: Calibration, recording: Recording
 ) -> tuple[Array, dict[str, Array], NDArray[np.bool_]]:
-    """Return errors of all components that gravity shows, (2m,), axis -> (m,), deg/s, and outside, (m,), of m turns.
+    """Return the errors of m turns, deg/s: all components that gravity shows, (2m,), axis -> (m,), and outside, (m,).
 
     Raises BadInput where version and recording do not fit, NotEnoughData for too few rests.
     """

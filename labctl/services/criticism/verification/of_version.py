@@ -104,9 +104,10 @@ def _channels(compensator: Compensator, data: FitData) -> Mapping[str, NDArray[n
 
 
 def expected_dps(row: CalibrationRecord) -> float | None:
-    """Return the error that a version promises for a data set: held-out, else of its own data; None where unknown.
+    """Return the error that a version promises for a data set, deg/s; None where it is unknown.
 
-    A version of poses promises what its exported part leaves: without the sensitivity to specific force.
+    It is the largest of its held-out errors and the error of its own data. A version of poses promises what its
+    exported part leaves: without the sensitivity to specific force.
     """
     if "poses" in row.answer:
         return row.answer["poses"]["moves"]["applied_rms_dps"]
