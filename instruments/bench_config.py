@@ -98,7 +98,7 @@ class GyroSettings(DeviceSettings):
 
 
 class ReferenceSettings(DeviceSettings):
-    """A reference thermometer or hygrometer: an instrument of its own, whose value is traceable by itself."""
+    """A reference thermometer or hygrometer: a separate instrument with its own traceable calibration."""
 
     name: str = "reference"
     serial: str = ""  #: of the readout; compared with what it says of itself, where it says something

@@ -20,7 +20,7 @@ class NoOptions(BaseModel):
 
 
 class TableOptions(BaseModel):
-    """Options of an importer that gives a table; its column map knows the rest."""
+    """Options of an importer that returns a table; the rest is in its column map."""
 
     model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True)
 

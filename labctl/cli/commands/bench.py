@@ -42,7 +42,7 @@ def check(
 
 @app.command("ports")
 def ports(as_json: Json = False, database: Database = None) -> None:  # noqa: ARG001  every command takes it
-    """List the serial ports of this computer: name for a bench file, USB adapter, and what keeps from its use."""
+    """List the serial ports of this computer: name for a bench file, USB adapter, and what prevents its use."""
     from labctl.services.benches.ports import list_ports
 
     found = list_ports()
@@ -120,7 +120,9 @@ def wiggle(
     as_json: Json = False,
     database: Database = None,  # noqa: ARG001  every command takes it
 ) -> None:
-    """Turn one unit after the other by hand when asked, and learn which port moved; exit 1 where one is another's."""
+    """Turn one unit after the other by hand when asked, and learn on which port each is; exit 1 where a port is
+    another unit's.
+    """
     from labctl.services.benches.wiggle import wiggle as wiggle_test
 
     say = stderr if as_json else console

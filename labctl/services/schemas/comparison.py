@@ -206,7 +206,7 @@ class PoseColumns(ResponseModel):
 
 
 class MotionResponse(ResponseModel):
-    """A recording by what moved the unit; of `rest`, `turns`, `profile` and `poses` one is there."""
+    """A recording by what moved the unit; exactly one of `rest`, `turns`, `profile` and `poses` is present."""
 
     serial: str
     recording: int

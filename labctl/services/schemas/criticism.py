@@ -119,7 +119,7 @@ class CriticismResponse(ResponseModel):
 
 
 class StageResponse(ResponseModel):
-    """Of a criticism that is followed: the stage that begins."""
+    """The stage of a followed criticism that begins now."""
 
     stage: str
 

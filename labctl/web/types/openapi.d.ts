@@ -3127,7 +3127,7 @@ export interface components {
         };
         /**
          * CriticisedNoise
-         * @description Noise of the recording; `vs_datasheet`: the drift over what the data sheet lets expect.
+         * @description Noise of the recording; `vs_datasheet`: the drift divided by what the data sheet lets expect.
          */
         CriticisedNoise: {
             /** White Dps */
@@ -3748,7 +3748,7 @@ export interface components {
         };
         /**
          * EffectAgreement
-         * @description Whether recordings, each fitted alone, agree on an effect: chi2 of the differences; null without freedom.
+         * @description Whether recordings, each fitted alone, agree on an effect: chi2 of the differences; null: no freedom left.
          */
         EffectAgreement: {
             /** Effect */
@@ -4970,7 +4970,7 @@ export interface components {
         };
         /**
          * MotionResponse
-         * @description A recording by what moved the unit; of `rest`, `turns`, `profile` and `poses` one is there.
+         * @description A recording by what moved the unit; exactly one of `rest`, `turns`, `profile` and `poses` is present.
          */
         MotionResponse: {
             /** Serial */
@@ -6341,7 +6341,7 @@ export interface components {
         };
         /**
          * StageResponse
-         * @description Of a criticism that is followed: the stage that begins.
+         * @description The stage of a followed criticism that begins now.
          */
         StageResponse: {
             /** Stage */
