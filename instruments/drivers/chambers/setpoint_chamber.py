@@ -135,8 +135,8 @@ class SetpointChamber(ABC):
             raise LimitError(
                 self.name,
                 f"set point {temperature_c:g} deg C lies outside the limits, {limits.min_c:g} to "
-                f"{limits.max_c:g} deg C (the narrower ones of controller and bench file); nothing was written: "
-                "ask for a set point within these limits",
+                f"{limits.max_c:g} deg C (the narrower of those of the controller and of the bench file); nothing was "
+                "written: ask for a set point within these limits",
             )
         return rounded
 

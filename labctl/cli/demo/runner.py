@@ -69,7 +69,10 @@ class DemoRunner:
 
             answer = run(self.store, prepared, observe=seen)
         if answer.state is not CampaignState.DONE:
-            raise RuntimeError(f"campaign {answer.id} of the demo ended in the state {answer.state}: {answer.reason}")
+            raise RuntimeError(
+                f"campaign {answer.id} of the demo ended in the state {answer.state}: {answer.reason}; "
+                "run the demo again"
+            )
         assert answer.started_at is not None
         assert answer.ended_at is not None
         hours = (answer.ended_at - answer.started_at).total_seconds() / 3600

@@ -90,8 +90,8 @@ class LegError(ResponseModel):
     """How well one leg, a stretch of heating or of cooling, is predicted by a fit to the others."""
 
     fitted: str = Field(
-        description="Data sets that the model was fitted to: those measured while heating, "
-        "while cooling, or all legs but one."
+        description="Data sets that the model was fitted to: those measured while heating, while cooling, or those of "
+        "all legs (stretches of heating or cooling) but the one that is predicted."
     )
     tested: str = Field(
         description="Data sets that this fit predicted: those measured while cooling, while "

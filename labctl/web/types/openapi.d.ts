@@ -4678,7 +4678,7 @@ export interface components {
         LegError: {
             /**
              * Fitted
-             * @description Data sets that the model was fitted to: those measured while heating, while cooling, or all legs but one.
+             * @description Data sets that the model was fitted to: those measured while heating, while cooling, or those of all legs (stretches of heating or cooling) but the one that is predicted.
              */
             fitted: string;
             /**

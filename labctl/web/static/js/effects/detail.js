@@ -130,7 +130,7 @@ export function effectDetail(effect, all) {
       effect.leaves ? "good" : "",
       h("strong", {}, effect.leaves ? "Exported. " : "Not exported. "),
       effect.leaves
-        ? "The effect is part of a calibration: the class Compensator subtracts it."
+        ? "A calibration can contain this effect. The Python class Compensator, which applies a calibration to readings, then subtracts it."
         : ["sensor", "package"].includes(effect.origin)
           ? "The effect is a property of the unit, but its correction needs channels that are measured only on the bench."
           : about,

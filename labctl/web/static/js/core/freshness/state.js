@@ -55,7 +55,7 @@ export function freshnessWords(found, { service_s, bench_s, trouble, clock }) {
     return { stale: true, text: `The service answers, but it did not send the data for this page: ${trouble}` };
   const bench = bench_s === null ? "" : ago(bench_s);
   if (found === "bench") {
-    const what = "The values of the bench on this page may be out of date.";
+    const what = "The values of the bench on this page may be out of date; they follow by themselves once it answers.";
     return { stale: true, text: `Last answer of the bench ${bench}; the service answers. ${what}` };
   }
   if (service_s === null || bench_s === null) return { stale: false, text: service };
