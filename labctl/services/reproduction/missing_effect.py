@@ -33,7 +33,7 @@ def _in(store: Store, readings: Recording, of: str) -> Findings:
     answer = criticise_unit(store, serial, None, None)
     error = fitted.error
     stalled = (
-        f"An effect is missing from the model yang2018: it reduces the RMS error from {_said(error.raw_rms_dps)} to "
+        f"The model yang2018 lacks an effect: it reduces the RMS error from {_said(error.raw_rms_dps)} to "
         f"{_said(error.rms_dps)} deg/s, but the noise floor is {_said(error.noise_floor_dps)} deg/s. The criticism of "
         f"the model reports: {' '.join(answer.text)}"
     )

@@ -147,7 +147,9 @@ class UncertaintyResponse(ResponseModel):
     coefficients: dict[str, dict[str, BudgetResponse]] = Field(
         description="For each axis: the budgets of bias, scale factor and misalignments at this temperature."
     )
-    not_stated: list[str] = Field(description="Standards that the bench does not state; they are not in U.")
+    not_stated: list[str] = Field(
+        description="Reference standards whose uncertainty the bench file does not state; U does not contain their contributions."
+    )
     overdue: bool = Field(description="Whether a standard was past its due date when it was used.")
     grid: UncertaintyGrid | None = Field(
         default=None, description="The uncertainty over the calibrated range; null unless `grid` was requested."

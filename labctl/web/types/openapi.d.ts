@@ -6202,7 +6202,7 @@ export interface components {
             recipe: string;
             /**
              * State
-             * @description State of the start: waiting, ended or cancelled.
+             * @description State of the entry: waiting for its time, ended (no start is to come) or cancelled.
              */
             state: string;
             /**
@@ -6893,7 +6893,7 @@ export interface components {
             };
             /**
              * Not Stated
-             * @description Standards that the bench does not state; they are not in U.
+             * @description Reference standards whose uncertainty the bench file does not state; U does not contain their contributions.
              */
             not_stated: string[];
             /**

@@ -85,7 +85,7 @@ def test_without_times_rows_belong_together_one_by_one(tmp_path: Path) -> None:
             line(50, 0.01, start=3.0),
             (
                 r"there is no reading within 5 steps of time 0 of a\.csv \(row 1; 50 rows without a "
-                r"reading\): its own times go from 3 to 3\.49"
+                r"reading\): the times of the other file go from 3 to 3\.49"
             ),
         ),
         (line(50, 10.0), r"there is no reading within 5 steps of time .*: its own times"),

@@ -172,7 +172,7 @@ function sizeCard(effect) {
       "p",
       { class: "muted small" },
       effect.unit === "1"
-        ? "Values are ratios to the rate, or to the full effect. ppm: millionths."
+        ? "Values without a unit or in ppm (millionths) are ratios: to the rate, or, where the coefficient scales another effect, to that effect."
         : "Plausible sizes of its first coefficient.",
     ),
   );
