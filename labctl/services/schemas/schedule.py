@@ -27,9 +27,7 @@ class ScheduledResponse(ResponseModel):
     id: int
     bench: str
     recipe: str
-    state: str = Field(
-        description="State of the entry: waiting for its time, ended (no start is to come) or cancelled."
-    )
+    state: str = Field(description="State of the entry: waiting, ended (no start is to come) or cancelled.")
     due_at: datetime | None = Field(description="Time of the next start, in `time_zone`; null: no start is to come.")
     time_zone: str
     cron: str | None

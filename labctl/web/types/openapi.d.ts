@@ -6202,7 +6202,7 @@ export interface components {
             recipe: string;
             /**
              * State
-             * @description State of the entry: waiting for its time, ended (no start is to come) or cancelled.
+             * @description State of the entry: waiting, ended (no start is to come) or cancelled.
              */
             state: string;
             /**
