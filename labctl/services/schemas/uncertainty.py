@@ -148,8 +148,8 @@ class UncertaintyResponse(ResponseModel):
         description="For each axis: the budgets of bias, scale factor and misalignments at this temperature."
     )
     not_stated: list[str] = Field(
-        description="Reference standards whose uncertainty the bench file does not state; "
-        "U does not contain their contributions."
+        description="Reference standards whose uncertainty the bench file does not "
+        "state; U does not contain their contributions."
     )
     overdue: bool = Field(description="Whether a standard was past its due date when it was used.")
     grid: UncertaintyGrid | None = Field(
