@@ -93,8 +93,8 @@ def _refuse_apart(table: RawTable, at: Array, other: RawTable, theirs: Array) ->
             other,
             f"there is no reading within {MOST_STEPS:.0f} steps of time {at[row]:.9g} of {table.path.name} (row "
             f"{row + 1}; {int(apart.sum())} rows without a reading): the times of the other file go from "
-            f"{theirs[0]:.9g} to {theirs[-1]:.9g}, in steps of {np.median(steps):.3g}. Give both files the same clock and the same "
-            "unit of time",
+            f"{theirs[0]:.9g} to {theirs[-1]:.9g}, in steps of {np.median(steps):.3g}. Give both files the same clock "
+            "and the same unit of time",
         )
 
 
