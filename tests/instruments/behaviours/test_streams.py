@@ -197,8 +197,8 @@ SET_OTHERWISE = (
 STANDS = (
     MalformedReply,
     (
-        r"the sample counter on sim://\S+ does not advance: it is \d+ in \d+ successive readings; check in "
-        r"the bench file which field of the frame is the counter"
+        r"the sample counter on sim://\S+ does not advance: it is \d+ in \d+ successive readings; check "
+        r"that the bench file names the right field of the frame as the counter"
     ),
 )
 SPECIAL = [

@@ -181,7 +181,7 @@ def test_a_direction_turns_rate_and_angle_round(stand: Make) -> None:
 def test_host_or_port_but_not_both() -> None:
     record = read_bench("servo-sim").model_dump()
     for wrong in ({"host": None}, {"port": "/dev/ttyUSB0"}):
-        with pytest.raises(ValueError, match="give one address of the controller"):
+        with pytest.raises(ValueError, match="give either host"):
             resolve(BenchFile.model_validate({**record, "table": {**record["table"], **wrong}}))
 
 
