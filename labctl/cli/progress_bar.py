@@ -43,7 +43,7 @@ class CampaignProgress:
 
     @property
     def is_shown(self) -> bool:
-        """Whether anybody sees the bar."""
+        """Whether the bar is displayed: standard error is a terminal, and it was not turned off."""
         return not self._progress.disable
 
     def update(self, answer: CampaignResponse) -> None:

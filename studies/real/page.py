@@ -31,14 +31,16 @@ NOTES = """\
 - The choice of the quiet sections that count as rests changes elements of the matrix. Neither labctl's uncertainty
   nor that of the independent analysis includes the effect of this choice. If the independent analysis of
   mpu9150-2 uses the rests that labctl finds, it gives 7.5 +- 1.6 for the element that disagrees (labctl 7.9 +- 2.4,
-  published 8.4). One more rest of 1.7 s changes an element of mpu9150-1 by 2 in 1e-3.
+  published 8.4). If one more rest of 1.7 s is used, an element of the matrix of mpu9150-1
+  changes by 2e-3.
 - At rest labctl's U is 1.5 to 6 times that of the independent analysis. labctl treats slow variations of the
   output as drift that lasts for minutes; the independent analysis assumes that sections of 2 min, or bursts, are
   independent. These data cannot show which assumption is right.
 - Where the autopilots' cubic has less error than labctl's parabola, the bias differs from a parabola by less than
   the criticism considers significant: `labctl fit PAN-2020 --effects bias,bias_temperature:3` gives a held-out
   error of 0.0069 deg/s in place of 0.0073 deg/s.
-- For recordings in poses no criticism is possible. For recordings with one turn about each axis neither a
+- A recording of poses (the unit is held still in one position after another, without a rate table) cannot be
+  criticised, because the rates during the moves are not known. For recordings with one turn about each axis neither a
   criticism nor a held-out error is possible."""
 THERMAL = """\
 The formulas of the autopilots PX4 and ArduPilot fit cubics in temperature to the samples (the results agree with

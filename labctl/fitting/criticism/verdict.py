@@ -274,10 +274,9 @@ def channels_behind(comparison: Comparison) -> tuple[str, ...]:
 
 
 def probabilities(candidates: Sequence[Candidate]) -> dict[str, float]:
-    """Return effect id -> probability that it is the one missing.
+    """Return effect id -> probability that it is the one missing; 0 for a size that the technology cannot have.
 
-    The prior probability that nothing is missing is that of all effects together. The probability is 0 for an effect of
-    a size that the unit's technology cannot have.
+    The prior probability that nothing is missing is that of all effects together.
     """
     effects = [c for c in candidates if not c.smooth]
     log_bf = np.array([c.log_bf if c.physical else -np.inf for c in effects]) - np.log(max(len(effects), 1))

@@ -83,7 +83,7 @@ def test_what_cannot_be_followed_is_named(tmp_path: Path, turned: dict[str, np.n
     with pytest.raises(BadRecording, match=r"column 't_s', row 2: 109\.9 s is not later than"):
         follow({**turned, "t_s": turned["t_s"][::-1]})
     source = write(tmp_path / "in.csv", turned)
-    with pytest.raises(BadInput, match="result file other than the input"):
+    with pytest.raises(BadInput, match="name another file for the result"):
         orientation_of_file(source, None, source, OrientationOptions())
 
 

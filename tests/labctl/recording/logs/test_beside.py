@@ -88,7 +88,7 @@ def test_without_times_rows_belong_together_one_by_one(tmp_path: Path) -> None:
                 r"reading\): the times of the other file go from 3 to 3\.49"
             ),
         ),
-        (line(50, 10.0), r"there is no reading within 5 steps of time .*: its own times"),
+        (line(50, 10.0), r"there is no reading within 5 steps of time .*: the times of the other file"),
         (line(50, 0.01)[::-1], "do not increase from row to row"),
         (
             np.delete(line(50, 0.01), slice(20, 40), axis=0),
