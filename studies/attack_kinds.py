@@ -177,18 +177,13 @@ def imports(target: Target) -> AbstractContextManager[None]:
 @contextmanager
 def all_cores_busy(_: Target) -> Iterator[None]:
     """Four other processes for each core take all the processor time that they get."""
-    context = multiprocessing.get_context("spawn")
-    burners = [context.Process(target=_burn, daemon=True) for _ in range(4 * (os.cpu_count() or 1))]
-    for burner in burners:
-        burner.start()
-    try:
+    with ExitStack() as burning:
+        for number in range(4 * (os.cpu_count() or 1)):
+            burning.enter_context(_from_another_process(_burn, number))
         yield
-    finally:
-        for burner in burners:
-            burner.kill()
 
 
-def _burn() -> None:
+def _burn(_: int) -> None:
     while True:
         pass
 
