@@ -164,7 +164,7 @@ class BenchRunner:
             if job is not None and job.row.id == campaign:
                 if not job.control.request.pause:
                     raise Conflict(
-                        f"campaign {campaign} is running, so it cannot be resumed; pause it first, or let it run"
+                        f"campaign {campaign} is running, so there is nothing to resume; let it run"
                     )
                 job.control.resume(f"{request.reason or 'goes on'} ({request.by})")
             else:

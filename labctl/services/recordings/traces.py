@@ -72,7 +72,7 @@ def _window(
 ) -> tuple[float | None, float | None]:
     for name, value in (("from_s", from_s), ("until_s", until_s)):
         if value is not None and not math.isfinite(value):
-            raise BadInput(f"{name} = {value} s: give a number")
+            raise BadInput(f"{name} = {value} s: give a finite number")
     low = from_s if from_s is not None else min(begins, default=None)
     high = until_s if until_s is not None else max(ends, default=None)
     if low is not None and high is not None and (low > high or (low == high and from_s is not None)):

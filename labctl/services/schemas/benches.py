@@ -33,7 +33,7 @@ class BenchStatus(ResponseModel):
     )
     unconfirmed_at: datetime | None = None
     attempts: int = Field(
-        default=0, description="How often labctl has tried again to set the safe state since `unconfirmed_at`."
+        default=0, description="How many times labctl has tried again to set the safe state since `unconfirmed_at`."
     )
     attempted_at: datetime | None = None
     confirmed_at: datetime | None = Field(

@@ -140,7 +140,9 @@ class FittedResponse(ResponseModel):
     validity: Validity
     warnings: list[DataWarning] = Field(default_factory=list, description=WARNINGS)
     noise: dict[str, AxisNoiseJson] = Field(
-        default_factory=dict, description="For each axis: white noise and drift that set the weights of the fit, deg/s."
+        default_factory=dict,
+        description="For each axis: white noise of the mean of a data set and drift of the bias between data sets, deg/s "
+        "(standard deviations); the weights of the fit follow from them.",
     )
     environment: FitEnvironment = Field(
         default_factory=FitEnvironment,
@@ -156,8 +158,8 @@ class FittedResponse(ResponseModel):
     recordings: list[int] = Field(default_factory=list, description=FITTED_TO)
     joint: JointJson | None = Field(
         default=None,
-        description="Only for several recordings: repeatability, agreement, and the error when "
-        "each is predicted by a fit to the others.",
+        description="Only for several recordings: repeatability, agreement between the recordings, and the error "
+        "when each recording is predicted by a fit to the others.",
     )
 
 

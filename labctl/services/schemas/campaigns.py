@@ -34,8 +34,8 @@ class CampaignRequest(Request):
     hide: list[str] = Field(
         default_factory=list,
         max_length=20,
-        description="Effects to hide in the units of a simulated bench, each as EFFECT or EFFECT=SIZE, SIZE in the "
-        "unit of the effect, or z10 for a signal of ten standard deviations of the noise on this plan.",
+        description="Effects to hide in the simulated gyros, each as EFFECT or EFFECT=SIZE; SIZE is a number in the "
+        "unit of the effect, or zN, such as z10, for a signal of N standard deviations of the noise on this plan.",
     )
     fit: bool = Field(
         default=True,
@@ -46,7 +46,7 @@ class CampaignRequest(Request):
         default=None,
         max_length=64,
         description="Time of the start, ISO 8601; a time without an offset is in `time_zone`. `now`: start as soon "
-        "as the bench is free. Default: start at once.",
+        "as the bench is free. Default: start at once, or status 409 if the bench is not free.",
     )
     cron: str | None = Field(
         default=None,

@@ -67,8 +67,8 @@ class CriticismResponse(ResponseModel):
     )
     joint: JointJson | None = Field(
         default=None,
-        description="Only for several recordings: repeatability, agreement, and the error when each is "
-        "predicted by a fit to the others.",
+        description="Only for several recordings: repeatability, agreement between the recordings, and the error "
+        "when each recording is predicted by a fit to the others.",
     )
     verdict: Literal["adequate", "missing", "ambiguous", "unexplained", "insufficient_data"]
     text: list[str] = Field(description="The verdict in sentences, the conclusion first.")

@@ -92,7 +92,7 @@ def test_a_window_of_few_data_sets_is_drawn_from_the_readings(fast: TestClient, 
             {"channel": "gyro_y"},
             "recording 1 has no channel 'gyro_y'; choose one of gyro_z, table_rate_dps, temperature_c",
         ),
-        ({"from_s": "nan"}, "from_s = nan s: give a number"),
+        ({"from_s": "nan"}, "from_s = nan s: give a finite number"),
         ({"from_s": 5, "until_s": 5}, "give a start that is before the end"),
     ],
 )

@@ -19,7 +19,7 @@ class MeasuredUnder(ResponseModel):
         "was computed from the recording.",
     )
     temperature_c: tuple[float, float] | None = Field(
-        description="Lowest and highest temperature, deg C; null: unknown."
+        description="Lowest and highest temperature in the recording, deg C; null: unknown."
     )
     rate_dps: tuple[float, float] | None = Field(description="Lowest and highest rate, deg/s; null: unknown.")
     runs: int | None = Field(description="Number of power-on sessions; null: unknown.")

@@ -34,7 +34,8 @@ class RemainingLine(ResponseModel):
     bias_dps: float
     u_bias_dps: float
     scale_factor: float | None = Field(
-        description="Scale factor error: error divided by rate (1 = 100 %); null: the recording has only one rate."
+        description="Scale factor error: slope of the error over the rate (1 = 100 %); null: the recording has only "
+        "one rate."
     )
     u_scale_factor: float | None
 

@@ -66,7 +66,7 @@ export const stopButton = (campaign) =>
       },
       { kind: "danger large" },
     ),
-    { title: "End the campaign now, in the safe state" },
+    { title: "End the campaign now and bring the bench to its safe state" },
   );
 
 /** @param {number} campaign */

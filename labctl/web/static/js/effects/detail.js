@@ -103,7 +103,7 @@ export function effectDetail(effect, all) {
             : h(
                 "p",
                 { class: "muted" },
-                "No other effect of the catalogue has the same signature on every schedule. With a given schedule of rates and temperatures other effects may look similar; the criticism lists them.",
+                "No other effect of the catalogue has the same signature on every schedule. With a given schedule of rates and temperatures other effects may look similar: then the verdict on a fit lists all of them.",
               ),
         ),
         card(
@@ -120,7 +120,7 @@ export function effectDetail(effect, all) {
                 ),
                 ".",
               )
-            : h("p", {}, "Rate and temperature are enough."),
+            : h("p", {}, "A recording with rate and temperature is enough to test for this effect."),
           axesParagraph(effect),
         ),
       ),
