@@ -14,6 +14,7 @@ import shutil
 import subprocess
 import tempfile
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,6 +22,7 @@ import numpy as np
 
 from labctl.calibration import Calibration
 from labctl.compensator import Compensator
+from labctl.errors import BadInput
 from labctl.exports import written_calibration
 from labctl.exports.c_header import c_name
 from labctl.fitting.numeric.rounding import at_most
@@ -112,7 +114,8 @@ def variants(calibration: Calibration, given: Points, folder: Path) -> Iterator[
         rates = compiled(calibration, header, number, rows, folder)
         yield number, float(np.abs(rates - given.rate).max()), _stated(header, before)
     if np.isfinite(calibration.temperature_c).all() and not Compensator(calibration).remembers:
-        yield ("Q31", *_fixed(calibration, given, folder))
+        with suppress(BadInput):
+            yield ("Q31", *_fixed(calibration, given, folder))
 
 
 def _stated(header: bytes, before: str) -> float:

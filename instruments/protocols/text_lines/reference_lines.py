@@ -100,7 +100,8 @@ class LineReferenceSettings(ReferenceSettings):
     def _is_known(cls, model: str) -> str:
         if model and model not in MODELS:
             raise ValueError(
-                f"model {model!r} is not known; choose one of {', '.join(MODELS)}, or leave model out and state each quantity in quantities"
+                f"model {model!r} is not known; choose one of {', '.join(MODELS)}, or leave model out and state each "
+                "quantity in quantities"
             )
         return model
 

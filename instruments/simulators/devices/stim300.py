@@ -37,7 +37,7 @@ from instruments.protocols.stim300.frames import (
     TEMPERATURE_PER_LSB,
     layout_of,
 )
-from instruments.protocols.stim300.layouts import Bytes
+from instruments.protocols.stim300.layouts import Bytes, Layout
 from instruments.protocols.stim300.settings import Stim300Settings
 from instruments.simulators.setup import InstrumentSetup
 
@@ -77,6 +77,16 @@ def _serial_of(gyro: GyroSettings) -> str:
     return "N" + (known[1] if known else f"{zlib.crc32(gyro.serial.encode()):014d}")
 
 
+def _constant_part(layout: Layout) -> Bytes:
+    """Return a datagram, (stride,), with what is the same in each: identifier, latency and line end; the rest is 0."""
+    found = np.zeros(layout.stride, dtype=np.uint8)
+    found[0] = layout.id
+    found[layout.counter + 1 : layout.counter + 3] = np.array([LATENCY_US], dtype=">u2").view(np.uint8)
+    if layout.crlf:
+        found[layout.length :] = (0x0D, 0x0A)
+    return found
+
+
 class SimulatedStim300:
     """Encodes the world's unit; frames that do not fit into the port's buffer are lost."""
 
@@ -86,6 +96,7 @@ class SimulatedStim300:
         chosen = {"datagram": device.datagram, "crlf": device.crlf}
         options = options.model_copy(update={name: value for name, value in chosen.items() if value is not None})
         self._layout = layout_of(options)
+        self._constant = _constant_part(self._layout)
         self._unit, self._faults = setup.unit, setup.faults
         self._columns = [AXES.index(axis) for axis in setup.gyro.axes]
         self._rate_hz = float(device.sample_rate_hz or self._unit.sample_rate_hz)
@@ -177,18 +188,25 @@ class SimulatedStim300:
             steps_deg = (steps_deg + half) % INTEGRATED_WRAP_DEG - half
         return np.rint(steps_deg / ANGLE_PER_LSB)
 
+    def _on_three_axes(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return values of the unit's axes, (n, axes), as those of x, y and z, (n, 3), with 0 for one that it lacks."""
+        if self._columns == [0, 1, 2]:
+            return values
+        found = np.zeros((len(values), 3))
+        found[:, self._columns] = values
+        return found
+
     def _encode(self, index: NDArray[np.int64], t_s: float) -> Bytes:
         layout, n = self._layout, len(index)
         sample = self._unit.sample(index / self._rate_hz)
-        frames = np.zeros((n, layout.stride), dtype=np.uint8)
-        frames[:, 0] = layout.id
-        rates = np.zeros((n, 3))
-        warm = np.zeros((n, 3))
-        rates[:, self._columns], warm[:, self._columns] = sample.rate_dps, sample.temperature_c
+        frames = np.empty((n, layout.stride), dtype=np.uint8)
+        frames[:] = self._constant
+        rates, warm = self._on_three_axes(sample.rate_dps), self._on_three_axes(sample.temperature_c)
         over = np.abs(rates) > SATURATION_DPS
         words = self._words(rates).astype(">i4")
         frames[:, 1:10] = words.view(np.uint8).reshape(n, 3, 4)[:, :, 1:].reshape(n, 9)
-        frames[:, layout.status] = np.where(over.any(axis=1), OVERLOAD, 0) | (over @ np.array([1, 2, 4]))
+        if over.any():
+            frames[:, layout.status] = np.where(over.any(axis=1), OVERLOAD, 0) | (over @ np.array([1, 2, 4]))
         if self._starts_until:
             frames[index < self._starts_until, layout.status] |= START_UP
         if layout.temperature is not None:
@@ -198,10 +216,7 @@ class SimulatedStim300:
         if (gap := self._faults.trigger(["counter_gap"], t_s)) is not None:
             skip = gap.value
         frames[:, layout.counter] = (index * self._step) % 256
-        frames[:, layout.counter + 1 : layout.counter + 3] = np.array([LATENCY_US], dtype=">u2").view(np.uint8)
         frames[:, layout.covered : layout.length] = layout.crc(frames).astype(">u4").view(np.uint8).reshape(n, 4)
-        if layout.crlf:
-            frames[:, layout.length :] = (0x0D, 0x0A)
         if self._faults.trigger(["wrong_crc"], t_s) is not None:
             frames[0, layout.covered] ^= 0x55
         return frames[skip:]

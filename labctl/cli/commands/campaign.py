@@ -82,8 +82,8 @@ Hide = Annotated[
     typer.Option(
         "--hide",
         metavar="EFFECT[=SIZE]",
-        help="Hide an effect in the simulated gyros; may be repeated; SIZE is a number in the unit of the effect, or zN, "
-        "such as z10, for a signal of N standard deviations of the noise on this plan.",
+        help="Hide an effect in the simulated gyros; may be repeated; SIZE is a number in the unit of the effect, or "
+        "zN, such as z10, for a signal of N standard deviations of the noise on this plan.",
     ),
 ]
 NoFit = Annotated[

@@ -15,14 +15,14 @@ from numpy.typing import NDArray
 
 from labctl.compensator import MARGIN_C, output_limits_dps
 from labctl.errors import BadInput
-from labctl.exports.static_part import StaticPart
+from labctl.exports.static_part import StaticPart, all_turning
 from labctl.fitting.numeric.arrays import Array
 
 Whole = NDArray[np.int64]
 Q31, Q16, POSITION_BITS, RECIPROCAL_BITS = 31, 16, 24, 32
 MOST_Q31 = 2**31 - 1
 #: Highest order of the polynomials; the lowest order that is within NEAR of the calibration is taken, and the highest
-#: has to be within NEAR_ENOUGH, both as shares of the full scale.
+#: has to be within NEAR_ENOUGH, both as shares of the full scale; so has what several axes cause only together.
 MOST_ORDER, NEAR, NEAR_ENOUGH = 11, 2.0**-30, 2.0**-18
 #: Coefficients of an axis may add up to this share of the full scale: no sum and no product leaves its 64 bits.
 FILLED = 0.99
@@ -114,6 +114,12 @@ def fixed_point(part: StaticPart, nodes: int, format_name: str) -> FixedPoint:
             f"format {format_name}: polynomials of order {MOST_ORDER} in the output differ from model "
             f"{part.calibration.fitted.model.name} by up to {off:.2g} deg/s; use format c or json"
         )
+    if (joint := _of_several_axes(part)) > NEAR_ENOUGH * full_scale:
+        raise BadInput(
+            f"format {format_name}: it adds up the errors that the output of each axis causes, and while several axes "
+            f"turn model {part.calibration.fitted.model.name} differs from this sum by up to {joint:.2g} deg/s; use "
+            "format c or json"
+        )
     largest = float(np.abs(coefficients).max(axis=-1).sum(axis=(1, 2)).max())
     room = FILLED * full_scale
     shift = max(0, math.floor(math.log2(room / max(largest, full_scale * 2.0**-20))))
@@ -126,6 +132,18 @@ def fixed_point(part: StaticPart, nodes: int, format_name: str) -> FixedPoint:
     inside = (math.floor((low - MARGIN_C) * 2**Q16), math.ceil((high + MARGIN_C) * 2**Q16))
     limits = (math.floor(slowest / full_scale * 2**Q31), math.ceil(fastest / full_scale * 2**Q31))
     return FixedPoint(tables, full_scale, shift, low_q16, high_q16, inside, limits)
+
+
+def _of_several_axes(part: StaticPart) -> float:
+    """Return how far the error is from the sum of those that the output of each axis alone causes, deg/s."""
+    raw, warm = all_turning(part)
+    apart = raw - part.rate(raw, warm)
+    still = -part.rate(np.zeros_like(raw), warm)
+    for by in range(raw.shape[1]):
+        alone = np.zeros_like(raw)
+        alone[:, by] = raw[:, by]
+        apart = apart - (alone - part.rate(alone, warm) - still)
+    return float(np.abs(apart - still).max())
 
 
 def _polynomials(

@@ -40,7 +40,10 @@ def joined(table: RawTable, others: Sequence[RawTable], column_map: ColumnMap | 
             taken = name in columns or name.startswith(_NAMELESS)
             called = f"{other.path.stem}: {name}" if taken else name
             if called in columns:
-                raise _refused(other, f"another file has the same name and gives column {called!r} too; give the files different names")
+                raise _refused(
+                    other,
+                    f"another file has the same name and gives column {called!r} too; give the files different names",
+                )
             columns[called] = replace(column, name=called)
     return replace(table, columns=columns, problems=tuple(problems), first_rows=()) if others else table
 

@@ -163,9 +163,7 @@ class BenchRunner:
             job = self._job
             if job is not None and job.row.id == campaign:
                 if not job.control.request.pause:
-                    raise Conflict(
-                        f"campaign {campaign} is running, so there is nothing to resume; let it run"
-                    )
+                    raise Conflict(f"campaign {campaign} is running, so there is nothing to resume; let it run")
                 job.control.resume(f"{request.reason or 'goes on'} ({request.by})")
             else:
                 self._refuse_unless_free()

@@ -141,8 +141,8 @@ class FittedResponse(ResponseModel):
     warnings: list[DataWarning] = Field(default_factory=list, description=WARNINGS)
     noise: dict[str, AxisNoiseJson] = Field(
         default_factory=dict,
-        description="For each axis: white noise of the mean of a data set and drift of the bias between data sets, deg/s "
-        "(standard deviations); the weights of the fit follow from them.",
+        description="For each axis: white noise of the mean of a data set and drift of the bias between data sets, "
+        "deg/s (standard deviations); the weights of the fit follow from them.",
     )
     environment: FitEnvironment = Field(
         default_factory=FitEnvironment,

@@ -1912,7 +1912,7 @@ export interface components {
             unconfirmed_at: string | null;
             /**
              * Attempts
-             * @description How often labctl has tried again to set the safe state since `unconfirmed_at`.
+             * @description How many times labctl has tried again to set the safe state since `unconfirmed_at`.
              * @default 0
              */
             attempts: number;
@@ -2212,7 +2212,7 @@ export interface components {
             clip?: boolean;
             /**
              * Hide
-             * @description Effects to hide in the units of a simulated bench, each as EFFECT or EFFECT=SIZE, SIZE in the unit of the effect, or z10 for a signal of ten standard deviations of the noise on this plan.
+             * @description Effects to hide in the simulated gyros, each as EFFECT or EFFECT=SIZE; SIZE is a number in the unit of the effect, or zN, such as z10, for a signal of N standard deviations of the noise on this plan.
              */
             hide?: string[];
             /**
@@ -2223,7 +2223,7 @@ export interface components {
             fit?: boolean;
             /**
              * At
-             * @description Time of the start, ISO 8601; a time without an offset is in `time_zone`. `now`: start as soon as the bench is free. Default: start at once.
+             * @description Time of the start, ISO 8601; a time without an offset is in `time_zone`. `now`: start as soon as the bench is free. Default: start at once, or status 409 if the bench is not free.
              */
             at?: string | null;
             /**
@@ -3156,7 +3156,7 @@ export interface components {
              * @description All recordings that the model is compared with; `recording` is the newest.
              */
             recordings: number[];
-            /** @description Only for several recordings: repeatability, agreement, and the error when each is predicted by a fit to the others. */
+            /** @description Only for several recordings: repeatability, agreement between the recordings, and the error when each recording is predicted by a fit to the others. */
             joint: components["schemas"]["JointJson"] | null;
             /**
              * Verdict
@@ -4022,7 +4022,7 @@ export interface components {
             warnings: components["schemas"]["DataWarning"][];
             /**
              * Noise
-             * @description For each axis: white noise and drift that set the weights of the fit, deg/s.
+             * @description For each axis: white noise of the mean of a data set and drift of the bias between data sets, deg/s (standard deviations); the weights of the fit follow from them.
              */
             noise: {
                 [key: string]: components["schemas"]["AxisNoiseJson"];
@@ -4046,7 +4046,7 @@ export interface components {
              * @description All recordings that the model was fitted to; `recording` is the newest of these.
              */
             recordings: number[];
-            /** @description Only for several recordings: repeatability, agreement, and the error when each is predicted by a fit to the others. */
+            /** @description Only for several recordings: repeatability, agreement between the recordings, and the error when each recording is predicted by a fit to the others. */
             joint: components["schemas"]["JointJson"] | null;
             /** Version */
             version: number;
@@ -4277,7 +4277,7 @@ export interface components {
             warnings: components["schemas"]["DataWarning"][];
             /**
              * Noise
-             * @description For each axis: white noise and drift that set the weights of the fit, deg/s.
+             * @description For each axis: white noise of the mean of a data set and drift of the bias between data sets, deg/s (standard deviations); the weights of the fit follow from them.
              */
             noise: {
                 [key: string]: components["schemas"]["AxisNoiseJson"];
@@ -4301,7 +4301,7 @@ export interface components {
              * @description All recordings that the model was fitted to; `recording` is the newest of these.
              */
             recordings: number[];
-            /** @description Only for several recordings: repeatability, agreement, and the error when each is predicted by a fit to the others. */
+            /** @description Only for several recordings: repeatability, agreement between the recordings, and the error when each recording is predicted by a fit to the others. */
             joint: components["schemas"]["JointJson"] | null;
             /**
              * Improved From
@@ -4356,7 +4356,7 @@ export interface components {
             warnings: components["schemas"]["DataWarning"][];
             /**
              * Noise
-             * @description For each axis: white noise and drift that set the weights of the fit, deg/s.
+             * @description For each axis: white noise of the mean of a data set and drift of the bias between data sets, deg/s (standard deviations); the weights of the fit follow from them.
              */
             noise: {
                 [key: string]: components["schemas"]["AxisNoiseJson"];
@@ -4380,7 +4380,7 @@ export interface components {
              * @description All recordings that the model was fitted to; `recording` is the newest of these.
              */
             recordings: number[];
-            /** @description Only for several recordings: repeatability, agreement, and the error when each is predicted by a fit to the others. */
+            /** @description Only for several recordings: repeatability, agreement between the recordings, and the error when each recording is predicted by a fit to the others. */
             joint: components["schemas"]["JointJson"] | null;
             /**
              * Improved From
@@ -4889,7 +4889,7 @@ export interface components {
             version: number | null;
             /**
              * Temperature C
-             * @description Lowest and highest temperature, deg C; null: unknown.
+             * @description Lowest and highest temperature in the recording, deg C; null: unknown.
              */
             temperature_c: [
                 number,
@@ -5484,7 +5484,7 @@ export interface components {
             warnings: components["schemas"]["DataWarning"][];
             /**
              * Noise
-             * @description For each axis: white noise and drift that set the weights of the fit, deg/s.
+             * @description For each axis: white noise of the mean of a data set and drift of the bias between data sets, deg/s (standard deviations); the weights of the fit follow from them.
              */
             noise: {
                 [key: string]: components["schemas"]["AxisNoiseJson"];
@@ -5508,7 +5508,7 @@ export interface components {
              * @description All recordings that the model was fitted to; `recording` is the newest of these.
              */
             recordings: number[];
-            /** @description Only for several recordings: repeatability, agreement, and the error when each is predicted by a fit to the others. */
+            /** @description Only for several recordings: repeatability, agreement between the recordings, and the error when each recording is predicted by a fit to the others. */
             joint: components["schemas"]["JointJson"] | null;
             /**
              * Improved From
@@ -5837,7 +5837,7 @@ export interface components {
             u_bias_dps: number;
             /**
              * Scale Factor
-             * @description Scale factor error: error divided by rate (1 = 100 %); null: the recording has only one rate.
+             * @description Scale factor error: slope of the error over the rate (1 = 100 %); null: the recording has only one rate.
              */
             scale_factor: number | null;
             /** U Scale Factor */
@@ -7066,7 +7066,7 @@ export interface components {
             warnings: components["schemas"]["DataWarning"][];
             /**
              * Noise
-             * @description For each axis: white noise and drift that set the weights of the fit, deg/s.
+             * @description For each axis: white noise of the mean of a data set and drift of the bias between data sets, deg/s (standard deviations); the weights of the fit follow from them.
              */
             noise: {
                 [key: string]: components["schemas"]["AxisNoiseJson"];
@@ -7090,7 +7090,7 @@ export interface components {
              * @description All recordings that the model was fitted to; `recording` is the newest of these.
              */
             recordings: number[];
-            /** @description Only for several recordings: repeatability, agreement, and the error when each is predicted by a fit to the others. */
+            /** @description Only for several recordings: repeatability, agreement between the recordings, and the error when each recording is predicted by a fit to the others. */
             joint: components["schemas"]["JointJson"] | null;
             /** Version */
             version: number;

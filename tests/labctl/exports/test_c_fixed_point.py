@@ -10,6 +10,7 @@ import pytest
 
 from labctl.calibration import Calibration
 from labctl.compensator import Compensator
+from labctl.errors import BadInput
 from labctl.exports import export_calibration
 from labctl.exports.c_header import c_name
 from labctl.exports.fixed_point.force import fixed_force
@@ -25,6 +26,7 @@ Grid = tuple[np.ndarray, np.ndarray]
 
 
 @pytest.mark.needs_cc
+@pytest.mark.parametrize("any_calibration", ["fog", "mems", "plain", "open_loop"], indirect=True)
 def test_the_code_gives_the_stated_numbers_bit_by_bit(any_calibration: Calibration, tmp_path: Path) -> None:
     text, _ = exported(any_calibration, "c-q31")
     fixed = fixed_point(static_part(any_calibration, "c-q31", carries=""), 65, "c-q31")
@@ -49,6 +51,12 @@ def test_the_code_gives_the_stated_numbers_bit_by_bit(any_calibration: Calibrati
 def test_the_tables_are_nearer_with_more_temperatures(mems: Calibration) -> None:
     sizes = [exported(mems, "c-q31", temperatures=n)[1].differs_dps or 0.0 for n in ("9", "129")]
     assert sizes[1] < 0.1 * sizes[0]
+
+
+def test_axes_whose_errors_do_not_add_up_are_refused(open_loops: Calibration) -> None:
+    """A sum over the outputs would be wrong by 0.6 deg/s while three axes turn, and right while one does."""
+    with pytest.raises(BadInput, match=r"while several axes turn model .* differs from this sum by up to 0\.6"):
+        export_calibration(open_loops.to_bytes(), "c-q31")
 
 
 ON_ARM = """

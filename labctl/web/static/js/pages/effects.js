@@ -19,6 +19,10 @@ export async function page({ params, query, signal }) {
   if (!params.id) return effectList(all, query);
   const effect = all.find((each) => each.id === params.id);
   if (!effect)
-    throw new Problem({ title: "No such effect", detail: `The catalogue has no effect ${params.id}; choose one from the list of effects.`, status: 404 });
+    throw new Problem({
+      title: "No such effect",
+      detail: `The catalogue has no effect ${params.id}; choose one from the list of effects.`,
+      status: 404,
+    });
   return effectDetail(effect, all);
 }

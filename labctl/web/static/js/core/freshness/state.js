@@ -52,7 +52,10 @@ export function freshnessWords(found, { service_s, bench_s, trouble, clock }) {
     return { stale: true, text: `${service} The values on this page may be out of date${of}.` };
   }
   if (found === "trouble")
-    return { stale: true, text: `The service answers, but it did not send the data for this page; reload it: ${trouble}` };
+    return {
+      stale: true,
+      text: `The service answers, but it did not send the data for this page; reload it: ${trouble}`,
+    };
   const bench = bench_s === null ? "" : ago(bench_s);
   if (found === "bench") {
     const what = "The values of the bench on this page may be out of date; they follow by themselves once it answers.";
