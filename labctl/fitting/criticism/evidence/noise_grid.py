@@ -10,7 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cholesky, solve_triangular
+from scipy.linalg import cholesky, eigh_tridiagonal, solve_triangular
 
 from labctl.fitting.numeric.arrays import Array
 
@@ -21,6 +21,9 @@ SIZES = (0.2, 0.45, 0.7, 1.0, 1.5, 2.3, 3.6, 6.0, 12.0)
 #: Width of the prior, a factor.
 PRIOR_FACTOR = 2.5
 MIXTURE_S = (120.0, 700.0, 3600.0)
+#: Where data sets are closer than this share of a time constant, or not in the order of time, the inverse of their
+#: correlation is too large, or not tridiagonal.
+LEAST_LAG = 1e-6
 #: Drift of this size, in three equal parts, has an Allan deviation as high as a bias instability of 1 has.
 DRIFT_PER_INSTABILITY = 1.35
 #: Half of the usual bias stability, deg/s, where no data sheet says it.
@@ -131,10 +134,27 @@ def _modes(tau_s: float, white: bytes, times: bytes, runs: bytes) -> DriftModes:
     for number in np.unique(run):
         rows = np.flatnonzero(run == number)
         white_dps = np.sqrt(white_var[rows])
-        values, vectors = np.linalg.eigh(correlation(t_s[rows], tau_s) / np.outer(white_dps, white_dps))
+        values, vectors = _of_one_run(t_s[rows], tau_s, white_dps)
         variance[rows] = np.maximum(values, 0.0)
         blocks.append((rows, vectors / white_dps[:, None]))
     return DriftModes(blocks, variance, float(np.log(white_var).sum()))
+
+
+def _of_one_run(t_s: Array, tau_s: float, white_dps: Array) -> tuple[Array, NDArray[np.float64]]:
+    """Return the eigenvalues (n,) and eigenvectors (n, n) of the drift's correlation over the white noise.
+
+    The inverse of the correlation of one time constant is tridiagonal (Rybicki and Press 1995, eq. 5): there the same
+    decomposition takes n^2 instead of n^3 steps.
+    """
+    lag = np.diff(t_s) / tau_s if tau_s > 0 else np.zeros(len(t_s) - 1)
+    if len(lag) == 0 or lag.min() < LEAST_LAG:
+        return np.linalg.eigh(correlation(t_s, tau_s) / np.outer(white_dps, white_dps))
+    next_to, left = np.exp(-lag), -np.expm1(-2 * lag)
+    diagonal = np.append(1 / left, 1.0) + np.append(0.0, next_to**2 / left)
+    values, vectors = eigh_tridiagonal(
+        diagonal * white_dps**2, -next_to / left * white_dps[:-1] * white_dps[1:], check_finite=False
+    )
+    return 1 / values[::-1], vectors[:, ::-1]
 
 
 def whiten(

@@ -8,7 +8,7 @@ import pytest
 from labctl.fitting.criticism.evidence.design import Design
 from labctl.fitting.criticism.evidence.elimination import MeansByNoise, ScaledBase, WhitenedBase, gains_by_noise
 from labctl.fitting.criticism.evidence.gains import gains_of
-from labctl.fitting.criticism.evidence.noise_grid import noise_grid
+from labctl.fitting.criticism.evidence.noise_grid import DriftModes, correlation, noise_grid
 from labctl.fitting.criticism.reduction.outliers import FEW, inlier_mask
 
 
@@ -32,6 +32,22 @@ def test_gains_at_every_noise_are_those_at_each_by_itself() -> None:
         assert log_p[i] == pytest.approx(left.log_p, rel=1e-10)
         np.testing.assert_allclose(gain[i], expected, rtol=1e-9)
         assert dimensions[i].tolist() == number.tolist()
+
+
+@pytest.mark.parametrize("tau_s", [0.0, 120.0, 4000.0])
+@pytest.mark.parametrize("nearest_s", [60.0, 1e-2, 0.0])
+def test_modes_diagonalise_the_drift_over_the_noise(tau_s: float, nearest_s: float) -> None:
+    """Whatever their decomposition: data sets at irregular times, as near as `nearest_s`, in two runs."""
+    rng = np.random.default_rng(5)
+    t_s = np.cumsum(np.append(nearest_s, rng.uniform(50, 200, 79)))
+    t_s[40] = t_s[39] + nearest_s
+    run, white = np.repeat([1, 2], 40), rng.uniform(0.5, 2.0, 80) * 1e-6
+    modes = DriftModes.of(tau_s, white, t_s, run)
+    for number, (rows, vectors) in zip((1, 2), modes.blocks, strict=True):
+        assert np.array_equal(rows, np.flatnonzero(run == number))
+        noise, drift = vectors.T @ np.diag(white[rows]) @ vectors, vectors.T @ correlation(t_s[rows], tau_s) @ vectors
+        np.testing.assert_allclose(noise, np.eye(40), atol=1e-10)
+        np.testing.assert_allclose(drift, np.diag(modes.variance[rows]), atol=1e-9 * drift.max())
 
 
 def test_outliers_are_those_by_median_and_quantile_of_what_is_there() -> None:
