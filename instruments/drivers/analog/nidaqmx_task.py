@@ -54,10 +54,7 @@ class NidaqmxTask:
     def open(self) -> float:
         """Begin to scan; returns the scans per second that the device makes. Raises LinkError."""
         if self._missing is not None:
-            package = (self._missing.name or PACKAGE).partition(".")[0]
-            command = INSTALL if self._settings.host is None else INSTALL_GRPC
-            text = f"the package {package} is not installed; run `{command}`"
-            raise LinkError(self.name, text) from self._missing
+            raise self._not_installed(self._missing) from self._missing
         try:
             self._task = self._made() if self._settings.host is None else self._made_at(self._settings.host)
             self._configure()
@@ -135,6 +132,12 @@ class NidaqmxTask:
             sample_mode=constants.AcquisitionType.CONTINUOUS,
             samps_per_chan=round(BUFFER_S * settings.scans_per_s),
         )
+
+    def _not_installed(self, error: ImportError) -> LinkError:
+        command = INSTALL if self._settings.host is None else INSTALL_GRPC
+        if error.name in (None, PACKAGE):
+            return LinkError(self.name, f"the package {PACKAGE} is not installed; run `{command}`")
+        return LinkError(self.name, f"{PACKAGE} needs the module {error.name}, which is not installed; run `{command}`")
 
     def _failed(self, what: str, error: Exception) -> LinkError:
         """Return an error of nidaqmx as one line; the scans must be started again.
