@@ -30,7 +30,7 @@ class SimulatedNidaq(RpcDevice):
 
     def __init__(self, setup: InstrumentSetup) -> None:
         super().__init__(setup.faults)
-        self.version = (26, 0, 0)  #: of the driver software
+        self.version: tuple[int, int, int] = (26, 0, 0)  #: of the driver software
         self.inputs = Inputs(part_of(setup.gyro, NidaqSettings), setup.unit)
         self.failure: Status | None = None  #: of every read
         self.tasks: dict[str, Task] = {}
@@ -139,7 +139,7 @@ class SimulatedNidaq(RpcDevice):
             values = {Attribute.PRODUCT_TYPE: self.inputs.product}
         else:
             values = self._of_task(self._task(fields), self._name(fields), t_s)
-        if number not in values or (number == Attribute.DEFAULT_SAMPLES and self.version < (24, 5)):
+        if number not in values or (number == Attribute.DEFAULT_SAMPLES and self.version < (24, 5, 0)):
             raise DaqFailure(Status.ATTRIBUTE_UNKNOWN)
         value = values[number]
         if isinstance(value, str):
