@@ -6,7 +6,8 @@ from typing import Literal
 
 from pydantic import Field, model_validator
 
-from instruments.bench_config import GyroSettings, Strict
+from instruments.bench_config import GyroSettings, Strict, is_simulated_address
+from instruments.protocols.nidaqmx.service import SERVER_PORT
 
 #: Rates of the inputs, scans per second.
 DEFAULT_SCANS_PER_S = 1000.0
@@ -78,7 +79,31 @@ class LabJackSettings(AnalogSettings):
 
 
 class NidaqSettings(AnalogSettings):
-    """A device of National Instruments, by the name that its driver software gives it."""
+    """A device of National Instruments, by the name that its driver software gives it.
+
+    Without `host` the driver software is that of this computer; else that of a computer on the network, behind NI's
+    gRPC device server.
+    """
 
     device: str = "Dev1"
+    tcp_port: int = Field(default=SERVER_PORT, ge=1, le=65535)  #: of the server
     terminals: Literal["default", "rse", "nrse", "differential"] = "default"
+
+    @model_validator(mode="after")
+    def _has_plain_host(self) -> NidaqSettings:
+        if self.port is not None:
+            raise ValueError("key port is not used; give the network address of NI's gRPC device server as host")
+        if self.host is not None and "/" in self.host and not is_simulated_address(self.host):
+            raise ValueError(
+                f"host = {self.host!r} is not a network address; give the name or the IP address alone, its port as "
+                "tcp_port, and the device as device"
+            )
+        return self
+
+    @property
+    def address(self) -> str:
+        """Device, and where it is not at this computer, its server."""
+        if self.host is None:
+            return self.device
+        server = self.host if is_simulated_address(self.host) else f"{self.host}:{self.tcp_port}"
+        return f"{self.device} at {server}"

@@ -17,9 +17,12 @@ import tomli_w
 
 from instruments.bench_config import BenchFile, is_simulated_address
 from instruments.clock import Clock, ScaledClock
+from instruments.errors import LinkError
+from instruments.protocols.nidaqmx.service import INSTALL_GRPC
 from instruments.protocols.simulator_control import BUSY, IS_TURNING, MOUNT, OK, POWER, TURN, turn_of
 from instruments.simulators.links.device import SimulatedDevice
 from instruments.simulators.links.real_ports import LOCALHOST, RealPorts
+from instruments.simulators.links.rpc_server import RpcServer
 from instruments.simulators.simulated_bench import SimulatedBench
 
 
@@ -31,6 +34,7 @@ class SimulationServer:
         self._simulated = SimulatedBench(bench, clock)
         self._lock = threading.Lock()
         self._ports = RealPorts()
+        self._rpc_servers: list[RpcServer] = []
         self.addresses: dict[str, str] = {}  #: device name, or "control" -> real address
 
     def start(self) -> BenchFile:
@@ -53,6 +57,8 @@ class SimulationServer:
     def stop(self) -> None:
         """Close every port and end every thread."""
         self._ports.close()
+        for server in self._rpc_servers:
+            server.close()
 
     def _serve_device(self, name: str, settings: dict[str, Any]) -> None:
         """Open a real port for a device with a simulated address, and write that port into its settings."""
@@ -60,9 +66,19 @@ class SimulationServer:
             exchange = partial(self._exchange, name, self._simulated.device(url))
             settings["port"] = self.addresses[name] = self._ports.open_terminal(exchange)
         if (url := settings.get("host")) and is_simulated_address(url):
-            exchange = partial(self._exchange, name, self._simulated.device(url))
-            settings["host"], settings["tcp_port"] = LOCALHOST, self._ports.open_byte_server(exchange)
+            settings["host"], settings["tcp_port"] = LOCALHOST, self._listen(name, self._simulated.device(url))
             self.addresses[name] = f"{LOCALHOST}:{settings['tcp_port']}"
+
+    def _listen(self, name: str, device: SimulatedDevice) -> int:
+        """Open a TCP port that carries bytes, or calls of gRPC, to a device; returns its number."""
+        exchange = partial(self._exchange, name, device)
+        if not getattr(device, "is_rpc", False):
+            return self._ports.open_byte_server(exchange)
+        try:
+            self._rpc_servers.append(RpcServer(exchange))
+        except ImportError as error:
+            raise LinkError(name, f"the package grpcio is not installed; run `{INSTALL_GRPC}`") from error
+        return self._rpc_servers[-1].tcp_port
 
     def _exchange(self, name: str, device: SimulatedDevice, data: bytes) -> bytes:
         """Pass bytes to an instrument; returns the bytes that it has sent."""

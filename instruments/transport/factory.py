@@ -1,4 +1,4 @@
-"""Links of one bench by address: serial ports, Modbus RTU and Modbus TCP, on hardware or on simulated instruments.
+"""Links of one bench by address: serial ports, Modbus and gRPC, on hardware or on simulated instruments.
 
 An address that begins with `sim://` leads to the simulated instruments that the composition root hands in; this package
 imports no simulator.
@@ -17,13 +17,14 @@ from instruments.errors import LinkError
 from instruments.transport.adapters import require_adapter
 from instruments.transport.opened_port import open_port
 from instruments.transport.port_failures import reason, remedy
+from instruments.transport.rpc.channel import RpcChannel, TimedChannel
 from instruments.transport.rtu.client import NOT_OPENED, RtuClient
 from instruments.transport.serial import EIGHT_N_1, Line, SerialPort
 from instruments.transport.stream_reader import PolledReader, StreamReader, ThreadedReader
 
 
 class LinkFactory(Protocol):
-    """Makes ports and Modbus clients of one kind, hardware or simulated. Time-outs are seconds of the bench clock."""
+    """Makes ports, clients and channels, of hardware or simulated. Time-outs are seconds of the bench clock."""
 
     def serial_port(self, url: str, *, baudrate: int, timeout_s: float, line: Line = EIGHT_N_1) -> SerialPort:
         """Return an open port with 8 data bits; raises what pyserial raises."""
@@ -39,6 +40,10 @@ class LinkFactory(Protocol):
 
     def rtu_client(self, url: str, *, baudrate: int, timeout_s: float, line: Line = EIGHT_N_1) -> ModbusSerialClient:
         """Return a Modbus RTU client, 8 data bits, that is not connected yet."""
+        ...
+
+    def rpc_channel(self, host: str, tcp_port: int, *, timeout_s: float) -> RpcChannel:
+        """Return an open gRPC channel, each of whose calls ends within `timeout_s`; raises ImportError."""
         ...
 
 
@@ -63,6 +68,10 @@ class HardwareLinks:
     def rtu_client(self, url: str, *, baudrate: int, timeout_s: float, line: Line = EIGHT_N_1) -> ModbusSerialClient:
         """Return a client on a real port, not connected yet."""
         return RtuClient(url, baudrate=baudrate, timeout_s=self._clock.wall_s(timeout_s), line=line)
+
+    def rpc_channel(self, host: str, tcp_port: int, *, timeout_s: float) -> RpcChannel:
+        """Return an open gRPC channel to a real host, without encryption; raises ImportError without grpcio."""
+        return TimedChannel(host, tcp_port, self._clock.wall_s(timeout_s))
 
 
 class Ports:
@@ -124,6 +133,10 @@ class Ports:
                 device, f"port {url} cannot be opened ({reason(error)}); check {remedy(url, error)}"
             ) from error
         return client
+
+    def rpc_channel(self, host: str, tcp_port: int, *, device: str, timeout_s: float) -> RpcChannel:
+        """Open a gRPC channel, which connects with its first call; raises ImportError without grpcio, LinkError."""
+        return self._links(host, device).rpc_channel(host, tcp_port, timeout_s=timeout_s)
 
     def _require_adapter(self, url: str, device: str) -> None:
         if device in self._adapters:

@@ -1,4 +1,4 @@
-"""Ports and Modbus clients of simulated instruments, made from the same libraries as those of hardware."""
+"""Ports, Modbus clients and gRPC channels of simulated instruments, for the same libraries as those of hardware."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Callable
 from instruments.clock import Clock
 from instruments.simulators.links.device import SimulatedDevice
 from instruments.simulators.links.modbus_clients import SimulatedRtuClient, SimulatedTcpClient
+from instruments.simulators.links.rpc_channel import SimulatedChannel
 from instruments.simulators.links.serial_port import SimulatedSerialPort
 
 
@@ -37,3 +38,7 @@ class SimulatedLinks:
         return SimulatedRtuClient(
             self._device(url), self._clock, timeout_s, baudrate=baudrate, timeout=wall_s, retries=0
         )
+
+    def rpc_channel(self, host: str, tcp_port: int, *, timeout_s: float) -> SimulatedChannel:  # noqa: ARG002  no port
+        """Return an open gRPC channel; raises LinkError for an unknown address, ImportError without grpcio."""
+        return SimulatedChannel(self._device(host), self._clock, timeout_s)

@@ -141,6 +141,11 @@ class FaultyWire:
         """When the newest byte was sent, s; None where the instrument does not tell, or a fault may hide it."""
         return None if self.faults.armed or self._held else getattr(self._device, "newest_s", None)
 
+    @property
+    def is_rpc(self) -> bool:
+        """Whether the instrument answers calls of gRPC."""
+        return getattr(self._device, "is_rpc", False)
+
     def _check_link(self, t_s: float) -> None:
         if self.faults.trigger(["dropped_link"], t_s) is not None:
             raise serial.SerialException("device disconnected")

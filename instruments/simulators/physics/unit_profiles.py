@@ -186,10 +186,13 @@ DEFAULT_PROFILES = {
     "kvh-dsp3000": "rd2100",
     "gyrostar": "gyrostar",
     "labjack-t": "gyrostar",
+    "nidaq": "gyrostar",
     "stream-format": "mems-triaxial",
 }
 #: Sampling rate of a unit, Hz, where the bench file gives none: the rate of the wire.
-USUAL_RATE_HZ = {"stim300": 125.0, "kvh-dsp3000": 100.0, "kvh-rd2100": 10.0, "gyrostar": 10.0, "labjack-t": 1000.0}
+USUAL_RATE_HZ = {
+    "stim300": 125.0, "kvh-dsp3000": 100.0, "kvh-rd2100": 10.0, "gyrostar": 10.0, "labjack-t": 1000.0, "nidaq": 1000.0
+}  # fmt: skip
 
 
 def usual_rate_hz(driver: str) -> float:

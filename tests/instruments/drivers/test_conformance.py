@@ -21,10 +21,7 @@ from instruments.errors import NoReply
 from instruments.interfaces.gyro import Readings
 from instruments.protocols.kvh_lines import KvhSettings
 
-#: The maker's driver software has the device: no bytes pass here that a simulator could answer. Its tests put a module
-#: with the same calls in the place of nidaqmx.
-WITHOUT_A_WIRE = {"nidaq"}
-OWN = [name for name in DRIVERS.names if DRIVERS.plugin(name).is_own and name not in WITHOUT_A_WIRE]
+OWN = [name for name in DRIVERS.names if DRIVERS.plugin(name).is_own]
 CHECKS = [(name, check) for name in OWN for check in checks_of(name)]
 #: The first word of a method's docstring says whether it asks, acts, or changes a setting.
 FIRST_WORDS = ("Get", "Control", "Measure", "Set", "What")

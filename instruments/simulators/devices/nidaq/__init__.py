@@ -1,0 +1,1 @@
+"""A simulated device of National Instruments behind NI's gRPC device server."""

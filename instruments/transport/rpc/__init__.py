@@ -1,0 +1,1 @@
+"""Calls of gRPC to a server that has an instrument."""
