@@ -7,6 +7,7 @@ import time
 from typing import Any
 
 import nidaqmx
+import numpy as np
 import pytest
 
 from instruments.bench import open_bench
@@ -38,7 +39,8 @@ def test_the_driver_at_a_real_server() -> None:
         unit.read_latest()
         readings = unit.read(0.5)
         assert readings.lost == 0
-        assert len(readings) == pytest.approx(50, abs=15)
+        assert len(readings) > 40  # more on a busy machine, which comes back later
+        assert np.diff(readings.t_s) == pytest.approx(0.01, abs=1e-4)
         assert readings.valid.all()
         device: Any = server._simulated.device("sim://nidaq/fog")
         device._device.failure = Status.OVERRUN
