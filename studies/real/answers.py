@@ -67,7 +67,7 @@ def at_rest(commands: Commands, name: str, map_name: str) -> Answer:
         for axis in AXES
         for key, words in COEFFICIENTS_OF_TEMPERATURE.items()
     }
-    found["error on temperatures left out, deg/s"] = Value(fit["error"]["heldout_rms_dps"])
+    found["error at temperatures left out of the fit, deg/s"] = Value(fit["error"]["heldout_rms_dps"])
     return Answer(found, fit["error"], commands.verdict(serial))
 
 
@@ -105,7 +105,7 @@ def on_rate_table(commands: Commands, name: str, map_name: str) -> Answer:
         "sine, k, rad/(rad/s)": known["k"],
         "error of bias and scale factor, deg/s": Value(straight["error"]["rms_dps"]),
         "error with the sine, deg/s": Value(sine["error"]["rms_dps"]),
-        "error with the sine on temperatures left out, deg/s": Value(sine["error"]["heldout_rms_dps"]),
+        "error with the sine at temperatures left out of the fit, deg/s": Value(sine["error"]["heldout_rms_dps"]),
         "error of twelve coefficients in the output, deg/s": Value(direct["rms_dps"]),
     }
     return Answer(found, sine["error"], commands.verdict(serial))

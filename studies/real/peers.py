@@ -63,9 +63,9 @@ def _thermal(name: str, peers: Mapping[str, LeftOut], ours: LeftOut) -> Iterator
     for peer, theirs in peers.items():
         for which, value, own in (
             ("each eighth", theirs.all_parts, ours.all_parts),
-            ("inner six eighths", theirs.inner, ours.inner),
+            ("six inner eighths of the range", theirs.inner, ours.inner),
         ):
-            quantity = f"error on temperatures left out, {which}, deg/s"
+            quantity = f"error at temperatures left out of the fit, {which}, deg/s"
             yield Peer(name, quantity, peer, f"{value:.4f}", f"{own:.4f}", _better(own, value))
 
 

@@ -82,7 +82,7 @@ def test_what_is_worse_is_said(small: dict[str, list[Row]]) -> None:
     assert Row("bias, deg/s", Value(1.0, 0.1), Value(0.79, 0.1)).agreement == "no"
     section = PAGE.read_text(encoding="utf-8").partition("## Where labctl is worse")[2].partition("## Quantity")[0]
     assert "mpu9150-2, z by rate about x" in section
-    assert "pan-cooldown, error on temperatures left out" in section
+    assert "pan-cooldown, error at temperatures left out of the fit" in section
 
 
 def test_quantities_of_both_are_compared() -> None:

@@ -153,7 +153,7 @@ def simulate(
             "--hide",
             metavar="EFFECT[=SIZE]",
             help="Hide an effect in the gyro; SIZE in the unit of the effect "
-            "(`labctl effects`), or z10 for a signal of ten standard deviations of the noise.",
+            "(`labctl effects`), or zN, such as z10, for a signal of N standard deviations of the noise.",
         ),
     ] = None,
     seed: Annotated[

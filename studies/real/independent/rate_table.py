@@ -59,7 +59,7 @@ def analysis() -> Found:
         "sine, k, rad/(rad/s)": Value(float(k), float(np.degrees(u[6]))),
         "error of bias and scale factor, deg/s": Value(_error_straight(rate, output, warm)),
         "error with the sine, deg/s": Value(_error_sine(rate, output, warm, values)),
-        "error with the sine on temperatures left out, deg/s": Value(_held_out(rate, output, warm)),
+        "error with the sine at temperatures left out of the fit, deg/s": Value(_held_out(rate, output, warm)),
         "error of twelve coefficients in the output, deg/s": Value(_error_direct(rate, output, warm)),
     }
     return found

@@ -40,7 +40,7 @@ def analysis() -> Found:
         names = ("bias at 20 deg C, deg/s", "slope at 20 deg C, deg/s/K", "curvature, deg/s/K2")
         for name, value, variance in zip(names, values, np.diag(covariance), strict=True):
             found[f"{axis}: {name}"] = Value(float(value), float(np.sqrt(variance)))
-    found["error on temperatures left out, deg/s"] = Value(held_out(t_s, warm, rates))
+    found["error at temperatures left out of the fit, deg/s"] = Value(held_out(t_s, warm, rates))
     return found
 
 
