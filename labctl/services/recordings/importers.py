@@ -151,7 +151,7 @@ def log_with_map(path: Path, name: str | None, options: Mapping[str, str], colum
 def _table(path: Path, column_map: ColumnMap | None) -> RawTable:
     """Return the table of a file with further columns; raises BadInput, BadRecording."""
     if not path.exists():
-        raise BadRecording(f"{path}: not found; name the file to import beside the other")
+        raise BadRecording(f"{path}: not found; give the path of the file whose columns are to be added")
     name = surest(path)
     importer, given = _importer_and_options(name, {})
     if not isinstance(importer, TableImporter):
@@ -180,7 +180,7 @@ def _importer_and_options(name: str, options: Mapping[str, str]) -> tuple[Import
         first = error.errors()[0]
         key = ".".join(map(str, first["loc"]))
         names = [key for key in importer.options.model_fields if key != "file"]
-        known = f"its options are {', '.join(names)}" if names else "it has no options"
+        known = f"its options: {', '.join(names)}" if names else "it has no options"
         raise BadInput(f"importer {name}: option {key}: {first['msg']} ({known}); correct the option") from error
 
 

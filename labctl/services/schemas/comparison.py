@@ -63,13 +63,12 @@ class ComparisonColumns(ResponseModel):
     turn_before_deg: list[float | None] = Field(
         default_factory=list,
         description="Error of the integrated angle after a full turn with only the static bias subtracted, deg; "
-        "null: the rate is too low, another axis turns, or the recording has no data set at rest.",
+        "null: the rate is too low, the turn is about another axis, or the recording has no data set at rest.",
     )
     turn_after_deg: list[float | None] = Field(
         default_factory=list,
-        description="Error of the integrated angle "
-        "after a full turn with the calibration applied, deg; null: the rate is too low, another axis turns, or the "
-        "recording has no data set at rest.",
+        description="Error of the integrated angle after a full turn with the calibration applied, deg; null: the rate "
+        "is too low, the turn is about another axis, or the recording has no data set at rest.",
     )
 
 

@@ -138,7 +138,7 @@ class Leaving(ResponseModel):
 
     axis: str
     outside: bool = Field(
-        description="Whether the line is already outside the limit at the time of the newest recording."
+        description="Whether the fitted line is already outside the limit at the time of the newest recording."
     )
     expected: datetime | None
     earliest: datetime | None

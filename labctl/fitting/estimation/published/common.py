@@ -55,8 +55,8 @@ def rising(recording: Recording, nodes: Array, axis: str, least: int) -> NDArray
     if len(nodes) < least or np.any(np.diff(nodes[order]) <= 0):
         raise NotEnoughData(
             f"{recording.info.serial}, axis {axis}: a table needs at least {least} different temperature"
-            f"{'' if least == 1 else 's'}, each in one row; it has {len(nodes)} rows at {len(np.unique(nodes))} "
-            "temperatures; correct column temperature_c"
+            f"{'' if least == 1 else 's'} and only one row for each; it has {len(nodes)} rows at "
+            f"{len(np.unique(nodes))} temperatures; correct column temperature_c"
         )
     return order
 
