@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -14,6 +13,7 @@ from importlib.metadata import version as package_version
 from pathlib import Path
 from typing import cast, get_args
 
+from labctl.canonical_json import canonical, canonical_and_hash, hash_of, with_own_hash
 from labctl.certification import CalibrationWarning, Certification, read_certification
 from labctl.errors import BadCalibrationFile
 from labctl.fitting import FitResult, FittedModel, coefficients_json
@@ -46,16 +46,6 @@ HOW_TO_USE = (
 )
 #: The largest calibration file that is read; one of 6 axes' temperature tables has a fiftieth of it.
 MOST_BYTES = 64 << 20
-
-
-def canonical(document: JsonObject) -> bytes:
-    """Return the one way to write a document: sorted keys, no spaces, UTF-8, shortest exact numbers."""
-    return json.dumps(document, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
-
-
-def hash_of(document: JsonObject) -> str:
-    """Return the SHA-256 of everything in a document but its hash."""
-    return hashlib.sha256(canonical({k: v for k, v in document.items() if k != "hash"})).hexdigest()
 
 
 @dataclass(frozen=True)
@@ -206,9 +196,8 @@ def _uncertainty(
 
 def with_certification(content: bytes, known: Certification) -> tuple[bytes, str]:
     """Return the bytes of a calibration file with its certification, and their hash, which covers it."""
-    document = {**json.loads(content), "certification": known.to_json()}
-    document["hash"] = hash_of(document)
-    return canonical(document) + b"\n", document["hash"]
+    whole, found = with_own_hash({**json.loads(content), "certification": known.to_json()})
+    return whole + b"\n", found
 
 
 def _limits(pair: Sequence[float | None]) -> tuple[float, float]:
@@ -235,7 +224,7 @@ def read_calibration(source: Path | bytes) -> Calibration:
                 f"{name}: the file has schema {repr(schema)[:80]}, but this version of labctl reads {SCHEMA!r}; "
                 "use the version that wrote the file"
             )
-        whole, found = _canonical_and_hash(document)
+        whole, found = canonical_and_hash(document)
         if whole != content.strip():
             json.loads(content, object_pairs_hook=_object)
     except OSError as error:
@@ -263,13 +252,6 @@ def _content(path: Path) -> bytes:
     if len(content) > MOST_BYTES:
         raise ValueError(f"larger than the limit of {MOST_BYTES} bytes; check that it is a calibration file")
     return content
-
-
-def _canonical_and_hash(document: JsonObject) -> tuple[bytes, str]:
-    """Return `canonical` and `hash_of` of a document, written once for both."""
-    parts = [(key, canonical({key: document[key]})[1:-1]) for key in sorted(document)]
-    hashed = b"{" + b",".join(part for key, part in parts if key != "hash") + b"}"
-    return b"{" + b",".join(part for _, part in parts) + b"}", hashlib.sha256(hashed).hexdigest()
 
 
 def _object(pairs: list[tuple[str, object]]) -> dict[str, object]:

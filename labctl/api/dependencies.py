@@ -19,8 +19,8 @@ CONTROL_THREADS = 4
 ResultT = TypeVar("ResultT")
 
 
-def get_service(request: Request) -> LabService:
-    """Return the service that this application serves."""
+async def get_service(request: Request) -> LabService:
+    """Return the service that this application serves; without `async` each request would first go to a thread."""
     return cast(LabService, request.app.state.service)
 
 
@@ -43,7 +43,7 @@ class ControlPool:
         self._threads.shutdown()
 
 
-def get_control_pool(request: Request) -> ControlPool:
+async def get_control_pool(request: Request) -> ControlPool:
     """Return the threads that acts on campaigns are executed in."""
     return cast(ControlPool, request.app.state.control_pool)
 

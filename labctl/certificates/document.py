@@ -12,7 +12,7 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict, Field
 
 from instruments.laboratory import Contact, Laboratory
-from labctl.calibration import canonical
+from labctl.canonical_json import canonical
 
 SCHEMA = "labctl-certificate/1"
 TITLE = "Calibration certificate"

@@ -1,0 +1,43 @@
+"""Canonical JSON, and documents that hold the hash of themselves: one way to write each document, byte by byte."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+
+from labctl.json_types import JsonObject
+
+
+def canonical(document: JsonObject) -> bytes:
+    """Return the one way to write a document: sorted keys, no spaces, UTF-8, shortest exact numbers."""
+    return json.dumps(document, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
+
+
+def hash_of(document: JsonObject) -> str:
+    """Return the SHA-256 of everything in a document but its hash."""
+    return hashlib.sha256(_joined(*_around_hash(document))).hexdigest()
+
+
+def canonical_and_hash(document: JsonObject) -> tuple[bytes, str]:
+    """Return `canonical` and `hash_of` of a document, written once for both."""
+    before, after = _around_hash(document)
+    own = canonical({"hash": document["hash"]})[1:-1] if "hash" in document else b""
+    return _joined(before, own, after), hashlib.sha256(_joined(before, after)).hexdigest()
+
+
+def with_own_hash(document: JsonObject) -> tuple[bytes, str]:
+    """Return a document with the hash of itself in canonical form, and the hash; one that it has is replaced."""
+    before, after = _around_hash(document)
+    found = hashlib.sha256(_joined(before, after)).hexdigest()
+    return _joined(before, canonical({"hash": found})[1:-1], after), found
+
+
+def _around_hash(document: JsonObject) -> tuple[bytes, bytes]:
+    """Return the canonical members of a document before and after its hash."""
+    before = canonical({key: value for key, value in document.items() if key < "hash"})
+    after = canonical({key: value for key, value in document.items() if key > "hash"})
+    return before[1:-1], after[1:-1]
+
+
+def _joined(*members: bytes) -> bytes:
+    return b"{" + b",".join(part for part in members if part) + b"}"
