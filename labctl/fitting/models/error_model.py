@@ -9,6 +9,7 @@ import numpy as np
 
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.effects import Column, Reference, Term, kind_of
+from labctl.fitting.models.held import Held
 from labctl.fitting.models.temperature import Constant, TemperatureBasis, basis_from_dict
 from labctl.fitting.numeric.arrays import Array
 from labctl.json_types.models import ErrorModelJson, TermJson
@@ -34,6 +35,7 @@ class ErrorModel:
     argument: Argument = "rate"
     temperature: TemperatureBasis = field(default_factory=Constant)
     reference: Reference = field(default_factory=Reference)
+    held: Held = field(default_factory=Held)  #: coefficients that are not fitted
 
     @property
     def effect_ids(self) -> list[str]:
@@ -68,13 +70,16 @@ class ErrorModel:
 
     def to_dict(self) -> ErrorModelJson:
         """Return the model without coefficients, as JSON."""
-        return {
+        found: ErrorModelJson = {
             "name": self.name,
             "argument": self.argument,
             "terms": [_term_json(term) for term in self.terms],
             "temperature": self.temperature.to_dict(),
             "reference": {"temperature_c": self.reference.temperature_c},
         }
+        if self.held.axes:
+            found["held"] = self.held.to_json()
+        return found
 
     @staticmethod
     def from_dict(record: ErrorModelJson) -> ErrorModel:
@@ -88,11 +93,15 @@ class ErrorModel:
             record["argument"],
             basis_from_dict(record["temperature"]),
             Reference(record["reference"]["temperature_c"]),
+            Held.from_json(record.get("held")),
         )
 
     def forward(self) -> ErrorModel:
-        """Return the same effects as a law of the true rate: the form that is physics, and that criticism judges."""
-        return replace(self, argument="rate")
+        """Return the same effects as a law of the true rate: the form that is physics, and that criticism judges.
+
+        Coefficients of a law of the output mean something else in it, so those that were held are estimated.
+        """
+        return self if self.argument == "rate" else replace(self, argument="rate", held=Held())
 
 
 def _by_recording(term: Term, columns: list[Column], channels: Channels) -> list[Column]:
