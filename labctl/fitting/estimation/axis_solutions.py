@@ -15,7 +15,7 @@ from labctl.fitting.data.rate_profile import TIME_CONSTANT
 from labctl.fitting.data.shifts import KINDS, shifts_of
 from labctl.fitting.estimation.axis_design import AxisDesign, axis_design
 from labctl.fitting.estimation.common_turn_error import with_common_error
-from labctl.fitting.estimation.held.propagation import joint_covariance, with_derivative
+from labctl.fitting.estimation.held.propagation import considered, joint_covariance
 from labctl.fitting.estimation.response import (
     first_response,
     next_response,
@@ -136,9 +136,9 @@ def _solve_axis(data: FitData, model: ErrorModel, axis: str, design: AxisDesign,
         columns, y, scatter = with_prior(columns, values, y, scatter, wide**2)
         kinds = np.array([shift.kind for shift in design.shifts])
         random = RandomEffects(np.unique(kinds, return_inverse=True)[1], wide)
+    columns, y, scatter, known_beside = considered(design.held, columns, y, scatter)
     try:
-        found = solve(columns, y, scatter, fixed.drift if fixed else None, random)
-        return with_derivative(found, design.held, columns, scatter, random)
+        return solve(columns, y, scatter, fixed.drift if fixed else None, random, known_beside)
     except NotEnoughData as error:
         raise NotEnoughData(f"{data.info.serial}, axis {axis}, model {model.name}: {error}") from None
 

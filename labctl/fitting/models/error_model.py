@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -67,6 +68,16 @@ class ErrorModel:
     def with_terms(self, terms: tuple[Term, ...], name: str | None = None) -> ErrorModel:
         """Return the same model with other effects."""
         return replace(self, terms=terms, name=name or self.name)
+
+    def with_added(self, terms: Iterable[Term]) -> ErrorModel:
+        """Return the same model with more effects, each with one coefficient for all temperatures.
+
+        An effect of which it holds coefficients is replaced: what is added is estimated.
+        """
+        added = tuple(replace(term, steady=True) for term in terms)
+        freed = {term.effect for term in added} & self.held.effects
+        kept = tuple(term for term in self.terms if term.effect not in freed)
+        return replace(self, terms=(*kept, *added), held=self.held.beside(tuple(freed)))
 
     def to_dict(self) -> ErrorModelJson:
         """Return the model without coefficients, as JSON."""

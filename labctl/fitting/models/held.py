@@ -51,6 +51,11 @@ class Held:
         found = self.axes.get(axis, {}).get(name)
         return found if found is not None and found.effect == effect else None
 
+    @property
+    def effects(self) -> frozenset[str]:
+        """The effects of which coefficients are held."""
+        return frozenset(one.effect for names in self.axes.values() for one in names.values())
+
     def without_u(self, axis: str) -> tuple[str, ...]:
         """Return the names of an axis' held coefficients that state no uncertainty."""
         return tuple(name for name, one in self.axes.get(axis, {}).items() if not one.has_u)

@@ -148,8 +148,7 @@ def _refuse_what_changes_nothing(
 
     One with a shape may be added again: it gets another. One of which coefficients are held may: they are then fitted.
     """
-    held = {one.effect for names in model.held.axes.values() for one in names.values()}
-    fixed = {term.effect for term in model.terms if not term.parameters and term.effect not in held}
+    fixed = {term.effect for term in model.terms if not term.parameters} - model.held.effects
     for term in wanted:
         if term.effect in request.remove:
             raise BadInput(f"effect {term.effect!r} is both added and removed; give one of the two")

@@ -7,20 +7,20 @@ that f has the covariance (X'WX)^-1 + G U G', and f and c the covariance G U in 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
+from labctl.fitting.data.earth import with_prior
 from labctl.fitting.models.held import HeldCoefficient
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.numeric.drift_noise import Scatter, whitened
-from labctl.fitting.numeric.least_squares import Solution
-from labctl.fitting.numeric.variance_components import RandomEffects
+from labctl.fitting.numeric.drift_noise import Scatter
+from labctl.fitting.numeric.least_squares import Considered, Solution, rank_of
 
-#: Random effects count with a standard deviation of at least this, in the unit of their coefficients.
-LEAST_SPREAD = 1e-9
+#: The standard deviation, deg/s, that the row of a prior has in scaled columns: a drift adds nothing to that.
+PRIOR = 1e3
 
 
 @dataclass(frozen=True)
@@ -68,27 +68,38 @@ class HeldColumns:
         )
 
 
-def with_derivative(
-    solution: Solution, held: HeldPart, design: NDArray[np.float64], scatter: Scatter, random: RandomEffects | None
-) -> Solution:
-    """Return a solution with G, the derivative of its values along the held coefficients.
+def considered(
+    held: HeldPart, columns: NDArray[np.float64], y: Array, scatter: Scatter
+) -> tuple[NDArray[np.float64], Array, Scatter, Considered | None]:
+    """Return design (n, k), y and scatter of the estimated columns, and what is known beside them; None: nothing.
 
-    `design` (n, k) and `scatter` are those of the solution, with rows for priors below the data sets. The last of these
-    are the priors of `random` effects, which count with the standard deviations that were found.
+    What an error of a held coefficient leaves in the data is no noise, so the noise is estimated beside it: with its
+    uncertainty as a prior, a row for each; or freely, where the white noise, and so the weight of that row, is unknown.
+    A coefficient without uncertainty is taken as exact, and what it leaves counts as noise.
     """
     if held.columns.shape[1] == 0:
-        return solution
-    below = np.zeros((len(design) - len(held.columns), held.columns.shape[1]))
-    white = np.ones(len(design)) if scatter.white_var is None else scatter.white_var.copy()
-    if random is not None:
-        found = np.array([component.value for component in solution.components])
-        white[-len(random.kind) :] = np.maximum(found[random.kind], LEAST_SPREAD) ** 2
-    values = np.column_stack([design, np.vstack([held.columns, below])])
-    rows = whitened(scatter, [solution.drift], white, values)[0][0]
-    k = design.shape[1]
-    size = np.maximum(np.linalg.norm(rows[:, :k], axis=0), 1e-300)
-    taken, *_ = np.linalg.lstsq(rows[:, :k] / size, rows[:, k:], rcond=1e-12)
-    return replace(solution, along_held=-taken / size[:, None])
+        return columns, y, scatter, None
+    has_u = (np.nan_to_num(held.u) > 0) & np.any(held.columns, axis=0)
+    uncertain = held.columns[:, has_u] * held.u[has_u] / PRIOR
+    k = columns.shape[1]
+    if scatter.white_var is not None:
+        whole, y, scatter = with_prior(columns, uncertain, y, scatter, np.full(uncertain.shape[1], PRIOR**2))
+        columns, beside = whole[:, :k], whole[:, k:]
+    else:
+        beside = _determined(columns, uncertain)
+    below = np.zeros((len(columns) - len(held.columns), held.columns.shape[1]))
+    return columns, y, scatter, Considered(np.vstack([held.columns, below]), beside)
+
+
+def _determined(columns: NDArray[np.float64], more: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return those of more columns (m, b) that the data determine beside columns (m, k), with a row to spare."""
+    kept = np.zeros((len(columns), 0))
+    for column in more.T:
+        tried = np.column_stack([kept, column])
+        whole = np.column_stack([columns, tried])
+        if len(whole) > whole.shape[1] and rank_of(whole) == whole.shape[1]:
+            kept = tried
+    return kept
 
 
 def joint_covariance(

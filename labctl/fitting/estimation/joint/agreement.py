@@ -68,8 +68,7 @@ def agreement_of(
             fits[number] = {axis: _estimated(fit, tuple(model.held.axes.get(axis, ()))) for axis, fit in solved.items()}
         except LabctlError as error:
             return [], f"recording {number} alone does not determine the model: {error}"
-    known = {one.effect for names in model.held.axes.values() for one in names.values()}
-    known -= {effect for one in fits.values() for fit in one.values() for effect in fit.effects}
+    known = model.held.effects - {effect for one in fits.values() for fit in one.values() for effect in fit.effects}
     ours = [term.effect for term in model.terms if is_exported(term) and term.effect not in known]
     return [_agreement(effect, data.outputs, list(fits.values()), len(ours)) for effect in ours], ""
 
