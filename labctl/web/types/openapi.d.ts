@@ -1912,7 +1912,7 @@ export interface components {
             unconfirmed_at: string | null;
             /**
              * Attempts
-             * @description How often labctl has tried again to set the safe state since `unconfirmed_at`.
+             * @description How many times labctl has tried again to set the safe state since `unconfirmed_at`.
              * @default 0
              */
             attempts: number;
@@ -2212,7 +2212,7 @@ export interface components {
             clip?: boolean;
             /**
              * Hide
-             * @description Effects to hide in the units of a simulated bench, each as EFFECT or EFFECT=SIZE, SIZE in the unit of the effect, or z10 for a signal of ten standard deviations of the noise on this plan.
+             * @description Effects to hide in the simulated gyros, each as EFFECT or EFFECT=SIZE; SIZE is a number in the unit of the effect, or zN, such as z10, for a signal of N standard deviations of the noise on this plan.
              */
             hide?: string[];
             /**
@@ -2223,7 +2223,7 @@ export interface components {
             fit?: boolean;
             /**
              * At
-             * @description Time of the start, ISO 8601; a time without an offset is in `time_zone`. `now`: start as soon as the bench is free. Default: start at once.
+             * @description Time of the start, ISO 8601; a time without an offset is in `time_zone`. `now`: start as soon as the bench is free. Default: start at once, or status 409 if the bench is not free.
              */
             at?: string | null;
             /**
@@ -3156,7 +3156,7 @@ export interface components {
              * @description All recordings that the model is compared with; `recording` is the newest.
              */
             recordings: number[];
-            /** @description Only for several recordings: repeatability, agreement, and the error when each is predicted by a fit to the others. */
+            /** @description Only for several recordings: repeatability, agreement between the recordings, and the error when each recording is predicted by a fit to the others. */
             joint: components["schemas"]["JointJson"] | null;
             /**
              * Verdict
@@ -3991,6 +3991,8 @@ export interface components {
              * @description Effect ids; `name:2` sets the polynomial order to 2. Without `model`, these effects are the whole model; with `model`, they are added to that model.
              */
             effects?: string[];
+            /** @description Published or measured coefficients that are held at their values; the other coefficients of the model are fitted. Default: all are fitted. */
+            fixed?: components["schemas"]["FixedCoefficients"] | null;
             /**
              * Accept Warnings
              * @description Fit the data although labctl found errors in them, and keep the fit even if it is worse than no correction; the response still lists the warnings.
@@ -4022,7 +4024,7 @@ export interface components {
             warnings: components["schemas"]["DataWarning"][];
             /**
              * Noise
-             * @description For each axis: white noise and drift that set the weights of the fit, deg/s.
+             * @description For each axis: white noise of the mean of a data set and drift of the bias between data sets, deg/s (standard deviations); the weights of the fit follow from them.
              */
             noise: {
                 [key: string]: components["schemas"]["AxisNoiseJson"];
@@ -4046,7 +4048,7 @@ export interface components {
              * @description All recordings that the model was fitted to; `recording` is the newest of these.
              */
             recordings: number[];
-            /** @description Only for several recordings: repeatability, agreement, and the error when each is predicted by a fit to the others. */
+            /** @description Only for several recordings: repeatability, agreement between the recordings, and the error when each recording is predicted by a fit to the others. */
             joint: components["schemas"]["JointJson"] | null;
             /** Version */
             version: number;
@@ -4064,6 +4066,87 @@ export interface components {
              * @description SHA-256 of the calibration file.
              */
             hash: string;
+        };
+        /**
+         * FixedCoefficient
+         * @description A known coefficient: a number, or a list over temperatures.
+         */
+        FixedCoefficient: {
+            /** Value */
+            value: number | number[];
+            /**
+             * U
+             * @description Standard uncertainty, in the unit of the value; null: not stated.
+             */
+            u?: number | (number | null)[] | null;
+            /**
+             * Unit
+             * @description Checked against the unit that `labctl fit --json` gives.
+             */
+            unit?: string | null;
+            /**
+             * Effect
+             * @description Effect of the coefficient; default: by its name.
+             */
+            effect?: string | null;
+            /**
+             * Temperature C
+             * @description Temperatures of a table, rising, deg C; null: one value for all temperatures.
+             */
+            temperature_c?: number[] | null;
+        };
+        /**
+         * FixedCoefficients
+         * @description Known coefficients by axis, each under the name that `labctl fit --json` gives it.
+         */
+        FixedCoefficients: {
+            /**
+             * Source
+             * @description Where the values are from, such as a data sheet and its page.
+             * @default
+             */
+            source?: string;
+            /**
+             * Reference Temperature C
+             * @description Zero point of the temperature terms that the values hold for, deg C.
+             */
+            reference_temperature_c?: number | null;
+            /** X */
+            x?: {
+                [key: string]: components["schemas"]["FixedCoefficient"] | number;
+            };
+            /** Y */
+            y?: {
+                [key: string]: components["schemas"]["FixedCoefficient"] | number;
+            };
+            /** Z */
+            z?: {
+                [key: string]: components["schemas"]["FixedCoefficient"] | number;
+            };
+            /**
+             * File
+             * @description Name of the file that the values are from; used in messages.
+             * @default
+             */
+            file?: string;
+            /**
+             * Argument
+             * @description `argument` of the model that the values are from; null: that of the fitted model.
+             */
+            argument?: ("rate" | "output") | null;
+            /**
+             * Output
+             * @description How the outputs that the values are of were converted to deg/s, by axis.
+             */
+            output?: {
+                [key: string]: components["schemas"]["OutputUnit"];
+            };
+            /**
+             * Only Of Model
+             * @description Leave out values of effects that the model does not have; else they are an error.
+             * @default false
+             */
+            only_of_model?: boolean;
         };
         /**
          * Follower
@@ -4161,6 +4244,38 @@ export interface components {
              * @description Time since the last answer of the process that drives the bench, s.
              */
             heard_s: number;
+        };
+        /**
+         * HeldCoefficientJson
+         * @description A coefficient that was not fitted, with its standard uncertainty `u`; null: not stated.
+         *
+         *     Of a table, `value` and `u` are lists over `temperature_c`.
+         */
+        HeldCoefficientJson: {
+            /** Effect */
+            effect: string;
+            /** Value */
+            value: number | number[];
+            /** U */
+            u: number | (number | null)[] | null;
+            /** Unit */
+            unit: string;
+            /** Temperature C */
+            temperature_c?: number[];
+        };
+        /**
+         * HeldJson
+         * @description The coefficients that a fit held at known values, axis -> name -> coefficient, and where they are from.
+         */
+        HeldJson: {
+            /** Source */
+            source: string;
+            /** Axes */
+            axes: {
+                [key: string]: {
+                    [key: string]: components["schemas"]["HeldCoefficientJson"];
+                };
+            };
         };
         /**
          * HeldOutMovesJson
@@ -4277,7 +4392,7 @@ export interface components {
             warnings: components["schemas"]["DataWarning"][];
             /**
              * Noise
-             * @description For each axis: white noise and drift that set the weights of the fit, deg/s.
+             * @description For each axis: white noise of the mean of a data set and drift of the bias between data sets, deg/s (standard deviations); the weights of the fit follow from them.
              */
             noise: {
                 [key: string]: components["schemas"]["AxisNoiseJson"];
@@ -4301,7 +4416,7 @@ export interface components {
              * @description All recordings that the model was fitted to; `recording` is the newest of these.
              */
             recordings: number[];
-            /** @description Only for several recordings: repeatability, agreement, and the error when each is predicted by a fit to the others. */
+            /** @description Only for several recordings: repeatability, agreement between the recordings, and the error when each recording is predicted by a fit to the others. */
             joint: components["schemas"]["JointJson"] | null;
             /**
              * Improved From
@@ -4356,7 +4471,7 @@ export interface components {
             warnings: components["schemas"]["DataWarning"][];
             /**
              * Noise
-             * @description For each axis: white noise and drift that set the weights of the fit, deg/s.
+             * @description For each axis: white noise of the mean of a data set and drift of the bias between data sets, deg/s (standard deviations); the weights of the fit follow from them.
              */
             noise: {
                 [key: string]: components["schemas"]["AxisNoiseJson"];
@@ -4380,7 +4495,7 @@ export interface components {
              * @description All recordings that the model was fitted to; `recording` is the newest of these.
              */
             recordings: number[];
-            /** @description Only for several recordings: repeatability, agreement, and the error when each is predicted by a fit to the others. */
+            /** @description Only for several recordings: repeatability, agreement between the recordings, and the error when each recording is predicted by a fit to the others. */
             joint: components["schemas"]["JointJson"] | null;
             /**
              * Improved From
@@ -4889,7 +5004,7 @@ export interface components {
             version: number | null;
             /**
              * Temperature C
-             * @description Lowest and highest temperature, deg C; null: unknown.
+             * @description Lowest and highest temperature in the recording, deg C; null: unknown.
              */
             temperature_c: [
                 number,
@@ -4967,6 +5082,8 @@ export interface components {
             temperature: components["schemas"]["TemperatureBasisJson"] | null;
             /** @description Zero point of the temperature terms. */
             reference: components["schemas"]["ReferenceJson"] | null;
+            /** @description Coefficients that were held at known values and not fitted, and their source; null: none. */
+            held: components["schemas"]["HeldJson"] | null;
         };
         /**
          * MotionResponse
@@ -5307,6 +5424,30 @@ export interface components {
             t_s: number;
         };
         /**
+         * OutputUnit
+         * @description How a gyro column becomes a rate: rate_dps = (column - offset) / scale.
+         *
+         *     For deg/s, rad/s and deg/h both have defaults; for V, mV, count and arb the nominal scale must be given.
+         */
+        OutputUnit: {
+            /**
+             * Unit
+             * @default deg/s
+             * @enum {string}
+             */
+            unit?: "deg/s" | "rad/s" | "deg/h" | "V" | "mV" | "count" | "arb";
+            /**
+             * Offset
+             * @default 0
+             */
+            offset?: number;
+            /**
+             * Scale
+             * @default 1
+             */
+            scale?: number;
+        };
+        /**
          * ParameterJson
          * @description A nonlinear parameter of an effect, and between which values it is searched.
          */
@@ -5484,7 +5625,7 @@ export interface components {
             warnings: components["schemas"]["DataWarning"][];
             /**
              * Noise
-             * @description For each axis: white noise and drift that set the weights of the fit, deg/s.
+             * @description For each axis: white noise of the mean of a data set and drift of the bias between data sets, deg/s (standard deviations); the weights of the fit follow from them.
              */
             noise: {
                 [key: string]: components["schemas"]["AxisNoiseJson"];
@@ -5508,7 +5649,7 @@ export interface components {
              * @description All recordings that the model was fitted to; `recording` is the newest of these.
              */
             recordings: number[];
-            /** @description Only for several recordings: repeatability, agreement, and the error when each is predicted by a fit to the others. */
+            /** @description Only for several recordings: repeatability, agreement between the recordings, and the error when each recording is predicted by a fit to the others. */
             joint: components["schemas"]["JointJson"] | null;
             /**
              * Improved From
@@ -5837,7 +5978,7 @@ export interface components {
             u_bias_dps: number;
             /**
              * Scale Factor
-             * @description Scale factor error: error divided by rate (1 = 100 %); null: the recording has only one rate.
+             * @description Scale factor error: slope of the error over the rate (1 = 100 %); null: the recording has only one rate.
              */
             scale_factor: number | null;
             /** U Scale Factor */
@@ -7066,7 +7207,7 @@ export interface components {
             warnings: components["schemas"]["DataWarning"][];
             /**
              * Noise
-             * @description For each axis: white noise and drift that set the weights of the fit, deg/s.
+             * @description For each axis: white noise of the mean of a data set and drift of the bias between data sets, deg/s (standard deviations); the weights of the fit follow from them.
              */
             noise: {
                 [key: string]: components["schemas"]["AxisNoiseJson"];
@@ -7090,7 +7231,7 @@ export interface components {
              * @description All recordings that the model was fitted to; `recording` is the newest of these.
              */
             recordings: number[];
-            /** @description Only for several recordings: repeatability, agreement, and the error when each is predicted by a fit to the others. */
+            /** @description Only for several recordings: repeatability, agreement between the recordings, and the error when each recording is predicted by a fit to the others. */
             joint: components["schemas"]["JointJson"] | null;
             /** Version */
             version: number;
