@@ -64,21 +64,15 @@ def axis_design(
         if not np.any(values):
             continue
         if column.law is not None:
-            here = basis @ at[column.name] if at and column.name in at else np.full(len(data), column.start)
-            values = column.slope(here)
-            offset += column.error_dps(here) - values * here
+            values, beside = _tangent(column, basis @ at[column.name] if at and column.name in at else None)
+            offset += beside
             laws.append(column.name)
         added = values[:, None] if owner in steady else values[:, None] * basis
         if owner in steady and _is_dependent(np.concatenate(columns, axis=1), added):
             continue  # an added polynomial repeats the powers that the model has already
         columns.append(added)
         unknowns += added.shape[1]
-        if unknowns > len(data):  # before each further column is compared with all of them
-            raise NotEnoughData(
-                f"{data.info.serial}, axis {axis}: model {model.name[:80]} has more coefficients than the "
-                f"recording's {len(data)} data sets determine; leave effects out"
-                f", or measure more"
-            )
+        _refuse_too_many(data, model, axis, unknowns)  # before each further column is compared with all of them
         spread.append(np.ones((nodes, 1)) if owner in steady else np.eye(nodes))
         held.add_none()
         names.append((owner, column.name, column.unit))
@@ -92,6 +86,21 @@ def axis_design(
         tuple(laws),
         tuple(shifts_of(data.channels, axis)),
     )
+
+
+def _refuse_too_many(data: FitData, model: ErrorModel, axis: str, unknowns: int) -> None:
+    if unknowns > len(data):
+        raise NotEnoughData(
+            f"{data.info.serial}, axis {axis}: model {model.name[:80]} has more coefficients than the "
+            f"recording's {len(data)} data sets determine; leave effects out, or measure more"
+        )
+
+
+def _tangent(column: Column, at: Array | None) -> tuple[Array, Array]:
+    """Return the slope of a law at coefficients (m,), or where it starts, and what the law has beside the tangent."""
+    here = np.full(len(column.values), column.start) if at is None else at
+    slope = column.slope(here)
+    return slope, column.error_dps(here) - slope * here
 
 
 def _exercised(data: FitData, model: ErrorModel, channels: Channels, axis: str) -> list[tuple[str, Column]]:

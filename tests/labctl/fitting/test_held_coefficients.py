@@ -65,7 +65,7 @@ def test_values_and_covariance_are_those_of_least_squares_on_the_reduced_system(
     g, u = -np.linalg.pinv(x) @ h, np.diag([4e-4**2, 3e-5**2])
     joint = np.block([[own + g @ u @ g.T, g @ u], [u @ g.T, u]])
     order = [found.names.index(name) for name in ("bias", "asymmetry", "bias_t1", "scale_factor")]
-    np.testing.assert_allclose(found.values[order, 0], [*values, 2.9e-3, 4.1e-3], rtol=1e-9)
+    assert found.values[order, 0] == pytest.approx([*values, 2.9e-3, 4.1e-3], rel=1e-9)
     size = np.sqrt(np.outer(np.diag(joint), np.diag(joint)))
     np.testing.assert_allclose(found.covariance[np.ix_(order, order)] / size, joint / size, atol=1e-9)
 

@@ -117,7 +117,7 @@ def _of_axis(
 
 def _check(what: str, one: HeldCoefficient, unit: str, model: ErrorModel) -> None:
     if one.unit and one.unit != unit:
-        raise BadInput(f"{what}: the unit of this coefficient is {unit!r}, not {one.unit!r}; convert value and u")
+        raise BadInput(f"{what}: the unit of this coefficient is {unit!r}, not {one.unit!r}; write value and u in it")
     term = next(term for term in model.terms if term.effect == one.effect)
     if kind_of(term).parameters:
         shape = ", ".join(parameter.name for parameter in kind_of(term).parameters)
