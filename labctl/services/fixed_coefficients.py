@@ -53,11 +53,14 @@ def _complaints(error: ValidationError) -> str:
     """Return what is wrong, once for each coefficient or key."""
     found: dict[tuple[int | str, ...], str] = {}
     for each in error.errors():
-        place = each["loc"][:2] if each["loc"][:1] and each["loc"][0] in AXES else each["loc"][:1]
+        loc = each["loc"]
+        place = loc[:2] if loc[:1] and loc[0] in AXES else loc[:1]
         text = each["msg"].removeprefix("Value error, ")
-        if each["type"] == "extra_forbidden" and len(each["loc"]) == 1:
+        if each["type"] == "extra_forbidden" and len(loc) == 1:
             text = "is neither an axis (x, y, z) nor one of source, reference_temperature_c"
         what = f"axis {place[0]}: {place[1]}" if len(place) == 2 else str(place[0])
+        if len(loc) > 2 and loc[2] != "value":
+            what += f", {loc[2]}"
         found.setdefault(place, f"{what} = {shown(each['input'])}: {text}")
     return listed(found.values())
 

@@ -252,6 +252,13 @@ def test_other_refusals_name_the_file_and_say_what_to_do() -> None:
         fit(recording, "bias", fixed=replace(fixed({"z": {"asymmetry": one(0.1)}}), only_of_model=True))
 
 
+def test_beside_published_coefficients_nothing_is_held() -> None:
+    recording = grid(10)
+    info = recording.info.model_copy(update={"kind": "coefficients"})
+    with pytest.raises(BadInput, match=r"known.toml: the recording of ONE is a table of coefficients, beside which"):
+        fit(Recording(info, recording.columns), "bias", fixed=fixed({"z": {"bias": one(0.1)}}))
+
+
 def test_a_reference_temperature_is_the_one_that_the_values_hold_for() -> None:
     held = {"bias": one(0.2 - 3e-3 * 25), "scale_factor": one(4e-3)}
     result = fit(grid(9, 1e-9), None, ["bias", "bias_temperature:1", "scale_factor"], fixed=fixed({"z": held}, 0.0))
