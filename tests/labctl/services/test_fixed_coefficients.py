@@ -199,6 +199,8 @@ WRONG = {
     "w = { bias = 0.1 }": "w = {'bias': 0.1}: is neither an axis (x, y, z) nor one of source",
     "[z]\nbias = inf": "axis z: bias = inf: Input should be a finite number",
     "[z]\nbias = nan": "axis z: bias = nan: Input should be a finite number",
+    "[z]\nbias = 1e300": "axis z: bias = 1e+300: Input should be less than or equal to 1000000000000",
+    "reference_temperature_c = 1e5": "reference_temperature_c = 100000.0: Input should be less than or equal",
     "[z]\nbias = 'big'": "axis z: bias = 'big': Input should be a valid number",
     "[z]\nbias = true": "axis z: bias = True: Input should be a valid number",
     "[z]\nbias = { value = 1, u = -0.1 }": "axis z: bias, u = -0.1: Input should be greater than or equal to 0",

@@ -16,8 +16,12 @@ from labctl.services.schemas.base import Request
 #: Most coefficients of an axis, most temperatures of a table, and the longest text.
 MOST_COEFFICIENTS, MOST_TEMPERATURES, LONGEST = 200, 1000, 200
 
-Number = Annotated[FiniteFloat, Field(strict=True)]
-NotNegative = Annotated[FiniteFloat, Field(strict=True, ge=0)]
+#: The largest size of a value, whose squares are summed, and the least u that differs from 0.
+LARGEST, LEAST_U = 1e12, 1e-30
+
+Number = Annotated[FiniteFloat, Field(strict=True, ge=-LARGEST, le=LARGEST)]
+NotNegative = Annotated[FiniteFloat, Field(strict=True, ge=0, le=LARGEST)]
+Celsius = Annotated[FiniteFloat, Field(strict=True, ge=-273.15, le=1e4)]
 Text = Annotated[str, Field(max_length=LONGEST)]
 
 
@@ -30,7 +34,7 @@ class FixedCoefficient(Request):
     )
     unit: Text | None = Field(default=None, description="Checked against the unit that `labctl fit --json` gives.")
     effect: Text | None = Field(default=None, description="Effect of the coefficient; default: by its name.")
-    temperature_c: Annotated[list[Number], Field(max_length=MOST_TEMPERATURES)] | None = Field(
+    temperature_c: Annotated[list[Celsius], Field(max_length=MOST_TEMPERATURES)] | None = Field(
         default=None, description="Temperatures of a table, rising, deg C; null: one value for all temperatures."
     )
 
@@ -55,7 +59,7 @@ class FixedCoefficient(Request):
     def us(self) -> tuple[float, ...]:
         """The standard uncertainty of each value; NaN where it is not stated."""
         given = self.u if isinstance(self.u, list) else [self.u] * len(self.values)
-        return tuple(math.nan if u is None else u for u in given)
+        return tuple(math.nan if u is None else u if u >= LEAST_U else 0.0 for u in given)
 
 
 def _with_value(given: object) -> object:
@@ -71,7 +75,7 @@ class FixedCoefficients(Request):
     """Known coefficients by axis, each under the name that `labctl fit --json` gives it."""
 
     source: Text = Field(default="", description="Where the values are from, such as a data sheet and its page.")
-    reference_temperature_c: Number | None = Field(
+    reference_temperature_c: Celsius | None = Field(
         default=None, description="Zero point of the temperature terms that the values hold for, deg C."
     )
     x: AxisCoefficients = Field(default_factory=dict)
