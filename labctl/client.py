@@ -34,6 +34,7 @@ from labctl.services.schemas.campaigns import (
     ReasonRequest,
     ResumeRequest,
 )
+from labctl.services.schemas.documents.fixed import FixedCoefficients
 from labctl.services.schemas.recordings import ImportResponse, RecordingResponse
 from labctl.services.schemas.schedule import ScheduledResponse
 from labctl.services.schemas.units import UnitResponse
@@ -47,6 +48,7 @@ __all__ = [
     "EventResponse",
     "FitRequest",
     "FitResponse",
+    "FixedCoefficients",
     "ImportResponse",
     "RecordingResponse",
     "ResumeRequest",

@@ -6,9 +6,11 @@ from labctl.fitting.effects import CATALOGUE, describe_effects
 from labctl.fitting.estimation.axis_solutions import fit_turning, residuals
 from labctl.fitting.estimation.error_metrics import ErrorFigures, Spread, by_turning_axis, rms
 from labctl.fitting.estimation.fit import fit
+from labctl.fitting.estimation.held.resolution import Fixed
 from labctl.fitting.estimation.result import FitResult, coefficients_json
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.fitted_model import FittedModel
+from labctl.fitting.models.held import HeldCoefficient
 from labctl.fitting.models.presets import PRESETS, describe_presets
 
 __all__ = [
@@ -20,6 +22,8 @@ __all__ = [
     "FitData",
     "FitResult",
     "FittedModel",
+    "Fixed",
+    "HeldCoefficient",
     "Spread",
     "by_turning_axis",
     "coefficients_json",

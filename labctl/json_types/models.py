@@ -37,14 +37,35 @@ class ReferenceJson(TypedDict):
     temperature_c: float
 
 
+class HeldCoefficientJson(TypedDict):
+    """A coefficient that was not fitted, with its standard uncertainty `u`; null: not stated.
+
+    Of a table, `value` and `u` are lists over `temperature_c`.
+    """
+
+    effect: str
+    value: float | list[float]
+    u: float | list[float | None] | None
+    unit: str
+    temperature_c: NotRequired[list[float]]
+
+
+class HeldJson(TypedDict):
+    """The coefficients that a fit held at known values, axis -> name -> coefficient, and where they are from."""
+
+    source: str
+    axes: dict[str, dict[str, HeldCoefficientJson]]
+
+
 class ErrorModelJson(TypedDict):
-    """A model without coefficients."""
+    """A model without coefficients; `held` only where some were held at known values."""
 
     name: str
     argument: Literal["rate", "output"]
     terms: list[TermJson]
     temperature: TemperatureBasisJson
     reference: ReferenceJson
+    held: NotRequired[HeldJson]
 
 
 class AxisFitJson(TypedDict):

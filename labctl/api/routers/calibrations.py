@@ -30,7 +30,6 @@ from labctl.services.schemas.calibrations import (
     ImprovedVersionResponse,
     ImproveRequest,
     ImproveResponse,
-    LadderResponse,
     PreviewResponse,
     VersionResponse,
 )
@@ -42,6 +41,7 @@ from labctl.services.schemas.criticism import (
     StageResponse,
     VerificationResponse,
 )
+from labctl.services.schemas.reports.ladder import LadderResponse
 from labctl.services.schemas.uncertainty import SurfaceResponse, UncertaintyResponse
 
 router = APIRouter(prefix="/api/units/{serial}", tags=["calibrations"])

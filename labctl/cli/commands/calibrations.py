@@ -36,6 +36,15 @@ def fit(
             "polynomial order to 2.",
         ),
     ] = None,
+    fixed: Annotated[
+        Path | None,
+        typer.Option(
+            "--fixed",
+            metavar="FILE",
+            help="Hold the coefficients in FILE at their values and fit the others; FILE is TOML (a table for each "
+            "axis) or a calibration file.",
+        ),
+    ] = None,
     accept_warnings: AcceptWarnings = False,
     as_json: Json = False,
     database: Database = None,
@@ -51,6 +60,10 @@ def fit(
         request = FitRequest(
             recordings=recording_numbers(recording), model=model, effects=names, accept_warnings=accept_warnings
         )
+        if fixed is not None:
+            from labctl.services.fixed_coefficients import read_fixed
+
+            request = request.model_copy(update={"fixed": read_fixed(fixed)})
         answer = execute(database, FIT, ToUnit(serial, request))
     if as_json:
         print_json(answer)

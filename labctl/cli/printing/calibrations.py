@@ -10,7 +10,7 @@ from labctl.cli.printing.joint import print_joint
 from labctl.fitting.numeric.rounding import rounded_to_uncertainty
 
 if TYPE_CHECKING:
-    from labctl.json_types.models import Coefficients, Entry
+    from labctl.json_types.models import Coefficients, Entry, HeldJson
     from labctl.json_types.poses import PosesJson
     from labctl.services.schemas.calibrations import FitResponse
     from labctl.services.schemas.certification import CertificationResponse
@@ -32,6 +32,8 @@ def print_fit(answer: FitResponse) -> None:
     rates = "any rate" if slow is None or fast is None else f"{slow:.4g} to {fast:.4g} deg/s"
     warm = "any temperature (none was measured)" if low is None or high is None else f"{low:.1f} to {high:.1f} deg C"
     console.print(f"  valid              {warm}, {rates}")
+    if answer.model.held is not None:
+        _print_held(answer.model.held)
     print_joint(answer.joint)
     for axis, content in answer.axes.items():
         coefficients = content["coefficients"]
@@ -47,6 +49,13 @@ def print_fit(answer: FitResponse) -> None:
         console.print(rows)
     if answer.poses is not None:
         print_poses(answer.poses)
+
+
+def _print_held(held: HeldJson) -> None:
+    """Print which coefficients were held at known values, and where these are from."""
+    for axis, names in held["axes"].items():
+        console.print(f"  held, axis {axis}       {', '.join(names)}", markup=False, soft_wrap=True)
+    console.print(f"  held values from   {held['source']}", markup=False, soft_wrap=True)
 
 
 def print_poses(poses: PosesJson) -> None:

@@ -11,8 +11,9 @@ from labctl.cli.printing.joint import print_joint
 if TYPE_CHECKING:
     from labctl.json_types.criticism import ResidualMap, Suspect
     from labctl.json_types.noise import StaticRecordJson
-    from labctl.services.schemas.calibrations import ImproveResponse, LadderResponse
+    from labctl.services.schemas.calibrations import ImproveResponse
     from labctl.services.schemas.criticism import CriticismResponse, VerificationResponse
+    from labctl.services.schemas.reports.ladder import LadderResponse
 
 
 #: From dark to bright: residual over floor in the small map.

@@ -72,25 +72,46 @@ def _takes_mean_rate(data: ReducedRecording, kind: Effect) -> bool:
 def base_rows(data: ReducedRecording, model: ErrorModel, axis: str) -> tuple[NDArray[np.float64], list[str], Array]:
     """Return the base's coordinates (R, m, k), its columns' names, and the prior precision of each (k,).
 
-    The base is the model in its forward form, and the Earth's once-per-turn rate where the latitude is known.
+    The base is the model in its forward form, and the Earth's once-per-turn rate where the latitude is known. Held
+    coefficients, whose values `beside_held` has subtracted, are known to their uncertainty.
     """
     basis = model.temperature.basis(data.nodes.temperature_c(axis))
     rows: list[NDArray[np.float64]] = []
     names: list[str] = []
-    for effect_id, column in model.forward().carried(data.nodes, axis):
+    precision: list[Array] = []
+    forward = model.forward()
+    for effect_id, column in forward.carried(data.nodes, axis):
         if not np.any(column.values):
             continue
         over = np.ones((len(basis), 1)) if effect_id in model.steady else basis
+        known = forward.held.of(axis, effect_id, column.name)
+        if known is not None:
+            if not known.has_u or not min(known.u) > 0:
+                continue
+            over = basis @ known.spread(model.temperature)
         rows.append(_over_temperature(data, column, over))
         names += [f"{column.name}@{k}" for k in range(over.shape[1])]
-    precision = [np.zeros(len(names))]
+        precision.append(np.zeros(over.shape[1]) if known is None else np.array(known.u) ** -2.0)
     turning = _turning(data, axis)
     if turning:
         rows.append(np.stack([data.rows(column) for column in turning], axis=2))
         names += [column.name for column in turning]
         precision.append(np.full(len(turning), 2.0 / turning_size_dps(data.info) ** 2))
     whole = np.concatenate(rows, axis=2) if rows else np.zeros((*data.present.shape, 0))
-    return whole, names, np.concatenate(precision)
+    return whole, names, np.concatenate([np.zeros(0), *precision])
+
+
+def beside_held(data: ReducedRecording, model: ErrorModel) -> ReducedRecording:
+    """Return a recording whose outputs are without what the held coefficients of a model add to them."""
+    forward = model.forward()
+    output = dict(data.output)
+    for axis in forward.held.axes:
+        basis = forward.temperature.basis(data.nodes.temperature_c(axis))
+        for effect_id, column in forward.carried(data.nodes, axis):
+            if (known := forward.held.of(axis, effect_id, column.name)) is not None:
+                over = basis @ known.spread(forward.temperature)
+                output[axis] = output[axis] - _over_temperature(data, column, over) @ np.array(known.value)
+    return data if not forward.held.axes else replace(data, output=output)
 
 
 def _over_temperature(data: ReducedRecording, column: Column, basis: Array) -> NDArray[np.float64]:

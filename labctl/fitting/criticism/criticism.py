@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from labctl.fitting.criticism.candidates import beside_held
 from labctl.fitting.criticism.diagnostics import views_of
 from labctl.fitting.criticism.model_comparison import Comparison, compare_models, with_noise_of
 from labctl.fitting.criticism.reduction import ReducedRecording, reduce_recording
@@ -125,7 +126,8 @@ def criticise(
     forward = _forward(fit_data, model, base)
     if (short := _too_little(data, forward)) is not None:
         return Criticism(Verdict("insufficient_data", reason=short), data, fit_data, base, None, None)
-    comparison = compare_models(data.through(response_of_terms(forward.terms)), forward, catalogue)
+    seen = data.through(response_of_terms(forward.terms))
+    comparison = compare_models(beside_held(seen, forward), forward, catalogue)
     verdict, initial, final = search_stepwise(comparison, catalogue)
     found = Criticism(verdict, data, fit_data, base, None, comparison, final)
     if not full or found.beside_missing is None:
@@ -138,7 +140,7 @@ def criticise(
         direct_rms_dps=_direct_rms_dps(fit_data, model),
         suspects=suspects,
         not_testable=tuple(line for line in not_testable(comparison, catalogue) if line["effect"] not in suspected),
-        explained=_explained(initial),
+        explained=_explained(initial, seen),
         views=views_of(found.beside_missing, found.residuals, recording, catalogue),
     )
 
@@ -154,7 +156,8 @@ def best_shapes(
     recording = with_temperature(recording)
     data = replace(reduce_recording(recording), static=static_record(recording))
     forward = _forward(fit_data_of(points), model, None)
-    comparison = compare_models(data.through(response_of_terms(forward.terms)), forward, catalogue)
+    seen = data.through(response_of_terms(forward.terms))
+    comparison = compare_models(beside_held(seen, forward), forward, catalogue)
     return {c.id: refined_term(comparison, c) for c in comparison.candidates if not c.smooth and c.term is not None}
 
 
@@ -186,12 +189,11 @@ def _too_little(data: ReducedRecording, model: ErrorModel) -> str | None:
     return None
 
 
-def _explained(first: Comparison) -> float:
-    """Return the share of the raw excess chi2 that the base explains, 0 to 1."""
+def _explained(first: Comparison, data: ReducedRecording) -> float:
+    """Return the share of the excess chi2 of the raw `data` that the base explains, 0 to 1."""
     excess = raw = 0.0
     for axis, found in first.axes.items():
         freedom = found.rows - found.base_columns
         excess += max(found.best.chi2 - freedom, 0.0)
-        data = first.data
         raw += float(np.sum(data.error_dps(axis)[0] ** 2 / (first.white_var[axis] + found.best.noise.size_dps**2)))
     return float(np.clip(1.0 - excess / max(raw, 1e-12), 0.0, 1.0))

@@ -15,6 +15,7 @@ from labctl.fitting.data.earth import turning_columns
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.data.shifts import Shift, shifts_of
 from labctl.fitting.effects import Column
+from labctl.fitting.estimation.held.propagation import HeldColumns, HeldPart
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.numeric.arrays import Array
 
@@ -32,7 +33,8 @@ class AxisDesign:
     spread: NDArray[np.float64]  #: (k * nodes, c): from the estimated columns to the coefficients of the table
     names: list[tuple[str, str, str]]  #: (effect, name, unit) of the k
     turning: NDArray[np.float64]  #: (m, e): the Earth's rate that goes round with the table
-    offset_dps: Array  #: (m,): what a law at its present coefficients differs by from its tangent; 0 without laws
+    offset_dps: Array  #: (m,): held coefficients, and what laws at their present coefficients have beside the tangent
+    held: HeldPart  #: coefficients that are not estimated; their part of the error is in `offset_dps`
     laws: tuple[str, ...] = ()  #: names of the coefficients that enter by a law
     shifts: tuple[Shift, ...] = ()  #: what differs between recordings, where there are several
 
@@ -40,53 +42,72 @@ class AxisDesign:
 def axis_design(
     data: FitData, model: ErrorModel, axis: str, at: Mapping[str, NDArray[np.float64]] | None = None
 ) -> AxisDesign:
-    """Return the design of one axis. Columns that the recording does not exercise are left out.
+    """Return the design of one axis. Columns that the recording does not exercise are left out, unless they are held.
 
     A column with a law is its tangent at the coefficients `at`, name -> (nodes,), or where it starts.
     """
     channels = data.channels if model.argument == "rate" else data.channels.with_rates(data.outputs)
     steady = model.steady
-    found = [(owner, column) for owner, column in _exercised(data, model, channels, axis) if np.any(column.values)]
     basis = model.temperature.basis(data.channels.temperature_c(axis))
     nodes = basis.shape[1]
     columns, spread, names, laws = [np.zeros((len(data), 0))], [], [], []
+    held = HeldColumns(basis)
     offset = np.zeros(len(data))
     unknowns = 0
-    for owner, column in found:
+    for owner, column in _exercised(data, model, channels, axis):
         values = column.values
+        if (known := model.held.of(axis, owner, column.name)) is not None:
+            held.add(known, known.spread(model.temperature), values)
+            spread.append(np.zeros((nodes, 0)))
+            names.append((owner, column.name, column.unit))
+            continue
+        if not np.any(values):
+            continue
         if column.law is not None:
-            here = basis @ at[column.name] if at and column.name in at else np.full(len(data), column.start)
-            values = column.slope(here)
-            offset += column.error_dps(here) - values * here
+            values, beside = _tangent(column, basis @ at[column.name] if at and column.name in at else None)
+            offset += beside
             laws.append(column.name)
         added = values[:, None] if owner in steady else values[:, None] * basis
         if owner in steady and _is_dependent(np.concatenate(columns, axis=1), added):
             continue  # an added polynomial repeats the powers that the model has already
         columns.append(added)
         unknowns += added.shape[1]
-        if unknowns > len(data):  # before each further column is compared with all of them
-            raise NotEnoughData(
-                f"{data.info.serial}, axis {axis}: model {model.name[:80]} has more coefficients than the "
-                f"recording's {len(data)} data sets determine; leave effects out"
-                f", or measure more"
-            )
+        _refuse_too_many(data, model, axis, unknowns)  # before each further column is compared with all of them
         spread.append(np.ones((nodes, 1)) if owner in steady else np.eye(nodes))
+        held.add_none()
         names.append((owner, column.name, column.unit))
     return AxisDesign(
         np.concatenate(columns, axis=1),
         block_diag(*spread) if spread else np.zeros((0, 0)),
         names,
         turning_columns(data.info, data.channels, axis),
-        offset,
+        offset + held.part.error_dps,
+        held.part,
         tuple(laws),
         tuple(shifts_of(data.channels, axis)),
     )
+
+
+def _refuse_too_many(data: FitData, model: ErrorModel, axis: str, unknowns: int) -> None:
+    if unknowns > len(data):
+        raise NotEnoughData(
+            f"{data.info.serial}, axis {axis}: model {model.name[:80]} has more coefficients than the "
+            f"recording's {len(data)} data sets determine; leave effects out, or measure more"
+        )
+
+
+def _tangent(column: Column, at: Array | None) -> tuple[Array, Array]:
+    """Return the slope of a law at coefficients (m,), or where it starts, and what the law has beside the tangent."""
+    here = np.full(len(column.values), column.start) if at is None else at
+    slope = column.slope(here)
+    return slope, column.error_dps(here) - slope * here
 
 
 def _exercised(data: FitData, model: ErrorModel, channels: Channels, axis: str) -> list[tuple[str, Column]]:
     """Return (effect id, regressor) without those that multiply the rate of an axis that had one rate throughout.
 
     At one rate the part of an effect that grows with the rate is the same as its part at rest, so only that is claimed.
+    A held coefficient is known whatever the recording exercises.
     """
     found = model.columns(channels, axis)
     still = {name for name in channels.rates if data.distinct_rates(name) < TOLD_APART}
@@ -95,7 +116,11 @@ def _exercised(data: FitData, model: ErrorModel, channels: Channels, axis: str) 
     none = np.zeros(len(data))
     stopped = channels.with_rates({name: none if name in still else v for name, v in channels.rates.items()})
     at_rest = model.columns(stopped, axis)
-    return [seen for seen, left in zip(found, at_rest, strict=True) if np.any(left[1].values)]
+    return [
+        (owner, column)
+        for (owner, column), (_, left) in zip(found, at_rest, strict=True)
+        if np.any(left.values) or model.held.of(axis, owner, column.name) is not None
+    ]
 
 
 def _is_dependent(columns: NDArray[np.float64], added: NDArray[np.float64]) -> bool:

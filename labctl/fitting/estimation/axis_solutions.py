@@ -15,6 +15,7 @@ from labctl.fitting.data.rate_profile import TIME_CONSTANT
 from labctl.fitting.data.shifts import KINDS, shifts_of
 from labctl.fitting.estimation.axis_design import AxisDesign, axis_design
 from labctl.fitting.estimation.common_turn_error import with_common_error
+from labctl.fitting.estimation.held.propagation import considered, joint_covariance
 from labctl.fitting.estimation.response import (
     first_response,
     next_response,
@@ -135,8 +136,9 @@ def _solve_axis(data: FitData, model: ErrorModel, axis: str, design: AxisDesign,
         columns, y, scatter = with_prior(columns, values, y, scatter, wide**2)
         kinds = np.array([shift.kind for shift in design.shifts])
         random = RandomEffects(np.unique(kinds, return_inverse=True)[1], wide)
+    columns, y, scatter, known_beside = considered(design.held, columns, y, scatter)
     try:
-        return solve(columns, y, scatter, fixed.drift if fixed else None, random)
+        return solve(columns, y, scatter, fixed.drift if fixed else None, random, known_beside)
     except NotEnoughData as error:
         raise NotEnoughData(f"{data.info.serial}, axis {axis}, model {model.name}: {error}") from None
 
@@ -159,13 +161,14 @@ def _with_white_noise(design: AxisDesign, y: Array, scatter: Scatter) -> Scatter
 
 
 def _axis_fit(design: AxisDesign, solution: Solution) -> AxisFit:
-    names, k = design.names, design.columns.shape[1]
+    names = design.names
+    values, covariance = joint_covariance(solution, design.held, design.spread)
     return AxisFit(
         tuple(owner for owner, _, _ in names),
         tuple(name for _, name, _ in names),
         tuple(unit for _, _, unit in names),
-        (design.spread @ solution.values[:k]).reshape(len(names), -1),
-        design.spread @ solution.covariance[:k, :k] @ design.spread.T,
+        values.reshape(len(names), -1),
+        covariance,
     )
 
 

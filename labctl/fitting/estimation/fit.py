@@ -15,6 +15,7 @@ from labctl.fitting.data.temperature.history import TemperatureHistory
 from labctl.fitting.effects import Term, kind_of
 from labctl.fitting.estimation.axis_solutions import residuals, solve_axes
 from labctl.fitting.estimation.error_metrics import ErrorFigures, rms
+from labctl.fitting.estimation.held.resolution import Fixed, refuse_fixed, with_held
 from labctl.fitting.estimation.held_out import held_out_errors
 from labctl.fitting.estimation.held_out_legs import errors_by_leg
 from labctl.fitting.estimation.joint.findings import joint_findings
@@ -35,20 +36,23 @@ from labctl.recording import Recording
 
 
 def fit(
-    recording: Recording, model: str | None = None, effects: list[str] | None = None, *, covered: Covered | None = None
-) -> FitResult:
+    recording: Recording, model: str | None = None, effects: list[str] | None = None, *, covered: Covered | None = None,
+    fixed: Fixed | None = None,
+) -> FitResult:  # fmt: skip
     """Fit a preset, or effects, to a recording; `covered` is the range of the readings behind means, if known.
 
-    Raises BadInput for unknown names, NotEnoughData when the recording cannot determine the model (and how much more it
+    Coefficients that are `fixed` are held at their values, and the others are estimated. Raises BadInput for unknown
+    names and for what cannot be held, NotEnoughData when the recording cannot determine the model (and how much more it
     takes).
     """
     preset = preset_for(model, effects or [])
+    refuse_fixed(recording.info, fixed)
     if recording.info.motion == "poses" or preset.name == POSES:
         return of_poses(recording, model, effects or [])
     if recording.info.kind == "coefficients":
         return from_coefficients(recording, model, effects or [])
     data = fit_data_of(recording, covered)
-    return fit_preset(data, with_shapes(data, preset))
+    return fit_preset(data, with_shapes(data, with_held(data, preset, fixed)))
 
 
 @single_threaded

@@ -6,7 +6,7 @@ import numpy as np
 
 from labctl.errors import NotEnoughData
 from labctl.fitting.data.fit_data import FitData
-from labctl.fitting.effects import kind_of
+from labctl.fitting.effects import Term, kind_of
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.linearity import is_linear_in_rate
 
@@ -16,6 +16,14 @@ SPAN_PER_ORDER_C = 1.0
 
 def require_enough_data(data: FitData, model: ErrorModel) -> None:
     """Raise NotEnoughData, saying what is missing and how much, where the data sets cannot determine the model."""
+    require_channels(data, model)
+    _require_mean_rates(data, model)
+    _require_rates(data, model)
+    _require_temperatures(data, model)
+
+
+def require_channels(data: FitData, model: ErrorModel) -> None:
+    """Raise NotEnoughData where the recording lacks a column that an effect needs."""
     serial = data.info.serial
     for term in model.terms:
         if absent := data.channels.missing(kind_of(term).channels):
@@ -23,9 +31,19 @@ def require_enough_data(data: FitData, model: ErrorModel) -> None:
                 f"{serial}: effect {term.effect} needs column {absent[0]!r}; the recording has none: add the column, "
                 "or leave the effect out"
             )
-    _require_mean_rates(data, model)
-    _require_rates(data, model)
-    _require_temperatures(data, model)
+
+
+def _estimated(data: FitData, model: ErrorModel, axes: list[str]) -> list[Term]:
+    """Return the effects with a coefficient that is not held, on one of some axes."""
+    if not model.held.axes:
+        return list(model.terms)
+    free = {
+        effect
+        for axis in axes
+        for effect, column in model.columns(data.channels, axis)
+        if model.held.of(axis, effect, column.name) is None
+    }
+    return [term for term in model.terms if term.effect in free]
 
 
 def _require_mean_rates(data: FitData, model: ErrorModel) -> None:
@@ -46,7 +64,7 @@ def _require_mean_rates(data: FitData, model: ErrorModel) -> None:
 def _require_rates(data: FitData, model: ErrorModel) -> None:
     for axis in data.outputs:
         rates = data.distinct_rates(axis)
-        for term in model.terms:
+        for term in _estimated(data, model, [axis]):
             least, _ = kind_of(term).least(term)
             if rates < least:
                 raise NotEnoughData(
@@ -58,7 +76,7 @@ def _require_rates(data: FitData, model: ErrorModel) -> None:
 def _require_temperatures(data: FitData, model: ErrorModel) -> None:
     serial = data.info.serial
     temperatures, span = data.distinct_temperatures(), float(np.ptp(data.temperature_c))
-    for term in model.terms:
+    for term in _estimated(data, model, list(data.outputs)):
         _, least = kind_of(term).least(term)
         if temperatures < least:
             raise NotEnoughData(

@@ -65,6 +65,8 @@ class FitResult:
             "environment": self.environment,
             "reference_temperature_c": model.reference.temperature_c,
         }
+        if "held" in whole:
+            found["model"]["held"] = whole["held"]
         if self.poses is not None:
             found["poses"] = self.poses
         if self.joint is not None:

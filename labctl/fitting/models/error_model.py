@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.effects import Column, Reference, Term, kind_of
+from labctl.fitting.models.held import Held
 from labctl.fitting.models.temperature import Constant, TemperatureBasis, basis_from_dict
 from labctl.fitting.numeric.arrays import Array
 from labctl.json_types.models import ErrorModelJson, TermJson
@@ -34,6 +36,7 @@ class ErrorModel:
     argument: Argument = "rate"
     temperature: TemperatureBasis = field(default_factory=Constant)
     reference: Reference = field(default_factory=Reference)
+    held: Held = field(default_factory=Held)  #: coefficients that are not fitted
 
     @property
     def effect_ids(self) -> list[str]:
@@ -66,15 +69,28 @@ class ErrorModel:
         """Return the same model with other effects."""
         return replace(self, terms=terms, name=name or self.name)
 
+    def with_added(self, terms: Iterable[Term]) -> ErrorModel:
+        """Return the same model with more effects, each with one coefficient for all temperatures.
+
+        An effect of which it holds coefficients is replaced: what is added is estimated.
+        """
+        added = tuple(replace(term, steady=True) for term in terms)
+        freed = {term.effect for term in added} & self.held.effects
+        kept = tuple(term for term in self.terms if term.effect not in freed)
+        return replace(self, terms=(*kept, *added), held=self.held.beside(tuple(freed)))
+
     def to_dict(self) -> ErrorModelJson:
         """Return the model without coefficients, as JSON."""
-        return {
+        found: ErrorModelJson = {
             "name": self.name,
             "argument": self.argument,
             "terms": [_term_json(term) for term in self.terms],
             "temperature": self.temperature.to_dict(),
             "reference": {"temperature_c": self.reference.temperature_c},
         }
+        if self.held.axes:
+            found["held"] = self.held.to_json()
+        return found
 
     @staticmethod
     def from_dict(record: ErrorModelJson) -> ErrorModel:
@@ -88,11 +104,15 @@ class ErrorModel:
             record["argument"],
             basis_from_dict(record["temperature"]),
             Reference(record["reference"]["temperature_c"]),
+            Held.from_json(record.get("held")),
         )
 
     def forward(self) -> ErrorModel:
-        """Return the same effects as a law of the true rate: the form that is physics, and that criticism judges."""
-        return replace(self, argument="rate")
+        """Return the same effects as a law of the true rate: the form that is physics, and that criticism judges.
+
+        Coefficients of a law of the output mean something else in it, so those that were held are estimated.
+        """
+        return self if self.argument == "rate" else replace(self, argument="rate", held=Held())
 
 
 def _by_recording(term: Term, columns: list[Column], channels: Channels) -> list[Column]:

@@ -13,6 +13,7 @@ from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.data.temperature.levels import level_means
 from labctl.fitting.effects import Reference, Term, parse_term
 from labctl.fitting.models.error_model import ErrorModel
+from labctl.fitting.models.held import Held
 from labctl.fitting.models.temperature import LagrangeTable
 from labctl.json_types.effects import PresetJson
 
@@ -191,7 +192,11 @@ def preset_for(model: str | None, effects: list[str]) -> Preset:
 
 
 def changed(model: ErrorModel, add: tuple[Term, ...] = (), remove: tuple[str, ...] = ()) -> Preset:
-    """Return how to fit a model again in its forward form, with effects added and others left out."""
+    """Return how to fit a model again in its forward form, with effects added and others left out.
+
+    What the model holds stays held, but for the effects that are added: their coefficients are estimated.
+    """
+    held = model.forward().held.beside((*remove, *(term.effect for term in add)))
     kept = tuple(t for t in model.terms if t.effect not in {*remove, *(term.effect for term in add)})
     name = model.name + "".join(f"+{t.effect}" for t in add) + "".join(f"-{effect_id}" for effect_id in remove)
 
@@ -200,9 +205,19 @@ def changed(model: ErrorModel, add: tuple[Term, ...] = (), remove: tuple[str, ..
         if isinstance(table, LagrangeTable):
             table = LagrangeTable(_nodes(data, table.points, model.name), table.points)
         terms = (*kept, *(replace(term, steady=True) for term in add))
-        return replace(model.forward(), name=name, terms=terms, temperature=table), _all(data)
+        return replace(model.forward(), name=name, terms=terms, temperature=table, held=held), _all(data)
 
     return Preset(name, build, isinstance(model.temperature, LagrangeTable))
+
+
+def holding(preset: Preset, held: Held, reference: Reference | None = None) -> Preset:
+    """Return a preset whose model holds coefficients, and is centred on the reference that they are given for."""
+
+    def build(data: FitData) -> tuple[ErrorModel, Rows]:
+        model, rows = preset.build(data)
+        return replace(model, held=held, reference=reference or model.reference), rows
+
+    return Preset(preset.name, build, preset.inner_only)
 
 
 def unchanged(model: ErrorModel) -> Preset:

@@ -26,6 +26,8 @@ RANK_TOLERANCE = 1e-9
 NEGLIGIBLE = 1e-20
 #: The same where the spread of random effects is averaged over at each of them.
 NEGLIGIBLE_NOISE = 1e-3
+#: The least standard deviation of a random effect, in the unit of its coefficient.
+LEAST_SPREAD = 1e-9
 
 
 @dataclass(frozen=True)
@@ -40,6 +42,15 @@ class Solution:
     scale: float  #: factor on the covariance estimated from the residuals; 1 where the white noise is known;
     #: NaN, as the covariance then is, where neither the residuals nor the readings say anything about noise
     components: tuple[Component, ...] = ()  #: spread of each kind of random effect
+    along_held: NDArray[np.float64] | None = None  #: (k, h) derivative of the values along h held coefficients
+
+
+@dataclass(frozen=True)
+class Considered:
+    """Columns of coefficients that are known to an uncertainty, and are not estimated; y is without their part."""
+
+    columns: NDArray[np.float64]  #: (m, h)
+    beside: NDArray[np.float64]  #: (m, b): those beside which the noise is estimated; a row of m may be their prior
 
 
 @dataclass(frozen=True)
@@ -110,10 +121,12 @@ def solve(
     scatter: Scatter,
     drift: Drift | None = None,
     random: RandomEffects | None = None,
+    considered: Considered | None = None,
 ) -> Solution:
     """Fit y (m,) by design (m, k), weighted by the inverse of its noise; `drift` fixes the noise instead of a grid.
 
-    The last columns are `random` effects where that is given; their wide priors are rows of the design.
+    The last columns are `random` effects where that is given; their wide priors are rows of the design. An error of
+    what is `considered` is no noise: the noise is estimated beside it, and the coefficients without it.
     Raises NotEnoughData when the columns are linearly dependent or there are fewer rows than columns.
     """
     m, k = design.shape
@@ -122,9 +135,16 @@ def solve(
             f"{m} data sets at these rates and temperatures determine only {min(m, rank_of(design))} of the {k} "
             "coefficients of the model; measure at other rates and temperatures, or leave effects out"
         )
-    fits = _at(design, y, scatter, [drift]) if drift is not None else _over_grid(design, y, scatter)
+    whole = design if considered is None else np.column_stack([design, considered.beside])
+    fits = _at(whole, y, scatter, [drift]) if drift is not None else _over_grid(whole, y, scatter)
+    # the triangle of the first columns is that of a fit of them alone
+    fits = replace(fits, r=fits.r[:, :k, :k], projected=fits.projected[:, :k])
     found = _collect(fits, design, y, scatter)
-    return found if random is None else _with_random_effects(found, fits, design, y, random)
+    if random is not None:
+        found = _with_random_effects(found, fits, design, y, random)
+    if considered is None:
+        return found
+    return replace(found, along_held=_along(fits, design, scatter, considered.columns, _tightened(found, random)))
 
 
 def drift_beside(columns: NDArray[np.float64], y: Array, scatter: Scatter) -> Drift:
@@ -230,3 +250,31 @@ def _with_random_effects(
         residual=y - design @ mixed.values,
         components=mixed.components,
     )
+
+
+def _tightened(found: Solution, random: RandomEffects | None) -> Array:
+    """Return what the found spread of each random effect adds to the root of its prior's precision, (q,)."""
+    if random is None:
+        return np.zeros(0)
+    spread = np.maximum(np.array([component.value for component in found.components])[random.kind], LEAST_SPREAD)
+    return np.asarray(np.sqrt(np.maximum(spread**-2.0 - random.wide**-2.0, 0.0)))
+
+
+def _along(
+    fits: _Fits, design: NDArray[np.float64], scatter: Scatter, columns: NDArray[np.float64], tightened: Array
+) -> NDArray[np.float64]:
+    """Return the derivative of the coefficients (k,) along those of columns (m, h), averaged over the noise, (k, h)."""
+    (m, k), q = design.shape, len(tightened)
+    white = scatter.white_var if scatter.white_var is not None else np.ones(m)
+    below = np.zeros((q, k + columns.shape[1]))
+    below[:, k - q : k] = np.diag(tightened)
+    weights = fits.weights()
+    counting = np.flatnonzero(~(weights < NEGLIGIBLE_NOISE))
+    found = np.zeros((k, columns.shape[1]))
+    for point, share in zip(counting.tolist(), weights[counting] / weights[counting].sum(), strict=True):
+        rows = drift_noise.whitened(scatter, [fits.drifts[point]], white, np.column_stack([design, columns]))[0][0]
+        rows = np.vstack([rows, below])
+        size = np.maximum(np.linalg.norm(rows[:, :k], axis=0), 1e-300)
+        taken, *_ = np.linalg.lstsq(rows[:, :k] / size, rows[:, k:], rcond=1e-12)
+        found -= share * taken / size[:, None]
+    return found

@@ -10,6 +10,7 @@ from labctl.fitting.uncertainty.use import AxisEvidence
 
 #: Why a part is unknown.
 PUBLISHED = "published coefficients come without uncertainties"
+HELD_WITHOUT_U = "held coefficients come without uncertainties ({}): add u to each of them and fit again"
 NO_DATA_SETS = "published coefficients have no data sets from which it could be estimated"
 NOT_KEPT = "the version was made by an older version of labctl, which did not store it: fit it again"
 BY_HAND = (
@@ -25,8 +26,13 @@ def coefficient_line(
 ) -> BudgetLine:
     """Return the line of the fitted coefficients: their uncertainty in the result of the law, in `unit`."""
     u = law.u(fitted, temperature_c)
+    held = fitted.model.held
     why = PUBLISHED if u is None else BY_COVARIANCE
-    count = fitted.axes[law.axis].values.size
+    if unstated := held.without_u(law.axis):
+        why = HELD_WITHOUT_U.format(", ".join(unstated))
+    fit = fitted.axes[law.axis]
+    estimated = [name for name, owner in zip(fit.names, fit.effects, strict=True) if not held.of(law.axis, owner, name)]
+    count = len(estimated) * fit.values.shape[1]
     freedom = max(len(evidence.model_error.rate_dps) - count, 1) if evidence else None
     return BudgetLine("coefficients", "fit", "A", "normal", u, unit, 1.0, u, freedom, why=why)
 

@@ -51,7 +51,7 @@ class LawFunction:
     def u(self, fitted: FittedModel, temperature_c: float) -> float | None:
         """Return its standard uncertainty by the covariance of the coefficients (GUM eq. 13); None: not stated."""
         covariance = fitted.axes[self.axis].covariance
-        if not np.any(covariance):
+        if not np.any(covariance) or fitted.model.held.without_u(self.axis):
             return None
         gradient = self.gradient(fitted, temperature_c)
         return math.sqrt(max(float(gradient @ covariance @ gradient), 0.0))

@@ -9,6 +9,7 @@ import numpy as np
 
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.estimation.axis_solutions import residuals, solve_axes
+from labctl.fitting.estimation.held.resolution import Fixed, with_held
 from labctl.fitting.estimation.shapes import with_shapes
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.models.presets import Preset, preset_for
@@ -82,7 +83,9 @@ def use_evidence(
     }
 
 
-def evidence_of(recording: Recording, model: str | None, effects: list[str] | None) -> dict[str, AxisEvidence]:
+def evidence_of(
+    recording: Recording, model: str | None, effects: list[str] | None, fixed: Fixed | None = None
+) -> dict[str, AxisEvidence]:
     """Return what a recording shows of a model's errors in use, by axis.
 
     Nothing for a table of coefficients, and in poses, where no error at a single rate is seen.
@@ -92,4 +95,4 @@ def evidence_of(recording: Recording, model: str | None, effects: list[str] | No
     if recording.info.kind == "coefficients" or recording.info.motion == "poses":
         return {}
     data = fit_data_of(recording)
-    return use_evidence(data, with_shapes(data, preset_for(model, effects or [])))
+    return use_evidence(data, with_shapes(data, with_held(data, preset_for(model, effects or []), fixed)))

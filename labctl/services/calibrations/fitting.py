@@ -16,6 +16,7 @@ from labctl.services.calibrations.comparison import worse_than_raw
 from labctl.services.calibrations.next_version import keep_next_version
 from labctl.services.calibrations.remembered import remembered_by
 from labctl.services.criticism.measurements import Measurements
+from labctl.services.fixed_coefficients import fixed_of
 from labctl.services.recordings.inspection import as_json, refuse_wrong, warning_of
 from labctl.services.recordings.loading import chosen_rows
 from labctl.services.schemas.calibrations import (
@@ -31,19 +32,21 @@ from labctl.store import NewCalibration, RecordingRow, Store
 def fit_unit(store: Store, serial: str, request: FitRequest, at: datetime, *, is_draft: bool = False) -> FitResponse:
     """Fit a model to a unit's recording and keep it as the next version.
 
-    Raises NotFound, BadInput for an unknown model or effect, NotEnoughData, DataRefused for data that are certainly
-    wrong and for a fit that is worse than none. A draft (`is_draft`) is kept once: raises Conflict for another one.
+    Raises NotFound, BadInput for an unknown model or effect and for coefficients that cannot be held, NotEnoughData,
+    DataRefused for data that are certainly wrong and for a fit that is worse than none. A draft (`is_draft`) is kept
+    once: raises Conflict for another one.
     """
     measured = Measurements(store, chosen_rows(store, serial, request.recording, request.recordings))
     recording, campaign, recordings = measured.row.id, measured.row.campaign, measured.recordings
     what = f"fit of {measured.named} of {serial}"
     refuse_wrong(measured.warnings, what, accepted=request.accept_warnings)
     source = measured.source
-    result = fit(source, request.model, request.effects, covered=measured.covered)
+    fixed = fixed_of(request.fixed)
+    result = fit(source, request.model, request.effects, covered=measured.covered, fixed=fixed)
     late = source.info.motion == "profile" and IDS.isdisjoint(result.fitted.model.effect_ids)
     warnings = [*measured.warnings, *map(warning_of, worse_than_raw(result.error, late=late))]
     refuse_wrong(warnings, what, accepted=request.accept_warnings)
-    evidence = evidence_of(source, request.model, request.effects)
+    evidence = evidence_of(source, request.model, request.effects, fixed)
     run = store.campaigns.get(campaign) if campaign is not None else None
     recipe, bench = (run.recipe_name, run.bench_name) if run is not None else (None, None)
     made = {

@@ -144,8 +144,11 @@ def _change(store: Store, serial: str, request: ImproveRequest) -> _Change:
 def _refuse_what_changes_nothing(
     wanted: Sequence[Term], model: ErrorModel, request: ImproveRequest, version: int
 ) -> None:
-    """Raise BadInput for an effect that is there already. One with a shape may be added again: it gets another."""
-    fixed = {term.effect for term in model.terms if not term.parameters}
+    """Raise BadInput for an effect that is there already.
+
+    One with a shape may be added again: it gets another. One of which coefficients are held may: they are then fitted.
+    """
+    fixed = {term.effect for term in model.terms if not term.parameters} - model.held.effects
     for term in wanted:
         if term.effect in request.remove:
             raise BadInput(f"effect {term.effect!r} is both added and removed; give one of the two")

@@ -15,6 +15,7 @@ from labctl.fitting.models.inversion import NotConverged
 from labctl.json_types.criticism import Experiment
 from labctl.progress import report_stage
 from labctl.services.criticism.decimated_readings import Decimated
+from labctl.services.criticism.held_text import held_sentences
 from labctl.services.criticism.measurements import Measurements, refuse_unmeasured
 from labctl.services.criticism.report_text import answer_of, with_warnings
 from labctl.services.criticism.residuals import residual_columns
@@ -54,6 +55,7 @@ def evaluate(
     serial, version = calibration.serial, calibration.version
     experiments = _experiments(store, measured.row.campaign, found)
     criticism = answer_of(serial, version, measured.recordings, found, experiments)
+    criticism = criticism.model_copy(update={"text": [*criticism.text, *held_sentences(model)]})
     return (
         with_warnings(criticism.model_copy(update={"applied": applied}), warnings),
         ResidualsResponse(

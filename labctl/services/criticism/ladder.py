@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from labctl.errors import BadInput, LabctlError
 from labctl.services.cache import UNNAMED, compute
 from labctl.services.criticism.versions import version_of
-from labctl.services.schemas.calibrations import LadderResponse, LadderRow
+from labctl.services.schemas.reports.ladder import LadderResponse, LadderRow
 from labctl.store import CalibrationRecord, RecordingRow, Store
 
 #: Applying more versions than this to a recording takes long.

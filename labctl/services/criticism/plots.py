@@ -11,8 +11,8 @@ from labctl.services.cache import cached
 from labctl.services.criticism.comparison import comparison_json
 from labctl.services.criticism.criticise import criticise_unit
 from labctl.services.criticism.ladder import ladder
-from labctl.services.schemas.calibrations import LadderResponse
 from labctl.services.schemas.criticism import CriticismResponse, PictureResponse, PicturesResponse
+from labctl.services.schemas.reports.ladder import LadderResponse
 from labctl.store import Store
 
 

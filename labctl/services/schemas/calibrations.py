@@ -13,6 +13,7 @@ from labctl.json_types.models import (
     AxisCoefficients,
     AxisNoiseJson,
     FitEnvironment,
+    HeldJson,
     LeftOut,
     ReferenceJson,
     TemperatureBasisJson,
@@ -23,6 +24,7 @@ from labctl.json_types.poses import PosesJson
 from labctl.services.schemas.base import Request, ResponseModel
 from labctl.services.schemas.certification import CertificationResponse
 from labctl.services.schemas.criticism import ResidualColumns
+from labctl.services.schemas.documents.fixed import FixedCoefficients
 from labctl.services.schemas.warnings import WARNINGS, DataWarning
 
 ACCEPT = (
@@ -47,6 +49,11 @@ class FitRequest(Request):
         default_factory=list,
         description="Effect ids; `name:2` sets the polynomial order to 2. Without `model`, these effects are the "
         "whole model; with `model`, they are added to that model.",
+    )
+    fixed: FixedCoefficients | None = Field(
+        default=None,
+        description="Published or measured coefficients that are held at their values; the other coefficients of the "
+        "model are fitted. Default: all are fitted.",
     )
     accept_warnings: bool = Field(default=False, description=ACCEPT)
 
@@ -84,6 +91,10 @@ class ModelResponse(ResponseModel):
         default=None, description="Polynomial or interpolation by which the model depends on the temperature."
     )
     reference: ReferenceJson | None = Field(default=None, description="Zero point of the temperature terms.")
+    held: HeldJson | None = Field(
+        default=None,
+        description="Coefficients that were held at known values and not fitted, and their source; null: none.",
+    )
 
 
 class LegError(ResponseModel):
@@ -196,38 +207,6 @@ class PreviewResponse(ChangedModel):
     """What a changed model would be; nothing was stored, so it has no version of its own."""
 
     residuals: ResidualColumns = Field(description="Residuals of the changed model, by data set.")
-
-
-class LadderRow(ResponseModel):
-    """One version of a unit's calibration, with its errors."""
-
-    version: int
-    parent: int | None
-    recording: int | None = Field(description="The recording that the version was fitted to.")
-    recordings: list[int] = Field(default_factory=list, description=FITTED_TO)
-    model: str
-    effects: list[str]
-    applied_rms_dps: float | None = Field(
-        default=None,
-        description="Only for versions in `others`: RMS error on this recording without refitting, deg/s.",
-    )
-    raw_rms_dps: float | None
-    rms_dps: float | None
-    heldout_rms_dps: float | None
-    noise_floor_dps: float | None
-
-
-class LadderResponse(ResponseModel):
-    """The error of the versions fitted to one recording, each version after its parent."""
-
-    serial: str
-    recording: int | None = Field(default=None, description="Recording that all `steps` were fitted to.")
-    recordings: list[int] = Field(default_factory=list, description="All recordings that `steps` were fitted to.")
-    steps: list[LadderRow]
-    others: list[LadderRow] = Field(
-        default_factory=list, description="Versions fitted to other recordings, with their error on this recording."
-    )
-    noise_floor_dps: float | None
 
 
 class CalibrationRow(ResponseModel):

@@ -3991,6 +3991,8 @@ export interface components {
              * @description Effect ids; `name:2` sets the polynomial order to 2. Without `model`, these effects are the whole model; with `model`, they are added to that model.
              */
             effects?: string[];
+            /** @description Published or measured coefficients that are held at their values; the other coefficients of the model are fitted. Default: all are fitted. */
+            fixed?: components["schemas"]["FixedCoefficients"] | null;
             /**
              * Accept Warnings
              * @description Fit the data although labctl found errors in them, and keep the fit even if it is worse than no correction; the response still lists the warnings.
@@ -4064,6 +4066,87 @@ export interface components {
              * @description SHA-256 of the calibration file.
              */
             hash: string;
+        };
+        /**
+         * FixedCoefficient
+         * @description A known coefficient: a number, or a list over temperatures.
+         */
+        FixedCoefficient: {
+            /** Value */
+            value: number | number[];
+            /**
+             * U
+             * @description Standard uncertainty, in the unit of the value; null: not stated.
+             */
+            u?: number | (number | null)[] | null;
+            /**
+             * Unit
+             * @description Checked against the unit that `labctl fit --json` gives.
+             */
+            unit?: string | null;
+            /**
+             * Effect
+             * @description Effect of the coefficient; default: by its name.
+             */
+            effect?: string | null;
+            /**
+             * Temperature C
+             * @description Temperatures of a table, rising, deg C; null: one value for all temperatures.
+             */
+            temperature_c?: number[] | null;
+        };
+        /**
+         * FixedCoefficients
+         * @description Known coefficients by axis, each under the name that `labctl fit --json` gives it.
+         */
+        FixedCoefficients: {
+            /**
+             * Source
+             * @description Where the values are from, such as a data sheet and its page.
+             * @default
+             */
+            source?: string;
+            /**
+             * Reference Temperature C
+             * @description Zero point of the temperature terms that the values hold for, deg C.
+             */
+            reference_temperature_c?: number | null;
+            /** X */
+            x?: {
+                [key: string]: components["schemas"]["FixedCoefficient"] | number;
+            };
+            /** Y */
+            y?: {
+                [key: string]: components["schemas"]["FixedCoefficient"] | number;
+            };
+            /** Z */
+            z?: {
+                [key: string]: components["schemas"]["FixedCoefficient"] | number;
+            };
+            /**
+             * File
+             * @description Name of the file that the values are from; used in messages.
+             * @default
+             */
+            file?: string;
+            /**
+             * Argument
+             * @description `argument` of the model that the values are from; null: that of the fitted model.
+             */
+            argument?: ("rate" | "output") | null;
+            /**
+             * Output
+             * @description How the outputs that the values are of were converted to deg/s, by axis.
+             */
+            output?: {
+                [key: string]: components["schemas"]["OutputUnit"];
+            };
+            /**
+             * Only Of Model
+             * @description Leave out values of effects that the model does not have; else they are an error.
+             * @default false
+             */
+            only_of_model?: boolean;
         };
         /**
          * Follower
@@ -4161,6 +4244,38 @@ export interface components {
              * @description Time since the last answer of the process that drives the bench, s.
              */
             heard_s: number;
+        };
+        /**
+         * HeldCoefficientJson
+         * @description A coefficient that was not fitted, with its standard uncertainty `u`; null: not stated.
+         *
+         *     Of a table, `value` and `u` are lists over `temperature_c`.
+         */
+        HeldCoefficientJson: {
+            /** Effect */
+            effect: string;
+            /** Value */
+            value: number | number[];
+            /** U */
+            u: number | (number | null)[] | null;
+            /** Unit */
+            unit: string;
+            /** Temperature C */
+            temperature_c?: number[];
+        };
+        /**
+         * HeldJson
+         * @description The coefficients that a fit held at known values, axis -> name -> coefficient, and where they are from.
+         */
+        HeldJson: {
+            /** Source */
+            source: string;
+            /** Axes */
+            axes: {
+                [key: string]: {
+                    [key: string]: components["schemas"]["HeldCoefficientJson"];
+                };
+            };
         };
         /**
          * HeldOutMovesJson
@@ -4967,6 +5082,8 @@ export interface components {
             temperature: components["schemas"]["TemperatureBasisJson"] | null;
             /** @description Zero point of the temperature terms. */
             reference: components["schemas"]["ReferenceJson"] | null;
+            /** @description Coefficients that were held at known values and not fitted, and their source; null: none. */
+            held: components["schemas"]["HeldJson"] | null;
         };
         /**
          * MotionResponse
@@ -5305,6 +5422,30 @@ export interface components {
              * @description Time of the last reading, s since the campaign began.
              */
             t_s: number;
+        };
+        /**
+         * OutputUnit
+         * @description How a gyro column becomes a rate: rate_dps = (column - offset) / scale.
+         *
+         *     For deg/s, rad/s and deg/h both have defaults; for V, mV, count and arb the nominal scale must be given.
+         */
+        OutputUnit: {
+            /**
+             * Unit
+             * @default deg/s
+             * @enum {string}
+             */
+            unit?: "deg/s" | "rad/s" | "deg/h" | "V" | "mV" | "count" | "arb";
+            /**
+             * Offset
+             * @default 0
+             */
+            offset?: number;
+            /**
+             * Scale
+             * @default 1
+             */
+            scale?: number;
         };
         /**
          * ParameterJson

@@ -14,8 +14,8 @@ from labctl.services import cache as result_cache
 from labctl.services.cache import RecentResults, cached, cached_group
 from labctl.services.criticism import evaluation, measurements
 from labctl.services.schemas.base import ResponseModel
-from labctl.services.schemas.calibrations import LadderResponse
 from labctl.services.schemas.certification import CertificationResponse
+from labctl.services.schemas.reports.ladder import LadderResponse
 from labctl.store import open_store
 from tests.helpers.lab import Lab
 from tests.helpers.simulated_recordings import single_axis

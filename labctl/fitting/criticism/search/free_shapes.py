@@ -75,7 +75,7 @@ def channels_beside_smooth(first: Comparison, catalogue: Mapping[str, Effect]) -
 
 def with_steady(first: Comparison, terms: tuple[Term, ...]) -> ErrorModel:
     """Return the model of a comparison with more terms, each of one coefficient for all temperatures."""
-    return first.model.with_terms((*first.model.terms, *(replace(term, steady=True) for term in terms)))
+    return first.model.with_added(terms)
 
 
 def beside_terms(first: Comparison, terms: tuple[Term, ...], discrepancy: Mapping[str, Discrepancy]) -> Comparison:

@@ -31,7 +31,7 @@ def remainder_of(
     `share` is of the excess chi2 before, `over_floor` the means' RMS over their noise, and `depends_on` the channels
     that it follows.
     """
-    model = first.model.with_terms((*first.model.terms, *(replace(term, steady=True) for term in terms)))
+    model = first.model.with_added(terms)
     designs = {
         axis: replace(design, options=[option for option in design.options if option.smooth])
         for axis, design in designs_beside(first, model, {}).items()
@@ -92,7 +92,7 @@ def is_better_than_smooth(
     """
     if effect.term is None:
         return False
-    model = first.model.with_terms((*first.model.terms, replace(effect.term, steady=True)))
+    model = first.model.with_added([effect.term])
     none, exact = (
         {axis: replace(design, options=[]) for axis, design in designs_beside(first, model, wrong).items()}
         for wrong in (discrepancy, {})

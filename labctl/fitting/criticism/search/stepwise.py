@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -200,10 +200,10 @@ def _compared_beside(
     first: Comparison, findings: Sequence[Finding], catalogue: Mapping[str, Effect]
 ) -> tuple[Comparison, Step]:
     """Return the comparison beside effects that were found, and its judgement."""
-    terms = (*first.model.terms, *(replace(finding.term, steady=True) for finding in findings))
-    terms = with_exact_terms(first, terms)
+    model = first.model.with_added(finding.term for finding in findings)
+    terms = with_exact_terms(first, model.terms)
     discrepancy = together([finding.discrepancy for finding in findings])
-    beside = compare_beside(first, first.model.with_terms(terms), catalogue, discrepancy)
+    beside = compare_beside(first, model.with_terms(terms), catalogue, discrepancy)
     return _judged(beside, catalogue, first=False)
 
 

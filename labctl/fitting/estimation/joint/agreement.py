@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,14 +60,30 @@ def agreement_of(
     The chi2 of an effect that is shifted from recording to recording is given with and without what a shift explains.
     """
     fits: dict[int, Mapping[str, AxisFit]] = {}
+    model = replace(model, held=model.held.as_exact())  # an error of what all hold alike sets none of them apart
     for number, alone in of_each_recording(data).items():
         try:
             require_enough_data(alone, model)
-            fits[number] = solve_axes(alone, model, together).fits
+            solved = solve_axes(alone, model, together).fits
+            fits[number] = {axis: _estimated(fit, tuple(model.held.axes.get(axis, ()))) for axis, fit in solved.items()}
         except LabctlError as error:
             return [], f"recording {number} alone does not determine the model: {error}"
-    ours = [term.effect for term in model.terms if is_exported(term)]
+    known = model.held.effects - {effect for one in fits.values() for fit in one.values() for effect in fit.effects}
+    ours = [term.effect for term in model.terms if is_exported(term) and term.effect not in known]
     return [_agreement(effect, data.outputs, list(fits.values()), len(ours)) for effect in ours], ""
+
+
+def _estimated(fit: AxisFit, held: tuple[str, ...]) -> AxisFit:
+    """Return the coefficients of an axis without those that are held."""
+    kept = [k for k, name in enumerate(fit.names) if name not in held]
+    flat = np.repeat([name not in held for name in fit.names], fit.values.shape[1])
+    return AxisFit(
+        tuple(fit.effects[k] for k in kept),
+        tuple(fit.names[k] for k in kept),
+        tuple(fit.units[k] for k in kept),
+        fit.values[kept],
+        fit.covariance[np.ix_(flat, flat)],
+    )
 
 
 def _agreement(

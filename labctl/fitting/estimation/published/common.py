@@ -12,7 +12,7 @@ from labctl.fitting.estimation.error_metrics import ErrorFigures, rms
 from labctl.fitting.models.fitted_model import AxisFit
 from labctl.fitting.models.temperature import lagrange_weights
 from labctl.fitting.numeric.arrays import Array
-from labctl.recording import Recording
+from labctl.recording import Recording, RecordingInfo
 
 #: Largest rate of a unit whose recording does not state it, deg/s.
 USUAL_MAX_RATE_DPS = 90.0
@@ -45,7 +45,12 @@ def axis_fit(
 
 def rate_range_dps(recording: Recording) -> tuple[float, float]:
     """Return the lowest and the highest rate that a table is valid at, deg/s."""
-    full = recording.info.max_rate_dps or USUAL_MAX_RATE_DPS
+    return full_range_dps(recording.info)
+
+
+def full_range_dps(info: RecordingInfo) -> tuple[float, float]:
+    """Return the lowest and the highest rate of a unit, deg/s; the usual ones where its recording does not say it."""
+    full = info.max_rate_dps or USUAL_MAX_RATE_DPS
     return -full, full
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from labctl.compensator import Compensator
 from labctl.recording import read_recording, to_points, write_recording
-from labctl.services.schemas.calibrations import LadderResponse
+from labctl.services.schemas.reports.ladder import LadderResponse
 from tests.helpers.lab import Lab
 from tests.helpers.simulated_recordings import single_axis
 

@@ -1,0 +1,1 @@
+"""Coefficients that a fit holds at known values: which, and how their uncertainty enters the others."""
