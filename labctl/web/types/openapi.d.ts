@@ -2974,12 +2974,12 @@ export interface components {
             residual_dps: number[];
             /**
              * Turn Before Deg
-             * @description Error of the integrated angle after a full turn with only the static bias subtracted, deg; null: the rate is too low, another axis turns, or the recording has no data set at rest.
+             * @description Error of the integrated angle after a full turn with only the static bias subtracted, deg; null: the rate is too low, the turn is about another axis, or the recording has no data set at rest.
              */
             turn_before_deg: (number | null)[];
             /**
              * Turn After Deg
-             * @description Error of the integrated angle after a full turn with the calibration applied, deg; null: the rate is too low, another axis turns, or the recording has no data set at rest.
+             * @description Error of the integrated angle after a full turn with the calibration applied, deg; null: the rate is too low, the turn is about another axis, or the recording has no data set at rest.
              */
             turn_after_deg: (number | null)[];
         };
@@ -4756,7 +4756,7 @@ export interface components {
             axis: string;
             /**
              * Outside
-             * @description Whether the line is already outside the limit at the time of the newest recording.
+             * @description Whether the fitted line is already outside the limit at the time of the newest recording.
              */
             outside: boolean;
             /** Expected */

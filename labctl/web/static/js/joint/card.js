@@ -72,7 +72,11 @@ function agreement(joint) {
         { title: "Degrees of freedom", number: true, cell: (row) => `${row.freedom}` },
         { title: "p-value", number: true, cell: (row) => chance(row.p_value) },
         { title: "p-value beside shifts", number: true, cell: (row) => chance(row.p_value_beside_shifts) },
-        { title: "Name of a difference that is equal at all temperatures", prose: true, cell: (row) => row.shift ?? "–" },
+        {
+          title: "Name of a difference that is equal at all temperatures",
+          prose: true,
+          cell: (row) => row.shift ?? "–",
+        },
       ],
       joint.agreement,
       { label: "Agreement" },
