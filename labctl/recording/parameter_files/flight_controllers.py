@@ -52,7 +52,10 @@ def read(path: Path, options: ParameterOptions) -> Recording:
     text = _text(path)
     found = _kind(text)
     if found is None:
-        raise BadRecording(f"{path}: no parameter TC_G*_X3_0 or INS_TCAL*_GYR1_X; export a thermal calibration first")
+        raise BadRecording(
+            f"{path}: no parameter TC_G*_X3_0 (PX4) or INS_TCAL*_GYR1_X (ArduPilot), so it has no thermal calibration "
+            "of a gyro; run the thermal calibration on the flight controller, then save its parameters again"
+        )
     try:
         values = {name: float(number) for name, number in _LINE.findall(text)}
         warm, bias_rad_s = _px4(values, found[1]) if found[0] == "PX4" else _ardupilot(values, found[1])

@@ -48,7 +48,7 @@ def sent_map(text: str) -> ColumnMap | None:
     try:
         return checked_map(json.loads(text))
     except (ValueError, RecursionError) as error:
-        raise BadInput(f"map: not JSON: {error}; send JSON or TOML") from error
+        raise BadInput(f"map: read as JSON, but not valid: {error}; send JSON or TOML") from error
 
 
 def _plain(name: str) -> str:

@@ -186,7 +186,9 @@ class WiggleUnit(ResponseModel):
     unit: str
     serial: str
     port: str
-    moved: list[str] = Field(description="Units whose readings moved, the fastest first.")
+    moved: list[str] = Field(
+        description="Units of which the readings showed a rotation by hand, the one with the highest rate first."
+    )
     ok: bool = Field(description="Whether the readings of this unit moved, and those of no other unit.")
     text: str
 

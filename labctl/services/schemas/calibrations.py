@@ -44,7 +44,9 @@ class FitRequest(Request):
         default=None, description="Number of the recording; default: the unit's newest recording."
     )
     recordings: list[int] = Field(default_factory=list, description=SEVERAL)
-    model: str | None = Field(default=None, description="Name of a model, such as yang2018; default: only `effects`.")
+    model: str | None = Field(
+        default=None, description="Name of a model, such as yang2018; default: no named model, only `effects`."
+    )
     effects: list[str] = Field(
         default_factory=list,
         description="Effect ids; `name:2` sets the polynomial order to 2. Without `model`, these effects are the "

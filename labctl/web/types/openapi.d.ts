@@ -3983,7 +3983,7 @@ export interface components {
             recordings?: number[];
             /**
              * Model
-             * @description Name of a model, such as yang2018; default: only `effects`.
+             * @description Name of a model, such as yang2018; default: no named model, only `effects`.
              */
             model?: string | null;
             /**
@@ -4108,7 +4108,7 @@ export interface components {
             source?: string;
             /**
              * Reference Temperature C
-             * @description Zero point of the temperature terms that the values hold for, deg C.
+             * @description Reference temperature, deg C, from which the temperature terms count.
              */
             reference_temperature_c?: number | null;
             /** X */

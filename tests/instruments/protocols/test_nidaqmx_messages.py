@@ -42,7 +42,7 @@ def number(message: str, field: str) -> int:
         ("GetErrorStringResponse", "error_string", service.VALUE),
         *((f"{each}Request", "attribute_raw", at) for each, at in service.ATTRIBUTE.items()),
         *((f"{each}Response", "value", service.VALUE) for each in service.ATTRIBUTE),
-        *((f"{each}Response", "value_raw", service.RAW_VALUE) for each in service.ENUMERATED),
+        *((f"{each}Response", "value_raw", service.RAW_VALUE) for each in sorted(service.ENUMERATED)),
         *((f"{each}Request", "task", service.TASK) for each in ("StartTask", "ReadAnalogF64", "CfgSampClkTiming")),
         *((f"{each}Response", "status", service.STATUS) for each in ("StartTask", "ReadAnalogF64", "ClearTask")),
     ],

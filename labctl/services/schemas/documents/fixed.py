@@ -76,7 +76,7 @@ class FixedCoefficients(Request):
 
     source: Text = Field(default="", description="Where the values are from, such as a data sheet and its page.")
     reference_temperature_c: Celsius | None = Field(
-        default=None, description="Zero point of the temperature terms that the values hold for, deg C."
+        default=None, description="Reference temperature, deg C, from which the temperature terms count."
     )
     x: AxisCoefficients = Field(default_factory=dict)
     y: AxisCoefficients = Field(default_factory=dict)

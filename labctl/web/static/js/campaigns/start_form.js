@@ -140,7 +140,7 @@ export function startForm(bench, order) {
         labelledField(
           "May be late by, h",
           late,
-          "If the campaign cannot begin within this time, the start is skipped. Empty: no limit; a missed start is made up once.",
+          "If the campaign cannot begin within this time, the start is skipped. Empty: no limit; after any number of missed starts, one campaign begins as soon as it can.",
         ),
         zones,
       ),
@@ -160,7 +160,7 @@ export function startForm(bench, order) {
         labelledField(
           "May be late by, h",
           late,
-          "If the campaign cannot begin within this time, the start is skipped. Empty: no limit; a missed start is made up once.",
+          "If the campaign cannot begin within this time, the start is skipped. Empty: no limit; after any number of missed starts, one campaign begins as soon as it can.",
         ),
         zones,
       ),

@@ -62,7 +62,7 @@ export async function askCertification(serial, version) {
     {
       name: "due_days",
       label: "Due again in days",
-      hint: known.due_from ? `Value from the ${known.due_from}.` : "Empty: no date.",
+      hint: known.due_from ? `This number of days comes from the ${known.due_from}.` : "Empty: no date.",
       type: "number",
       value: known.due_days === null ? "" : String(known.due_days),
       required: false,

@@ -51,7 +51,9 @@ export function inForce(unit, rows, force) {
       ["At left-out temperatures", number(row?.heldout_rms_dps), "deg/s"],
     ]),
     force?.override ? overridden(force) : null,
-    left !== null && left < 0 ? notice("bad", "This calibration is overdue.") : null,
+    left !== null && left < 0
+      ? notice("bad", "The date until which this calibration is valid has passed; calibrate the unit again.")
+      : null,
     exportFiles(unit, null),
   );
 }

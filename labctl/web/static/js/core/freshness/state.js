@@ -58,7 +58,8 @@ export function freshnessWords(found, { service_s, bench_s, trouble, clock }) {
     };
   const bench = bench_s === null ? "" : ago(bench_s);
   if (found === "bench") {
-    const what = "The values of the bench on this page may be out of date; they follow by themselves once it answers.";
+    const what =
+      "The values of the bench on this page may be out of date; they are updated as soon as the bench answers.";
     return { stale: true, text: `Last answer of the bench ${bench}; the service answers. ${what}` };
   }
   if (service_s === null || bench_s === null) return { stale: false, text: service };
