@@ -47,38 +47,27 @@ PAGES = {
 
 
 def test_every_page_opens_in_every_dress(furnished: Service, visit: Callable[..., Page]) -> None:
-    page, wrong = visit("/"), []
-    for path, title in PAGES.items():
-        dress(page, WIDE, dark=False)
-        page.goto(furnished.url + path)
-        settled(page)
-        heading = page.locator("main h1").inner_text()
-        if title not in heading:
-            wrong.append(f"{path}: headed {heading!r}, not {title!r}")
-        wrong += [f"{path}, wide and light: {fault}" for fault in faults_of(page)]
-        dress(page, NARROW, dark=True)
-        settled(page)
-        wrong += [f"{path}, narrow and dark: {fault}" for fault in faults_of(page)]
-    assert not wrong, "\n".join(wrong)
-
-
-def dress(page: Page, size: dict[str, int], *, dark: bool) -> None:
-    """Change size and colours of an open page."""
-    page.emulate_media(color_scheme="dark" if dark else "light")
-    page.set_viewport_size({"width": size["width"], "height": size["height"]})
-
-
-def faults_of(page: Page) -> list[str]:
-    """Return what sticks out of a page, and the serious faults that axe finds in it."""
     from axe_playwright_python.sync_playwright import Axe
 
-    beyond = page.evaluate("() => document.documentElement.scrollWidth - innerWidth")
-    found: dict[str, Any] = Axe().run(page).response
-    return [f"sticks out by {beyond} px"] * (beyond > 1) + [
-        f"{each['id']}: {each['help']}: {each['nodes'][0]['html'][:160]}"
-        for each in found["violations"]
-        if each["impact"] in SERIOUS
-    ]
+    wrong: list[str] = []
+    for size, dark in ((WIDE, False), (NARROW, True)):
+        page = visit("/", size=size, dark=dark)
+        for path, title in PAGES.items():
+            page.goto(furnished.url + path)
+            settled(page)
+            heading = page.locator("main h1").inner_text()
+            if title not in heading:
+                wrong.append(f"{path}: headed {heading!r}, not {title!r}")
+            beyond = page.evaluate("() => document.documentElement.scrollWidth - innerWidth")
+            if beyond > 1:
+                wrong.append(f"{path}: sticks out by {beyond} px at {size['width']} px")
+            found: dict[str, Any] = Axe().run(page).response
+            wrong += [
+                f"{path} ({size['width']} px): {each['id']}: {each['help']}: {each['nodes'][0]['html'][:160]}"
+                for each in found["violations"]
+                if each["impact"] in SERIOUS
+            ]
+    assert not wrong, "\n".join(wrong)
 
 
 def test_an_empty_house_leads_to_a_first_calibration_in_one_press(visit: Callable[..., Page], service: Service) -> None:

@@ -180,7 +180,7 @@ def _importer_and_options(name: str, options: Mapping[str, str]) -> tuple[Import
         first = error.errors()[0]
         key = ".".join(map(str, first["loc"]))
         names = [key for key in importer.options.model_fields if key != "file"]
-        known = f"its options: {', '.join(names)}" if names else "it has no options"
+        known = f"its options are {', '.join(names)}" if names else "it has no options"
         raise BadInput(f"importer {name}: option {key}: {first['msg']} ({known}); correct the option") from error
 
 
