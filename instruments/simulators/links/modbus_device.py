@@ -28,6 +28,7 @@ from instruments.protocols.modbus_codes import (
 )
 from instruments.protocols.modbus_registers import WordOrder
 from instruments.simulators.links.faults import Faults
+from instruments.simulators.links.replies import Replies
 
 FUNCTIONS = frozenset({READ_HOLDING, READ_INPUT, WRITE_SINGLE, WRITE_MULTIPLE})
 ANY_UNIT = frozenset({0, 255})  #: unit numbers that every Modbus TCP instrument takes for its own
@@ -98,7 +99,7 @@ def uint32(order: WordOrder, get: Callable[[float], float], put: Callable[[int, 
     return Cell(read, write if put else None, words=2)
 
 
-class ModbusDevice:
+class ModbusDevice(Replies):
     """Bytes in, bytes out, on a map of cells by their first register.
 
     `absent` is the value of a register that does not exist; None: exception 2, as the standard requires.
@@ -107,6 +108,7 @@ class ModbusDevice:
     def __init__(
         self, framing: Literal["rtu", "tcp"], cells: Mapping[int, Cell], faults: Faults, address: int = 1
     ) -> None:
+        super().__init__()
         self.functions = FUNCTIONS
         self.absent: int | None = None
         self.faults = faults
@@ -116,7 +118,6 @@ class ModbusDevice:
         self._units = frozenset({address}) if self._rtu else ANY_UNIT | {address}
         self._cells = dict(cells)
         self._pending = b""
-        self._out = bytearray()
 
     def receive(self, data: bytes, t_s: float) -> None:
         """Take bytes and answer every whole request to this address in them."""
@@ -132,19 +133,6 @@ class ModbusDevice:
             self._pending = self._pending[used:]
             if pdu and unit in self._units:
                 self._reply_to(pdu, unit, transaction, t_s)
-
-    def transmit(self, t_s: float) -> bytes:  # noqa: ARG002  a reply goes out at once
-        """Return the replies."""
-        sent, self._out = bytes(self._out), bytearray()
-        return sent
-
-    def skip(self, t_s: float) -> None:
-        """Lose the replies."""
-        self.transmit(t_s)
-
-    def next_byte_s(self, t_s: float) -> float | None:  # noqa: ARG002
-        """Return None: the instrument sends only replies."""
-        return None
 
     def _is_whole(self, data: bytes) -> bool:
         return bool(self._framer.decode(data)[3])

@@ -5,19 +5,20 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 
 from instruments.simulators.links.faults import Faults
+from instruments.simulators.links.replies import Replies
 from instruments.simulators.links.rpc_blocks import Call, Reply, reply_block, take_call
 
 
-class RpcDevice(ABC):
+class RpcDevice(Replies, ABC):
     """Answers each call at once."""
 
     #: A server on a real port carries gRPC to it, and no bare bytes.
     is_rpc = True
 
     def __init__(self, faults: Faults) -> None:
+        super().__init__()
         self.faults = faults
         self._pending = b""
-        self._out = bytearray()
 
     @abstractmethod
     def answer(self, call: Call, t_s: float) -> Reply:
@@ -32,19 +33,6 @@ class RpcDevice(ABC):
                 self._reply_to(call, t_s)
         except ValueError:
             self._pending = b""
-
-    def transmit(self, t_s: float) -> bytes:  # noqa: ARG002  a reply goes out at once
-        """Return the replies."""
-        sent, self._out = bytes(self._out), bytearray()
-        return sent
-
-    def skip(self, t_s: float) -> None:
-        """Lose the replies."""
-        self.transmit(t_s)
-
-    def next_byte_s(self, t_s: float) -> float | None:  # noqa: ARG002
-        """Return None: the instrument sends only replies."""
-        return None
 
     def _reply_to(self, call: Call, t_s: float) -> None:
         reply = self.answer(call, t_s)
