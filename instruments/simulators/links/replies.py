@@ -4,7 +4,7 @@ from __future__ import annotations
 
 
 class Replies:
-    """The sending side of such an instrument: what `_out` holds goes out at the next look at the link."""
+    """The sending side of such an instrument: `_out` is sent the next time the link is read."""
 
     def __init__(self) -> None:
         self._out = bytearray()

@@ -11,7 +11,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from instruments.clock import Clock
-from instruments.protocols.rpc_status import RpcStatus
+from instruments.protocols.nidaqmx.rpc_status import RpcStatus
 from instruments.simulators.links.device import SimulatedDevice
 from instruments.simulators.links.rpc_blocks import Call, Reply, call_block, take_reply
 

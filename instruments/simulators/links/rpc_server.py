@@ -6,7 +6,7 @@ import importlib
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
-from instruments.protocols.rpc_status import RpcStatus
+from instruments.protocols.nidaqmx.rpc_status import RpcStatus
 from instruments.simulators.links.real_ports import LOCALHOST, Exchange
 from instruments.simulators.links.rpc_blocks import Call, Reply, call_block, take_reply
 
