@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from instruments.errors import LinkError, NoReply, one_line
 from instruments.protocols.analog_settings import NidaqSettings
-from instruments.protocols.nidaqmx.service import INSTALL, INSTALL_GRPC
 from instruments.protocols.nidaqmx.rpc_status import RpcStatus
+from instruments.protocols.nidaqmx.service import INSTALL, INSTALL_GRPC
 from instruments.transport.factory import Ports
 from instruments.transport.rpc.channel import RpcChannel
 

@@ -14,8 +14,8 @@ from instruments.bench_config import part_of
 from instruments.protocols.analog_settings import NidaqSettings
 from instruments.protocols.nidaqmx import protobuf, service
 from instruments.protocols.nidaqmx.protobuf import Fields
-from instruments.protocols.nidaqmx.service import Attribute, Behaviour, Status
 from instruments.protocols.nidaqmx.rpc_status import RpcStatus
+from instruments.protocols.nidaqmx.service import Attribute, Behaviour, Status
 from instruments.simulators.devices.nidaq.task import DaqFailure, Inputs, Task
 from instruments.simulators.links.rpc_blocks import Call, Reply
 from instruments.simulators.links.rpc_device import RpcDevice
