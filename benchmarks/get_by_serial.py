@@ -92,8 +92,8 @@ def run() -> dict[str, float | str]:
         location = Path(folder) / "lab.sqlite"
         fill(location)
         with serve(location) as service:
-            asyncio.run(load(service.port))
-            times = asyncio.run(load(service.port))
+            for _ in range(3):  # during the second the service loads what its computations need, on the other core
+                times = asyncio.run(load(service.port))
     p50, p99 = np.percentile(times, [50, 99])
     return {**describe("fastapi", "uvicorn", "sqlalchemy"), "requests_per_s": float(PER_S),
             "p50_ms": float(p50), "p99_ms": float(p99), "max_ms": float(times.max())}  # fmt: skip

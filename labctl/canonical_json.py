@@ -7,10 +7,12 @@ import json
 
 from labctl.json_types import JsonObject
 
+_ENCODER = json.JSONEncoder(sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+
 
 def canonical(document: JsonObject) -> bytes:
     """Return the one way to write a document: sorted keys, no spaces, UTF-8, shortest exact numbers."""
-    return json.dumps(document, sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
+    return _ENCODER.encode(document).encode()
 
 
 def hash_of(document: JsonObject) -> str:

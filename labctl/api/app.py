@@ -49,9 +49,9 @@ certifying and keys for an approver's.
 """
 
 
-#: In the order of the API's description.
+#: In the order of the API's description, in which they are also asked: what is read most comes first.
 ROUTERS = (
-    health, units, benches, effects, calibrations, certification, certificates, plans,
+    calibrations, certification, health, units, benches, effects, certificates, plans,
     campaigns, schedule, recordings, motions, admin, swagger_ui,
 )  # fmt: skip
 #: Which of their routes take a key; every route of the others does.

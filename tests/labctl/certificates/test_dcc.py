@@ -1,7 +1,8 @@
 """The DCC: order, mandatory elements and words of the schema 3.3.0, and every number that the JSON has.
 
 The facts of the schema below are of PTB's dcc.xsd 3.3.0 (LGPL-3.0), which is not part of this repository. Where its
-files are at hand, `LABCTL_DCC_SCHEMA` names their folder, and the certificate is validated by them too.
+files are at hand, `LABCTL_DCC_SCHEMA` names their folder, and the certificate is validated by them too. PTB's rules
+beyond the schema are in test_dcc_schematron.py.
 """
 
 from __future__ import annotations
