@@ -6,6 +6,7 @@ import { number, resultTexts, unitText, idText, withUncertainty } from "../core/
 import { factList, table } from "../core/components.js";
 import { byHand } from "./by_hand.js";
 import { coefficientColumns, isSingle } from "./coefficient_table.js";
+import { heldText } from "./held.js";
 
 /** @import { Coefficient, Version } from "../../../types/api.js" */
 /** @import { CoefficientColumn } from "./coefficient_table.js" */
@@ -55,8 +56,11 @@ export function comparison(first, second) {
  * @param {Version | null} second
  */
 export function coefficients(first, second) {
-  if (coefficientColumns(first).length) return overTemperature(first, second);
-  return h("div", { class: "stack" }, list(first, second), byHand(first));
+  const held = [first, second]
+    .flatMap((version) => (version && heldText(version)) ?? [])
+    .map((text) => h("p", {}, text));
+  if (coefficientColumns(first).length) return h("div", { class: "stack" }, held, overTemperature(first, second));
+  return h("div", { class: "stack" }, held, list(first, second), byHand(first));
 }
 
 /**
