@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from tests.web.conftest import Service
+from tests.helpers.browser import Service
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
