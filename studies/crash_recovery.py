@@ -20,7 +20,7 @@ from labctl.services.planning.loading import load_bench
 from labctl.services.schemas.campaigns import ResumeRequest
 from labctl.store import Store
 from studies.crashable_process import Killed, Life, MortalDatabase, World, all_readings, complete_data_sets
-from studies.databases import new_database
+from studies.databases import close_server, new_database
 
 KILLS = int(os.environ.get("LABCTL_STUDY_KILLS", "240"))
 SEED = 20
@@ -221,6 +221,7 @@ def run_kills(count: int) -> dict[str, float]:
     """Kill campaigns, and return the figures."""
     with tempfile.TemporaryDirectory() as folder:
         instants, expected = undisturbed(Path(folder))
+    close_server()  # the workers would share it, and a power cut in one of them would be a power cut in all
     kills = drawn(instants, count)
     with ProcessPoolExecutor(max_workers=2) as pool:
         verdicts = list(pool.map(one, [(kill, expected) for kill in kills], chunksize=4))
