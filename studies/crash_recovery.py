@@ -92,8 +92,8 @@ def bench() -> BenchFile:
     """Return the bench that outlives the processes.
 
     Two things are left out that change with the instant of a data set and are no noise of the fit: the unit does not
-    heat itself (after minutes without power it would be colder), and the motor's steps are even
-    (where in a step a gate begins is worth up to 4 mdeg/s over 10 s).
+    heat itself (after minutes without power it would be colder), and the motor's steps are even (where in a step a gate
+    begins is worth up to 4 mdeg/s over 10 s).
     """
     single = load_bench("single-axis-sim")
     assert single.simulation is not None
