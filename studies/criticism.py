@@ -93,7 +93,7 @@ def one(task: Task) -> Task:
     if task["kind"] == "effect" and task["z"] == HELD_OUT_AT_Z and found.verdict.form == "missing":
         answer["held_out"] = clock("improve", lambda: held_out(recording, model, found))
     if task["kind"] == "drifting" and found.comparison is not None:
-        answer["drift"] = found.drift_over_datasheet
+        answer["large_drift"] = found.has_large_drift
     if WITH_PEERS and found.comparison is not None:
         designs = found.comparison.designs
         answer["peers"] = clock("peers", lambda: baselines.ask(found.data, designs))

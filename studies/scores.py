@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from labctl.fitting.criticism import LARGE_DRIFT
 from labctl.fitting.effects import CATALOGUE
 from studies.campaigns import OUTSIDE
 
@@ -107,7 +106,7 @@ def right_channel(answer: Answer) -> bool:
 
 def says_large_drift(answer: Answer) -> bool:
     """Return whether labctl says that the drift is larger than specified."""
-    return (answer.get("drift") or 0.0) > LARGE_DRIFT
+    return bool(answer.get("large_drift"))
 
 
 def both_named(answer: Answer) -> bool:

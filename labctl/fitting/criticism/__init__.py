@@ -4,7 +4,6 @@ This is the public face: other packages import from here only, never from a subm
 """
 
 from labctl.fitting.criticism.criticism import (
-    LARGE_DRIFT,
     Criticism,
     FittedMeans,
     best_shapes,
@@ -32,7 +31,6 @@ from labctl.fitting.criticism.verdict import Verdict
 from labctl.fitting.criticism.visibility import EffectVisibility, Schedule, effect_visibilities, schedule_of
 
 __all__ = [
-    "LARGE_DRIFT",
     "SEPARATED_CHI2",
     "Criticism",
     "EffectVisibility",

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from operator import attrgetter
 
 import numpy as np
 
@@ -29,6 +30,7 @@ from labctl.fitting.estimation.result import FitResult
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.presets import changed, unchanged
 from labctl.fitting.numeric.blas_threads import single_threaded
+from labctl.fitting.numeric.drift_noise import Drift
 from labctl.json_types.criticism import NotTestable
 from labctl.json_types.views import Views
 from labctl.progress import report_stage
@@ -36,8 +38,8 @@ from labctl.recording import Recording
 
 #: Data sets beyond the base's coefficients that a verdict needs.
 LEAST_SPARE = 6
-#: From this factor on the drift counts as larger than the data sheet says.
-LARGE_DRIFT = 2.0
+#: The drift counts as larger than the data sheet says where the least that it may be is this many times as large.
+LARGE_DRIFT = 1.5
 
 
 @dataclass(frozen=True)
@@ -78,10 +80,18 @@ class Criticism:
     @property
     def drift_over_datasheet(self) -> float | None:
         """The largest drift found, over half the data sheet's bias stability; None without a data sheet."""
+        return self._over_datasheet(attrgetter("drift_dps"))
+
+    @property
+    def has_large_drift(self) -> bool:
+        """Whether nearly all evidence is for a drift that is larger than the data sheet says."""
+        return (self._over_datasheet(attrgetter("least_dps")) or 0.0) >= LARGE_DRIFT
+
+    def _over_datasheet(self, size_dps: Callable[[Drift], float]) -> float | None:
         stability = self.data.info.datasheet.get("bias_stability_dps")
         if not stability or self.comparison is None:
             return None
-        return max(noise.drift.drift_dps for noise in self.floor.axes.values()) / (stability / 2)
+        return max(size_dps(noise.drift) for noise in self.floor.axes.values()) / (stability / 2)
 
 
 @dataclass(frozen=True)

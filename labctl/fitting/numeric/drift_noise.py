@@ -24,6 +24,8 @@ DRIFT_SIZES = (0.0, 0.35, 0.6, 0.8, 1.0, 1.3, 1.7, 2.3, 3.2)
 LARGEST = 12.0
 #: The usual bias stability, deg/s, where no data sheet says it.
 USUAL_STABILITY_DPS = 0.004
+#: Share of the evidence that a statement about the size of the drift needs.
+MOST_EVIDENCE = 0.9
 #: Prior width of the drift about half the data sheet's bias stability: a factor.
 PRIOR_FACTOR = 2.5
 
@@ -50,11 +52,12 @@ class Scatter:
 
 @dataclass(frozen=True)
 class Drift:
-    """One point of the grid: size, time constant, and the part that grows with rate."""
+    """A point of the grid, or what was found over all of it: size, time constant, and the part that grows with rate."""
 
     drift_dps: float
     tau_s: float
     per_rate: float = 0.0  #: standard deviation per deg/s of table rate
+    least_dps: float = 0.0  #: of a drift that was found: `MOST_EVIDENCE` is for this size or a larger one
 
 
 def whitened(

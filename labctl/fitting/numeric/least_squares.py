@@ -78,13 +78,17 @@ class _Fits:
         return np.asarray(weights / weights.sum())
 
     def drift(self) -> Drift:
-        """Return the likeliest drift, with a size that is averaged over the points."""
-        best = self.drifts[self.best]
+        """Return the likeliest drift, with a size that is averaged over the points, and the least that it may be."""
+        best, weights = self.drifts[self.best], self.weights()
         size_dps = np.array([drift.drift_dps for drift in self.drifts])
+        found_dps = np.sqrt(self.scale) * size_dps
+        rising = np.argsort(found_dps)
+        least = np.searchsorted(np.cumsum(weights[rising]), 1.0 - drift_noise.MOST_EVIDENCE)
         return Drift(
-            float(np.sqrt(np.sum(self.weights() * self.scale * size_dps**2))),
+            float(np.sqrt(np.sum(weights * self.scale * size_dps**2))),
             best.tau_s,
             best.per_rate * float(np.sqrt(self.scale[self.best])),
+            float(found_dps[rising[least]]),
         )
 
 

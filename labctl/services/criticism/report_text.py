@@ -8,7 +8,6 @@ import numpy as np
 from scipy.special import chdtrc
 
 from labctl.fitting.criticism import (
-    LARGE_DRIFT,
     Criticism,
     Suspect,
     Verdict,
@@ -172,9 +171,11 @@ def sentences(found: Criticism, experiments: Sequence[Experiment] = ()) -> list[
     said += _further(found)
     if found.data.info.rate_reference == "demanded":
         said.append(UNMEASURED)
-    factor = found.drift_over_datasheet
-    if verdict.form == "adequate" and factor is not None and factor >= LARGE_DRIFT:
-        said.append(f"The drift is larger than specified: {factor:.1f} times the value expected from the data sheet.")
+    if verdict.form == "adequate" and found.has_large_drift:
+        said.append(
+            f"The drift is larger than specified: {found.drift_over_datasheet:.1f} times the value expected from the "
+            "data sheet."
+        )
     if found.data.left_out:
         said.append(f"{found.data.left_out} readings far outside their data set were left out.")
     return said
