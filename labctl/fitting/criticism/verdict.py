@@ -42,7 +42,7 @@ EXPLAINED_TIME = 0.75
 SAME_AS_TEMPERATURE = TIMES | {"chamber_c"}
 #: An effect that takes off less than this share of the excess chi2 is not named alone at the first step.
 LEAST_SHARE = 0.3
-#: A time constant of at least this share of the longest is at the end of its range.
+#: A time constant of at least this share of the longest (the shortest: of its inverse) is at the end of its range.
 NEAR_END = 0.9
 #: Columns that are the same up to rounding have the same evidence within this.
 SAME = 0.02
@@ -149,15 +149,15 @@ def is_of_another_law(comparison: Comparison, effect: Candidate) -> bool:
     return is_at_end(comparison, effect) or refines_base(comparison, effect)
 
 
-def is_at_end(comparison: Comparison, effect: Candidate) -> bool:
-    """Return whether the longest possible time constant of an effect fits clearly best: then its law is another one."""
+def is_at_end(comparison: Comparison, effect: Candidate, *, shortest: bool = False) -> bool:
+    """Return whether the longest (or `shortest`) time constant of an effect fits clearly best: its law is another."""
     if effect.term is None or "tau_s" not in effect.term.parameters:
         return False
-    lead = 0.0
+    lead, sign = 0.0, -1.0 if shortest else 1.0
     for axis in effect.option:
-        options, found = comparison.designs[axis].options, comparison.axes[axis].log_bf
-        tau_s = {i: o.term.parameters["tau_s"] for i, o in enumerate(options) if o.candidate == effect.id and o.term}
-        end = NEAR_END * max(tau_s.values())
+        own = {i: o.term for i, o in enumerate(comparison.designs[axis].options) if o.candidate == effect.id}
+        tau_s = {i: term.parameters["tau_s"] ** sign for i, term in own.items() if term is not None}
+        end, found = NEAR_END * max(tau_s.values()), comparison.axes[axis].log_bf
         last = max((float(found[i]) for i, tau in tau_s.items() if tau >= end), default=-np.inf)
         inner = max((float(found[i]) for i, tau in tau_s.items() if tau < end), default=-np.inf)
         lead += last - inner if np.isfinite(last) and np.isfinite(inner) else 0.0

@@ -32,14 +32,17 @@ class _OncePerTurn(Effect):
     needs = ("table_angle_deg",)
     rows: ClassVar[Rows] = "all"
     shows_at_rest = True
-    harmonics: ClassVar[tuple[int, ...]] = (1,)
     mark: ClassVar[str]
+
+    def harmonics(self, term: Term) -> tuple[int, ...]:
+        """Return the cycles per turn of the waves."""
+        return (1,)
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         ones = np.ones(len(channels))
         return [
             Column(f"{self.mark}_{wave}{n}", "deg/s", ones, (wave, n))
-            for n in self.harmonics
+            for n in self.harmonics(term)
             for wave in ("cos", "sin")
         ]
 
@@ -81,11 +84,18 @@ class TableTilt(_OncePerTurn):
         "The table is out of level or its bearing wobbles, so gravity along the axes varies once and twice per turn."
     )
     origin: ClassVar[Origin] = "bench"
-    harmonics = (1, 2)
+    parameters = (Parameter("wobbles", "1", 0, 1),)
     ranges: ClassVar = {"fog": (0.0, 0.005), "mems": (0.0, 0.01), "piezo": (0.0, 0.05)}
     mark = "tilt"
     experiment = "level the table; then repeat with a deliberate tilt of 2 deg"
     draws = ("angle",)
+
+    def harmonics(self, term: Term) -> tuple[int, ...]:
+        """Return one cycle per turn of a table that is out of level, and two with a bearing that wobbles."""
+        return (1, 2) if term.parameters.get("wobbles", 1.0) else (1,)
+
+    def options(self, span: Span) -> list[Term]:
+        return by_parameter(self.id, wobbles=np.array([0.0, 1.0]))
 
 
 class TableRateRatio(Effect):

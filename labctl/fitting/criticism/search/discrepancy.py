@@ -2,8 +2,9 @@
 
 No shape is exact. Beside an effect that was found, the base also holds its signal times smooth functions of what drives
 it, smooth functions of these drivers, and what its parameters move, each with a Gaussian prior of a few per cent of the
-signal (model discrepancy: Kennedy and O'Hagan 2001, doi:10.1111/1467-9868.00294). So the next candidates compete with
-the possible remainder of the effects that were named before.
+signal (model discrepancy: Kennedy and O'Hagan 2001, doi:10.1111/1467-9868.00294). Where its shape is a choice, the
+other choices may be as true. So the next candidates compete with the possible remainder of the effects that were named
+before.
 """
 
 from __future__ import annotations
@@ -30,6 +31,8 @@ SHAPE_ERROR = 0.05
 PARAMETER_ERROR, STEP = 0.2, 0.05
 #: Knots of a smooth function of a driver; of the rate, which is given exactly, about one at each rate.
 KNOTS, KNOTS_OF_RATE = 9, 21
+#: Of what is no quantity to refine, the ends of a temperature range are no choice between shapes either.
+EDGES = {"low_c", "high_c"}
 #: Drivers of every effect.
 DRIVERS = ("table_rate_dps", "temperature_c")
 
@@ -60,7 +63,7 @@ def _of_signal(
         at_sets = np.column_stack([data.at_sets(column) for column in functions.T])
         rows += [SHAPE_ERROR * signal[:, :, None] * at_sets, SHAPE_ERROR * size_dps * data.rows_of(functions)]
     if kind is not None and term is not None:
-        rows += _moved(comparison, axis, kind, term, values)
+        rows += _moved(comparison, axis, kind, term, values) + _otherwise_chosen(comparison, axis, term, signal)
     whole = np.concatenate(rows, axis=2) if rows else np.zeros((*signal.shape, 0))
     return Discrepancy(whole, np.ones(whole.shape[-1]))
 
@@ -95,6 +98,24 @@ def _moved(comparison: Comparison, axis: str, kind: Effect, term: Term, values: 
         if len(ends) == 2:
             found.append((PARAMETER_ERROR / (2 * STEP) * (ends[0] - ends[1]))[:, :, None])
     return found
+
+
+def _otherwise_chosen(
+    comparison: Comparison, axis: str, term: Term, signal: NDArray[np.float64]
+) -> list[NDArray[np.float64]]:
+    """Return an effect's signal in the best shape of each other choice, less its signal as chosen, one column each."""
+    options, found = comparison.designs[axis].options, comparison.axes[axis]
+    best: dict[tuple[float, ...], int] = {}
+    for i in np.argsort(found.log_bf).tolist():
+        other = options[i].term
+        if other is not None and other.effect == term.effect and _choices(other) != _choices(term):
+            best[_choices(other)] = i
+    fitted = ((options[i].rows, solve_option(found.best, found.slices[i])[0]) for i in best.values())
+    return [(rows @ values - signal)[:, :, None] for rows, values in fitted]
+
+
+def _choices(term: Term) -> tuple[float, ...]:
+    return tuple(term.parameters.get(name, 0.0) for name in sorted(CHOICES - EDGES))
 
 
 def together(parts: Sequence[Mapping[str, Discrepancy]]) -> dict[str, Discrepancy]:

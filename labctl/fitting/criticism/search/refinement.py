@@ -22,7 +22,9 @@ from labctl.fitting.effects import CATALOGUE, Effect, Term
 from labctl.progress import report_stage
 
 #: A parameter that is a choice between shapes, and no quantity, is not refined.
-CHOICES = frozenset({"of_gradient", "bowed", "rounded", "low_c", "high_c", "by_sign", "by_position", "per_turn"})
+CHOICES = frozenset({
+    "of_gradient", "bowed", "rounded", "low_c", "high_c", "by_sign", "by_position", "per_turn", "wobbles",
+})  # fmt: skip
 EVALUATIONS = 10
 #: At most this many leaders are refined.
 LEADERS = 5

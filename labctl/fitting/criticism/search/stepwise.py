@@ -5,14 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-import numpy as np
-from numpy.typing import NDArray
-
 from labctl.fitting.criticism.channel_functions import smooth_channels
 from labctl.fitting.criticism.evidence.design import Discrepancy
-from labctl.fitting.criticism.evidence.gains import solve_option
 from labctl.fitting.criticism.model_comparison import Comparison, compare_beside, on_axis
-from labctl.fitting.criticism.ranking import Candidate, are_exact
+from labctl.fitting.criticism.ranking import are_exact
 from labctl.fitting.criticism.search.discrepancy import discrepancies, drivers, together
 from labctl.fitting.criticism.search.exact_shapes import with_exact_terms
 from labctl.fitting.criticism.search.free_shapes import beside_terms, channels_beside_smooth, channels_of_free_shape
@@ -20,9 +16,9 @@ from labctl.fitting.criticism.search.held_out import held_out_rises
 from labctl.fitting.criticism.search.merging import merged
 from labctl.fitting.criticism.search.refinement import refined_term, with_refined_leaders
 from labctl.fitting.criticism.search.remainder import is_better_than_smooth, is_within_noise, remainder_of
+from labctl.fitting.criticism.search.shape_error import is_shape_error
 from labctl.fitting.criticism.search.steps import may_be_step
 from labctl.fitting.criticism.verdict import (
-    ALIKE,
     ENOUGH,
     FAR,
     LEAD,
@@ -46,13 +42,6 @@ STEPS = 4
 NOTICED = 1.0
 #: How many of the strongest are tried as the first of a pair.
 LEADERS = 4
-#: The next effect is only named when its evidence, where it does most, is at least this share of the evidence for the
-#: one before: less is the residue of a wrong shape of the one before.
-NEXT_SHARE = 0.04
-#: The same after effects that could not be distinguished: one of the others may fit better than the one that was added.
-NEXT_SHARE_AMBIGUOUS = 0.08
-#: Least share of an effect that is assumed within data sets, and between them.
-LEAST_PART = 0.05
 #: Where what is named leaves more than this share of the excess, it is not the cause.
 MOST_LEFT = 0.5
 #: An effect whose shape may be wrong by a few per cent explains at least this share of what a smooth function does.
@@ -168,7 +157,7 @@ def _one_by_one(
         before = (comparison, step)
         comparison, step = _compared_beside(first, findings, catalogue)
         known = {name for finding in findings for name in finding.group}
-        if known & set(step.group) or _is_shape_error(*before, comparison, step):
+        if known & set(step.group) or is_shape_error(*before, comparison, step):
             break
     return findings, comparison
 
@@ -176,7 +165,8 @@ def _one_by_one(
 def _finding(comparison: Comparison, step: Step, catalogue: Mapping[str, Effect]) -> Finding | None:
     """Return what one step found missing; None where that is no effect of the catalogue, or none predicts.
 
-    An effect with which left-out data sets are predicted worse is not named: then another of its group is.
+    An effect with which left-out data sets are predicted worse is not named: then another of its group is that has as
+    much evidence. One that has less is not the cause where what explains more is none.
     """
     if step.form not in {"missing", "ambiguous"} or step.leader is None:
         return None
@@ -185,6 +175,8 @@ def _finding(comparison: Comparison, step: Step, catalogue: Mapping[str, Effect]
     for name in step.group:
         if left:
             left.append(name)
+            continue
+        if known[name].log_bf < step.leader.log_bf - LEAD:
             continue
         term = refined_term(comparison, known[name])
         if not held_out_rises(comparison, (term,), catalogue):
@@ -221,45 +213,6 @@ def _refined_findings(first: Comparison, findings: Sequence[Finding], catalogue:
         if again is not None and not set(again.group) & {name for other in others for name in other.group}:
             found[k] = again
     return found
-
-
-def _is_shape_error(before: Comparison, named: Step, after: Comparison, step: Step) -> bool:
-    """Return whether the new leader may be the residue of a wrong shape of the effect that was just added.
-
-    The two are compared where the new leader is largest, within data sets or between them: the wrong shape of a wave
-    within data sets leaves waves, and hardly anything between them.
-    """
-    if step.leader is None or named.leader is None or are_exact(step.leader, named.leader):
-        return False
-    least = NEXT_SHARE if _is_one(before, named) else NEXT_SHARE_AMBIGUOUS
-    of_new, of_old = _within_and_between(after, step.leader), _within_and_between(before, named.leader)
-    there = int(np.argmax(of_new))
-    could = max(float(of_old[there]), LEAST_PART) * named.leader.log_bf
-    return bool(of_new[there] * step.leader.log_bf < least * could)
-
-
-def _is_one(comparison: Comparison, named: Step) -> bool:
-    """Return whether a group is one effect, or several that each reproduce the leader's signal."""
-    others = [c for c in comparison.candidates if not c.smooth and c.id in named.group[1:]]
-    return all(overlap(comparison, named.leader, other) > ALIKE for other in others) if named.leader else False
-
-
-def _within_and_between(comparison: Comparison, candidate: Candidate) -> NDArray[np.float64]:
-    """Return the shares of a candidate's signal beside the base that lie within data sets, and between them."""
-    total = np.zeros(2)
-    for axis, index in candidate.option.items():
-        design, found = comparison.designs[axis], comparison.axes[axis]
-        values, _ = solve_option(found.best, found.slices[index])
-        scale = comparison.scales[axis].copy()
-        scale[0] = np.sqrt(comparison.white_var[axis] + found.best.noise.size_dps**2)
-        kept = design.present
-        base, signal = (rows[kept] / scale[kept][:, None] for rows in (design.base, design.options[index].rows))
-        size = np.maximum(np.linalg.norm(base, axis=0), 1e-300)
-        taken, *_ = np.linalg.lstsq(base / size, signal @ values, rcond=1e-9)
-        left = np.zeros(kept.shape)
-        left[kept] = signal @ values - base / size @ taken
-        total += (np.sum(left[1:] ** 2), np.sum(left[0] ** 2))
-    return np.asarray(total / max(float(total.sum()), 1e-300))
 
 
 def _judged(comparison: Comparison, catalogue: Mapping[str, Effect], *, first: bool = True) -> tuple[Comparison, Step]:

@@ -16,7 +16,7 @@ from labctl.fitting.effects import CATALOGUE
 from labctl.fitting.models.presets import preset_for
 from labctl.recording import Recording
 from labctl.services.simulation.recordings import SimulateRequest, make_recording
-from studies.campaigns import campaign
+from studies.campaigns import MODELS, campaign
 from studies.effect_sizes import sizes
 from studies.outside_catalogue import KINDS
 from tests.helpers.criticism import held
@@ -135,3 +135,24 @@ def test_a_size_of_a_sign_that_an_effect_cannot_have_is_outside() -> None:
 def test_what_grows_beyond_the_rate_is_no_saturation() -> None:
     """The same bend with the other sign: no output of a gyro has it."""
     assert "saturation" not in held(single_axis(3, saturation=0.02)).verdict.named
+
+
+def hidden(protocol: str, effect: str, z: int, seed: int) -> Verdict:
+    size = sizes(protocol)[effect][str(z)]
+    return held(campaign(protocol, seed, {effect: size}), MODELS[protocol]).verdict
+
+
+def test_a_table_may_be_out_of_level_without_a_bearing_that_wobbles() -> None:
+    """Its one wave per turn is that of the Earth's rate, which was named without it where the second is too small."""
+    verdict = hidden("Y", "table_tilt", 5, 20_020)
+    assert verdict.groups == (("earth_rate_tilt", "magnetic_sensitivity", "table_tilt"),)
+
+
+def test_an_effect_of_much_less_evidence_does_not_take_the_place_of_one_that_predicts_worse() -> None:
+    verdict = hidden("Y+", "warm_up", 5, 20_024)
+    assert (verdict.form, verdict.named, verdict.depends_on[0]) == ("unexplained", (), "temperature_c")
+
+
+def test_the_delay_of_an_effect_of_the_temperature_is_no_second_effect() -> None:
+    verdict = hidden("Y+", "temperature_rate", 100, 20_021)
+    assert verdict.groups == (("temperature_rate",),)
