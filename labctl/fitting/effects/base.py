@@ -136,7 +136,7 @@ class Effect(ABC):
     parameters: ClassVar[tuple[Parameter, ...]] = ()
     ranges: ClassVar[Mapping[str, tuple[float, float]]] = {}  #: technology -> plausible size of the first coefficient
     one_sign: ClassVar[bool] = False  #: whether the first coefficient has the sign of its range; else of either sign
-    aliases: ClassVar[tuple[str, ...]] = ()  #: ids whose columns are the same whatever the schedule
+    aliases: ClassVar[tuple[str, ...]] = ()  #: ids of the same columns, in one of the shapes, whatever the schedule
     experiment: ClassVar[str] = ""  #: what would distinguish it from similar effects
     draws: tuple[str, ...] = ()  #: views of a criticism, or channels, whose picture it would draw
     shows_at_rest: bool = False  #: whether it is an error of the bias, at least in part: then it takes no rate to see

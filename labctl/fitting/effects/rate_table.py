@@ -85,6 +85,7 @@ class TableTilt(_OncePerTurn):
     )
     origin: ClassVar[Origin] = "bench"
     parameters = (Parameter("wobbles", "1", 0, 1),)
+    aliases = ("earth_rate_tilt", "magnetic_sensitivity")
     ranges: ClassVar = {"fog": (0.0, 0.005), "mems": (0.0, 0.01), "piezo": (0.0, 0.05)}
     mark = "tilt"
     experiment = "level the table; then repeat with a deliberate tilt of 2 deg"
