@@ -165,8 +165,8 @@ def _one_by_one(
 def _finding(comparison: Comparison, step: Step, catalogue: Mapping[str, Effect]) -> Finding | None:
     """Return what one step found missing; None where that is no effect of the catalogue, or none predicts.
 
-    An effect with which left-out data sets are predicted worse is not named: then another of its group is that has as
-    much evidence. One that has less is not the cause where what explains more is none.
+    An effect with which left-out data sets are predicted worse is not named: then another of its group is. A single one
+    is not, where it has so much less evidence that the other would have been named without it.
     """
     if step.form not in {"missing", "ambiguous"} or step.leader is None:
         return None
@@ -176,13 +176,11 @@ def _finding(comparison: Comparison, step: Step, catalogue: Mapping[str, Effect]
         if left:
             left.append(name)
             continue
-        if known[name].log_bf < step.leader.log_bf - LEAD:
-            continue
         term = refined_term(comparison, known[name])
         if not held_out_rises(comparison, (term,), catalogue):
             left, chosen = [name], known[name]
             found = term
-    if not left:
+    if not left or (len(left) == 1 and chosen.log_bf < step.leader.log_bf - LEAD):
         return None
     axes = axes_of(comparison, chosen)
     return Finding(tuple(left), found, chosen.log_bf, discrepancies(comparison, chosen), axes)
