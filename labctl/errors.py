@@ -20,6 +20,7 @@ LabctlError              exit 2, HTTP 400
 │   └── NotIdentified    no key was given, or it is not one in force                             HTTP 401
 ├── TooLarge             a request carries more than this service takes              HTTP 413
 ├── BenchSilent          the bench process does not answer; the bench may move       HTTP 503
+│   └── NotStopped       a stop was asked for, and it is not known that the bench stands    HTTP 503, exit 1
 ├── Overloaded           there is no room for a request now; it may come again soon              HTTP 503
 ├── TooBusy              as much is computed, and waits, as there is place for; says when to ask again   HTTP 429
 ├── ComputationEnded     a worker process ended before its result: memory, time, a crash     HTTP 503
@@ -198,6 +199,13 @@ class BenchSilent(LabctlError):
 
     status = 503
     slug = "bench-silent"
+
+
+class NotStopped(BenchSilent):
+    """A stop was asked for, and it is not known that the table stands: a person has to use the stop switch."""
+
+    exit_status = 1
+    slug = "not-stopped"
 
 
 class StoreError(LabctlError):

@@ -11,7 +11,6 @@ from fastapi.security import HTTPBearer
 from labctl.services.admin.api_keys import require_role
 from labctl.services.schemas.admin import Role
 
-LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "[::1]"})
 READING = frozenset({"GET", "HEAD", "OPTIONS"})
 #: Paths that may need a computation; everything else that is read is a file or a few figures.
 API = "/api/"
@@ -19,6 +18,8 @@ API = "/api/"
 OPEN = frozenset({"/health", "/health/heartbeat"})
 #: Queries that are sent by POST because of what they carry: nothing changes, so a viewer may.
 ASKING = ("/api/plans", "/api/units/{serial}/calibrations/{version}/preview", "/api/recordings/logs/preview")
+#: Requests that stop a bench: their key is looked up in memory, as the database may be what does not answer.
+STOPS = re.compile(r"/api/(?:stop|campaigns/[^/]+/abort)")
 _ASKED = re.compile("|".join(re.sub(r"{\w+}", "[^/]+", path) for path in ASKING))
 #: Where files are sent: a recording, a log, and a log to preview.
 UPLOAD = "/api/recordings"

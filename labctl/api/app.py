@@ -32,6 +32,7 @@ from labctl.api.routers import (
     swagger_ui,
     units,
 )  # fmt: skip
+from labctl.services.admin.key_memory import KeyMemory
 from labctl.services.lab_service import LabService
 
 DESCRIPTION = """
@@ -72,8 +73,11 @@ def api_routes() -> tuple[BaseRoute, ...]:
     return tuple(described.routes)
 
 
-def create_app(service: LabService, access: AccessPolicy | None = None) -> FastAPI:
-    """Make the HTTP application of a service; closing the application closes the service, bench left safe."""
+def create_app(service: LabService, access: AccessPolicy | None = None, keys: KeyMemory | None = None) -> FastAPI:
+    """Make the HTTP application of a service; closing the application closes the service, bench left safe.
+
+    `keys` are the keys in force from memory, by which stops are admitted.
+    """
 
     @asynccontextmanager
     async def lifespan(_: FastAPI) -> AsyncIterator[None]:
@@ -98,7 +102,7 @@ def create_app(service: LabService, access: AccessPolicy | None = None) -> FastA
     problems.install(app)
     app.router.routes.extend(api_routes())
     web.install(app)
-    app.add_middleware(AccessMiddleware, service=service, access=access or AccessPolicy())
+    app.add_middleware(AccessMiddleware, service=service, access=access or AccessPolicy(), keys=keys)
     app.state.request_figures = RequestFigures()
     app.add_middleware(RequestLogMiddleware, figures=app.state.request_figures)
     return app

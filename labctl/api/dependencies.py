@@ -14,7 +14,8 @@ from fastapi.datastructures import Default
 from labctl.services.commands.command import Command, RequestT, ResponseT
 from labctl.services.lab_service import LabService
 
-CONTROL_THREADS = 4
+#: A stop of a bench that does not answer holds its thread for some seconds; the next stop must find another.
+CONTROL_THREADS = 16
 
 ResultT = TypeVar("ResultT")
 

@@ -1,10 +1,20 @@
 """The command line: it asks the services and prints what they say."""
 
 import os
+import sys
 
 # Fits are many small solves, for which threads only get in each other's way; to be set before numpy is loaded.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from labctl.cli.app import main
-
 __all__ = ["main"]
+
+
+def main() -> None:
+    """Run the command line; a stop is carried out before anything else is loaded."""
+    if sys.argv[1:2] == ["stop"] and "--help" not in sys.argv:
+        from labctl.stop.program import main as stop
+
+        sys.exit(stop(sys.argv[2:]))
+    from labctl.cli.app import main as run
+
+    run()

@@ -53,6 +53,7 @@ app.add_typer(audit.app, name="audit")
 COMMANDS: dict[str, Callable[..., None]] = {
     "demo": server.demo,
     "serve": server.serve,
+    "stop": server.stop,
     "simulator": server.simulator,
     "simulate": recordings.simulate,
     "import": recordings.import_,

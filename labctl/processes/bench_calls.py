@@ -12,6 +12,7 @@ from instruments.clock import Clock
 from labctl.acting_user import acting
 from labctl.log.context import for_request
 from labctl.processes.calls import Answer, Call, answer_with
+from labctl.processes.held_address import HeldAddress
 from labctl.processes.supervision import Supervision
 from labctl.services.commands.context import CommandContext
 from labctl.services.local_bench import LocalBench
@@ -32,24 +33,24 @@ class Beat:
     running: int | None  #: the campaign
     stops: bool
     schedule_trouble: str
+    not_stopped: str = ""  #: what is known of a stop that is late; empty: none is
 
 
 class BenchCalls:
     """Answers the calls of other processes."""
 
-    def __init__(self, store: Store, local: LocalBench, supervision: Supervision, clock: Clock) -> None:
+    def __init__(
+        self, store: Store, local: LocalBench, supervision: Supervision, address: HeldAddress, clock: Clock
+    ) -> None:
         """`clock` has the date of the service."""
-        self._store, self._local, self._supervision = store, local, supervision
+        self._store, self._local, self._supervision, self._address = store, local, supervision, address
         self._context = CommandContext(lambda: store, clock, local.control)
-
-    def stop(self, call: Call, _: Connection) -> Answer:
-        """Ask for the end of a campaign, or of whatever runs: nothing is waited for, nothing is written."""
-        campaign, reason = call.args
-        with for_request(getattr(call, "request_id", "")):
-            return Answer(self._local.stop_now(campaign, reason))
 
     def answer(self, call: Call, connection: Connection) -> Answer | None:
         """Answer a call; None where the connection is kept for a watcher or a supervisor."""
+        if call.name == "address.give_back":
+            self._address.give_back()
+            return Answer()
         if call.name == "watch":
             self._watch(connection)
             return None
@@ -84,7 +85,7 @@ class BenchCalls:
             with contextlib.suppress(OSError):
                 while True:
                     local = self._local
-                    connection.send(Beat(local.running, local.stops, local.schedule_trouble))
+                    connection.send(Beat(local.running, local.stops, local.schedule_trouble, local.not_stopped))
                     changed.wait(BEAT_S)
                     changed.clear()
                     never.wait(LEAST_BEAT_S)

@@ -6,8 +6,10 @@ import contextlib
 import os
 import select
 import signal
+import socket
 import threading
 from multiprocessing.connection import Connection
+from multiprocessing.reduction import send_handle
 from typing import NoReturn
 
 from instruments.clock import WallClock
@@ -25,13 +27,20 @@ from labctl.store import Holder, holder_of, is_url, open_store
 log = get_logger()
 
 ANSWER_S = 10.0
+#: What a bench process says once a second; the second one while its table is known to stand.
+BEAT, AT_REST = "beat", "at rest"
+BEATS = frozenset({BEAT, AT_REST})
 
 
 class BenchLine:
     """A bench process that this supervisor is in charge of."""
 
-    def __init__(self, settings: BenchSettings, pid: int, child: Child | None = None) -> None:
-        """Take charge. Raises Conflict while another supervisor is, or for another bench; BenchSilent.
+    def __init__(
+        self, settings: BenchSettings, pid: int, child: Child | None = None, listener: socket.socket | None = None
+    ) -> None:
+        """Take charge, and hand over the socket that the service listens at.
+
+        Raises Conflict while another supervisor is in charge, or for another bench; BenchSilent.
 
         A process that accepts the call and does not answer within `ANSWER_S` is ended: it hangs, perhaps with a table
         that turns, and the next one begins with the safe state.
@@ -45,6 +54,11 @@ class BenchLine:
         except BaseException:
             os.close(self._handle)
             raise
+        self.at_rest = False  #: whether the table was known to stand when it answered last
+        if listener is not None:
+            with contextlib.suppress(OSError):  # it has ended, which is noticed by itself
+                self._line.send("listener")
+                send_handle(self._line, listener.fileno(), pid)
         self._heard = Elapsed()
         self._thread = threading.Thread(target=self._hear, name="bench-line", daemon=True)
         self._thread.start()
@@ -65,7 +79,7 @@ class BenchLine:
         except BaseException:
             line.close()
             raise
-        if said != "beat":
+        if said not in BEATS:
             line.close()
             raise said.raised
         return line
@@ -85,6 +99,7 @@ class BenchLine:
             while True:
                 said = self._line.recv()
                 self._heard.restart()
+                self.at_rest = said == AT_REST
                 if isinstance(said, BenchLeft):
                     self.left = said
 
@@ -92,6 +107,10 @@ class BenchLine:
     def heard_s(self) -> float:
         """Time since its last answer, s."""
         return self._heard.s
+
+    def excuse(self) -> None:
+        """Count its silence from now on: this process itself was late."""
+        self._heard.restart()
 
     def tell(self, what: str) -> None:
         """Say `begin` or `end`."""

@@ -1,8 +1,8 @@
 """The bench process: engine, instruments, journal, schedule, and the one writing connection of the database.
 
-It takes no request from a network and computes no fit. Other processes call it over Unix sockets; a stop has a socket
-and a thread of its own that wait for no lock and no database. It outlives its supervisor: a campaign goes on to its
-end, and another supervisor finds it again.
+It computes no fit. Other processes call it over Unix sockets; a stop has a socket and a thread of its own that wait for
+no lock and no database. It outlives its supervisor: a campaign goes on or ends by the rule of its recipe, a page at the
+service's address can stop it, and another supervisor finds it again.
 """
 
 from __future__ import annotations
@@ -20,6 +20,8 @@ from labctl.log import get_logger
 from labctl.processes.bench_calls import BenchCalls
 from labctl.processes.calls import CallServer
 from labctl.processes.children import begin_child_log, line_to_parent, tell
+from labctl.processes.driver_note import DriverNoteWriter
+from labctl.processes.held_address import HeldAddress
 from labctl.processes.liveness import EngineWatch
 from labctl.processes.settings import CALLS, STOP, BenchSettings
 from labctl.processes.supervision import Supervision
@@ -30,6 +32,8 @@ from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.preparation import clock_for, on_date
 from labctl.services.local_bench import LocalBench
 from labctl.services.planning.loading import load_bench
+from labctl.stop.priority import of_the_bench
+from labctl.stop.wire import StopServer
 from labctl.store import ServiceAddress, Store
 from labctl.store.connection.database import Database
 from procedures.execution.signals import ENDING
@@ -40,7 +44,7 @@ log = get_logger()
 ANSWER_WITHIN_S = 0.2
 #: A bench process without a supervisor ends by itself when no campaign has run for so long, s.
 ALONE_S = 60.0
-LOOK_S = 1.0
+LOOK_S = 0.5
 
 
 def open_bench_service(settings: BenchSettings) -> tuple[Store, LocalBench]:
@@ -85,20 +89,24 @@ class BenchProcess:
     def __init__(self, settings: BenchSettings, store: Store, local: LocalBench) -> None:
         self._store, self._local = store, local
         self._waker = Waker()
-        self._supervision = Supervision(settings, store, self._waker, EngineWatch(lambda: local.polls).is_stuck)
+        watch = EngineWatch(lambda: local.polls)
+        self._note = DriverNoteWriter(settings, store, local)
+        self._address = HeldAddress(local.request_stop, local.describe_running)
+        self._supervision = Supervision(
+            settings, store, self._waker, watch.is_stuck, self._address, lambda: local.is_at_rest, self._note.write
+        )
         if local.scheduler is not None:
             local.scheduler.attended = lambda: self._supervision.alone_s == 0.0
-        calls = BenchCalls(store, local, self._supervision, WallClock(settings.ahead))
-        self._servers = (
-            CallServer(settings.folder / STOP, calls.stop, in_turn=True),
-            CallServer(settings.folder / CALLS, calls.answer),
-        )
+        calls = BenchCalls(store, local, self._supervision, self._address, WallClock(settings.ahead))
+        self._stop_server = StopServer(settings.folder / STOP, local.request_stop)
+        self._call_server = CallServer(settings.folder / CALLS, calls.answer)
 
     def run(self, line: Connection) -> None:
         """Serve until asked to end, or left alone; the bench is safe and the database closed when this returns."""
         self._waker.listen_to(ENDING)
-        for server in self._servers:
-            server.start()
+        self._note.write(self._supervision.settings)
+        self._stop_server.start()
+        self._call_server.start()
         tell(line, "ready")
         try:
             self._serve()
@@ -113,9 +121,16 @@ class BenchProcess:
                 begun = True
                 log.info("bench.begun")
                 self._local.start()
+            self._look_for_supervisor()
             if self._supervision.alone_s > ALONE_S and self._local.running is None:
                 log.warning("supervisor.gone", alone_s=round(self._supervision.alone_s))
                 return
+
+    def _look_for_supervisor(self) -> None:
+        """While there is no supervisor, go on or end by the recipe's rule, and answer at the service's address."""
+        if self._supervision.alone_s > 0.0:
+            self._local.note_unsupervised()
+            self._address.open_page(self._supervision.settings.page_access)
 
     def _close(self) -> None:
         log.info("process.ending", running=self._local.running)
@@ -123,16 +138,19 @@ class BenchProcess:
         try:
             left = self._local.close()
         finally:
-            self._servers[1].close()
+            self._call_server.close()
             with contextlib.suppress(LabctlError):
                 self._store.close()
+            self._note.write_left(left)
             self._supervision.say_left(left)
-            self._servers[0].close()
+            self._stop_server.close()
+            self._address.give_back()
             log.log(ERROR if left.unconfirmed else INFO, "process.ended", left=left.text, unconfirmed=left.unconfirmed)
 
 
 def main() -> int:
     """Run the process that the supervisor has started; returns its exit status."""
+    of_the_bench()
     line, settings = line_to_parent()
     threading.current_thread().name = "bench"
     begin_child_log("bench", settings.location)

@@ -12,7 +12,7 @@ import signal
 import socket
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from logging import INFO
 from multiprocessing.connection import Connection
 from typing import Any
@@ -24,6 +24,7 @@ from labctl.log.setup import begin_log
 Line = Connection
 #: Of linux/prctl.h.
 PR_SET_PDEATHSIG = 1
+LOOK_S = 0.5
 
 
 class Failed(LabctlError):
@@ -54,10 +55,16 @@ class Child:
         """The process's number."""
         return self._process.pid
 
-    def open(self, settings: object) -> None:
-        """Let it begin with its settings, and wait until it is ready; raises what kept it from that."""
+    def open(self, settings: object, gives_up: Callable[[], bool] = lambda: False) -> None:
+        """Let it begin with its settings, and wait until it is ready; raises what kept it from that.
+
+        Raises Failed, too, once `gives_up` returns True.
+        """
         try:
             self.line.send(settings)
+            while not self.line.poll(LOOK_S):
+                if gives_up():
+                    raise Failed(f"the {self.name} was not ready when it was asked to end; start the service again")
             said = self.line.recv()
         except (EOFError, OSError):
             self._process.wait()

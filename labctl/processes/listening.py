@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import socket
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from errno import EADDRINUSE
 
 from labctl.errors import BadInput
 
@@ -22,12 +23,15 @@ class Listening:
 
 
 @contextmanager
-def listening(host: str, port: int) -> Iterator[Listening]:
-    """Listen at an address while the block runs; port 0 takes a free one. Raises BadInput."""
+def listening(host: str, port: int, ask_for_it: Callable[[], None] = lambda: None) -> Iterator[Listening]:
+    """Listen at an address while the block runs; port 0 takes a free one. Raises BadInput.
+
+    `ask_for_it` asks whoever answers there in place of a service that is gone to give the address back.
+    """
     with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET) as listener:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
-            listener.bind((host, port))
+            _bind(listener, (host, port), ask_for_it)
         except socket.gaierror as error:
             raise BadInput(f"--host {host}: {error.strerror}; name an address of this machine") from error
         except OSError as error:
@@ -37,3 +41,14 @@ def listening(host: str, port: int) -> Iterator[Listening]:
         name = f"[{host}]" if ":" in host else host
         listener.listen(BACKLOG)  # a client that reads the address may connect at once
         yield Listening(listener, name, f"http://{name}:{listener.getsockname()[1]}")
+
+
+def _bind(listener: socket.socket, at: tuple[str, int], ask_for_it: Callable[[], None]) -> None:
+    """Bind to an address, once more where it was taken and could be asked for. Raises OSError."""
+    try:
+        listener.bind(at)
+    except OSError as error:
+        if error.errno != EADDRINUSE:
+            raise
+        ask_for_it()
+        listener.bind(at)

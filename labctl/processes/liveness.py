@@ -1,14 +1,17 @@
-"""Time since the last sign of life, and whether the engine still moves."""
+"""Time since the last sign of life, whether the engine still moves, and how often a process was started again."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 from instruments.clock import Clock, SystemClock
+from labctl.errors import LabctlError
 
 #: An engine asks for requests once a second, except in its safe state (at most 120 s) and while it waits for its
 #: database (at most 45 s). One that asked for none in so long hangs, s.
 ENGINE_SILENT_S = 180.0
+#: Processes that end so often within a quarter of an hour are not started again.
+MOST_RESTARTS, RESTARTS_WITHIN_S = 5, 900.0
 
 
 class Elapsed:
@@ -46,3 +49,21 @@ class EngineWatch:
             self._seen = polls
             self._since.restart()
         return self._since.s > ENGINE_SILENT_S
+
+
+class Restarts:
+    """Counts how often something had to be started again lately."""
+
+    def __init__(self) -> None:
+        self._age = Elapsed()
+        self._at_s: list[float] = []
+
+    def one_more(self, what: str) -> None:
+        """Count one. Raises LabctlError when there are too many."""
+        now_s = self._age.s
+        self._at_s = [at_s for at_s in self._at_s if now_s - at_s < RESTARTS_WITHIN_S] + [now_s]
+        if len(self._at_s) > MOST_RESTARTS:
+            raise LabctlError(
+                f"{what} ended {len(self._at_s)} times within {RESTARTS_WITHIN_S / 60:g} min; labctl stops. Read the "
+                "log for the cause, then start labctl again"
+            )

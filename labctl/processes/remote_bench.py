@@ -9,20 +9,25 @@ from pathlib import Path
 from typing import Any
 
 from instruments.bench_config import BenchFile
-from labctl.errors import BenchSilent, Conflict
+from labctl.acting_user import actor
+from labctl.errors import BenchSilent, Conflict, NotStopped
 from labctl.log import get_logger
 from labctl.processes.bench_calls import Beat
 from labctl.processes.calls import Call, Caller
 from labctl.processes.liveness import Elapsed
-from labctl.processes.settings import CALLS, STOP
+from labctl.processes.settings import CALLS
 from labctl.services.benches.bench_left import BenchLeft
+from labctl.services.benches.stops import describe_stop, late_stop
 from labctl.services.campaigns.listeners import ChangeListeners
 from labctl.services.commands.context import CommandContext
 from labctl.services.commands.requests import CampaignResume, CampaignStart, ToBench, ToCampaign
 from labctl.services.commands.service_control import NO_BENCH
-from labctl.services.schemas.benches import BenchCheckResponse, BenchDescription, CheckRequest
+from labctl.services.schemas.benches import BenchCheckResponse, BenchDescription, CheckRequest, StopResponse
 from labctl.services.schemas.campaigns import CampaignResponse, ConfirmRequest, ReasonRequest
 from labctl.services.schemas.schedule import ScheduledResponse
+from labctl.stop.client import NOT_STOPPED, SWITCH, StopAttempt
+from labctl.stop.latch import LatchState, StopRequest
+from labctl.stop.places import BenchPlace, place_of
 
 log = get_logger()
 
@@ -32,8 +37,10 @@ ANSWER_S = 3.0
 TRANSACTION_S = 30.0
 #: Opening a bench: every instrument is asked.
 OPENING_S = 180.0
-#: A stop is passed on without waiting for anything.
-STOP_S = 1.0
+#: Who asks for a stop is told within this that it is under way, or that the bench is not stopped, s.
+HEARD_S = 4.5
+#: And whether the table stands, where it does so soon, s.
+AT_REST_S = 0.1
 #: A bench process without an answer for so long gets no request but to stop.
 SILENT_S = 3.0
 RECONNECT_S = 0.5
@@ -59,12 +66,25 @@ class RemoteWriter:
         self._caller.close()
 
 
+def _not_stopped(text: str) -> str:
+    return f"{NOT_STOPPED}: {text}. {SWITCH}."
+
+
 class RemoteControl:
     """Control over the campaigns of the bench process."""
 
-    def __init__(self, folder: Path, bench: BenchFile | None) -> None:
-        self._bench = bench
-        self._calls, self._stop = Caller(folder / CALLS, ANSWER_S), Caller(folder / STOP, STOP_S, keeps=False)
+    def __init__(
+        self,
+        folder: Path,
+        bench: BenchFile | None,
+        place: BenchPlace | None = None,
+        may_run: Callable[[int], bool] = lambda _: True,
+        last_live: Callable[[int], CampaignResponse | None] = lambda _: None,
+    ) -> None:
+        """`may_run`: whether a campaign runs, or may; `last_live`: how a campaign was when it was last heard of."""
+        self._bench, self._place = bench, place
+        self._may_run, self._last_live = may_run, last_live
+        self._calls = Caller(folder / CALLS, ANSWER_S)
 
     def bench_of(self, _: CampaignStart) -> BenchFile:
         """Return the bench of the bench process. Raises Conflict without one."""
@@ -89,17 +109,45 @@ class RemoteControl:
         return self._ask("pause", asked, timeout_s=TRANSACTION_S)
 
     def abort(self, _: CommandContext, asked: ToCampaign[ReasonRequest]) -> CampaignResponse:
-        """End a campaign now, in the safe state: first the stop, by a way of its own; then it is written down."""
-        stopped = self._stop.call("stop", asked.campaign, asked.body.text)
+        """End a campaign now, in the safe state: first the stop, by a way of its own; then it is written down.
+
+        Raises NotStopped where it is not known within some seconds that the bench is being stopped.
+        """
+        if self._place is None or not self._may_run(asked.campaign):
+            return self._recorded(asked)
+        attempt = self._attempt(asked.body.text, asked.campaign)
+        if not attempt.is_heard(HEARD_S):
+            raise NotStopped(_not_stopped(attempt.text))
+        found = attempt.result(AT_REST_S)
+        if found is not None and not found.stands:
+            raise NotStopped(_not_stopped(found.text))
         try:
-            return self._ask("abort", asked, timeout_s=ANSWER_S)
+            return self._recorded(asked)
         except BenchSilent as silent:
-            if not stopped:
-                raise
-            raise BenchSilent(
-                f"labctl has requested the stop of campaign {asked.campaign}, but it is not known whether the "
-                f"campaign has stopped: {silent}; inspect the bench"
-            ) from silent
+            known = "the table stands" if found is not None else "the bench is being stopped"
+            last = self._last_live(asked.campaign)
+            if last is None:
+                raise BenchSilent(f"{known} ({attempt.text}); that is not recorded yet: {silent}") from silent
+            text = f"{known}, but that is not recorded yet: {silent}"
+            return last.model_copy(update={"wish": "abort", "step_text": attempt.text, "unrecorded": text})
+
+    def stop(self, reason: str) -> StopResponse:
+        """Stop the bench, whatever runs there. Raises NotStopped, Conflict without a bench."""
+        if self._place is None or self._bench is None:
+            raise Conflict(NO_BENCH)
+        attempt = self._attempt(reason, None)
+        found = attempt.result(HEARD_S)
+        if found is None or not found.stands:
+            raise NotStopped(_not_stopped(attempt.text))
+        return StopResponse(bench=self._bench.name, stands=True, text=found.text, campaign=found.campaign)
+
+    def _attempt(self, reason: str, campaign: int | None) -> StopAttempt:
+        assert self._place is not None
+        return StopAttempt(self._place, StopRequest.new(actor().name, actor().via, reason, campaign))
+
+    def _recorded(self, asked: ToCampaign[ReasonRequest]) -> CampaignResponse:
+        answer: CampaignResponse = self._ask("abort", asked, timeout_s=ANSWER_S)
+        return answer
 
     def confirm(self, _: CommandContext, asked: ToCampaign[ConfirmRequest]) -> CampaignResponse:
         """Answer the question that a campaign waits for."""
@@ -115,15 +163,16 @@ class RemoteControl:
     def close(self) -> None:
         """Close the connections."""
         self._calls.close()
-        self._stop.close()
 
 
 class RemoteBench:
     """The bench of a service whose bench process drives it."""
 
-    def __init__(self, folder: Path, bench: BenchFile | None) -> None:
+    def __init__(self, folder: Path, bench: BenchFile | None, location: str = "") -> None:
+        """`location` is the database, beside which the latch of the bench lies."""
         self.bench = bench
-        self.control = RemoteControl(folder, bench)
+        self._place = None if bench is None or not location else place_of(location, bench.name)
+        self.control = RemoteControl(folder, bench, self._place, self._may_run, self._last_of)
         self._caller = Caller(folder / CALLS, ANSWER_S)
         self._listeners = ChangeListeners()
         self._beat = Beat(running=None, stops=False, schedule_trouble="")
@@ -153,6 +202,27 @@ class RemoteBench:
     def heard_s(self) -> float:
         """Time since the last answer of the bench process, s."""
         return self._heard.s
+
+    @property
+    def not_stopped(self) -> str:
+        """What is known of a stop that is late; empty where none is."""
+        if self.heard_s <= SILENT_S:
+            return self._beat.not_stopped
+        return "" if self._place is None or self.bench is None else late_stop(self._latch_state(), self.bench.name)
+
+    def _latch_state(self) -> LatchState:
+        return LatchState() if self._place is None else self._place.latch.state()
+
+    def _may_run(self, campaign: int) -> bool:
+        return self.heard_s > SILENT_S or self._beat.running == campaign
+
+    def _last_of(self, campaign: int) -> CampaignResponse | None:
+        last = self._last_live
+        return last if last is not None and last.id == campaign else None
+
+    def stop(self, reason: str) -> StopResponse:
+        """Stop the bench, whatever runs there. Raises NotStopped, Conflict without a bench."""
+        return self.control.stop(reason)
 
     @property
     def _silence(self) -> str:
@@ -203,7 +273,10 @@ class RemoteBench:
             name=self.bench.name, simulated=self.bench.is_simulated, latitude_deg=self.bench.latitude_deg, units=[],
             campaign=None, unconfirmed="",
         )  # fmt: skip
-        silent = {"unconfirmed": self._silence} if self.heard_s > SILENT_S else {}
+        silent: dict[str, Any] = {}
+        if self.heard_s > SILENT_S:
+            stop = describe_stop(self._latch_state(), self.bench.name)
+            silent = {"unconfirmed": self._silence, "stop": stop}
         return known.model_copy(update={**silent, "heard_s": round(self.heard_s, 1)})
 
     def start(self) -> None:

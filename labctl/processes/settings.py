@@ -2,17 +2,30 @@
 
 from __future__ import annotations
 
+import ipaddress
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from labctl.config import default_database
 from labctl.errors import BadInput
+from labctl.stop.page import PageAccess
 
 SIMULATED_BENCH = "triaxial-sim"
 LAST_PORT = 65535
 #: Names of the sockets in the folder of a bench process.
 CALLS, STOP = "calls", "stop"
+#: Name of the file in that folder with the digests of the keys, for a process that answers without a database.
+KEYS = "keys.json"
+LOOPBACK_NAMES = frozenset({"localhost", "127.0.0.1", "[::1]"})
+
+
+def is_loopback(host: str) -> bool:
+    """Return whether only this machine reaches an address."""
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
 
 
 @dataclass(frozen=True)
@@ -33,6 +46,11 @@ class ServeRequest:
     def location(self) -> str:
         """The database: a URL, or a path that means the same in every process."""
         return self.database or default_database()
+
+    @property
+    def asks_for_keys(self) -> bool:
+        """Whether a request needs a key: off loopback always."""
+        return self.require_keys or not is_loopback(self.host)
 
     @property
     def bench_name(self) -> str | None:
@@ -66,11 +84,26 @@ class BenchSettings:
     url: str  #: of the web process
     simulated_start: datetime | None = None
     ahead: timedelta = timedelta()  #: how far the simulated date is ahead of this computer's
+    guardian_pid: int = 0  #: the supervisor, which stops the bench where the bench process does not
+    guardian_socket: str = ""
+    host: str = "127.0.0.1"  #: at which the service listens
+    at: str = "127.0.0.1"  #: that address, as a Host header names it
+    asks_for_keys: bool = False  #: whether a request needs a key
 
     @property
     def drives(self) -> tuple[str, str | None, float, datetime | None]:
         """The database, the bench, its pace and its date."""
         return self.location, self.bench, self.speed, self.simulated_start
+
+    @property
+    def page_access(self) -> PageAccess:
+        """Who may stop at the service's address while no web process answers there."""
+        return page_access(self.asks_for_keys, self.at, self.folder)
+
+
+def page_access(asks_for_keys: bool, at: str, folder: Path) -> PageAccess:
+    """Return who may stop at a service's address while no web process answers there."""
+    return PageAccess(LOOPBACK_NAMES | {at.lower()}, folder / KEYS if asks_for_keys else None)
 
 
 @dataclass(frozen=True)

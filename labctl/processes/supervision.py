@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import contextlib
 import os
+import socket
 import threading
 from collections.abc import Callable
 from multiprocessing.connection import Connection
+from multiprocessing.reduction import recv_handle
 
 from labctl.errors import Conflict, StoreError
+from labctl.processes.held_address import HeldAddress
 from labctl.processes.liveness import Elapsed
 from labctl.processes.settings import BenchSettings
 from labctl.processes.waker import Waker
@@ -22,10 +25,24 @@ BEAT_S = 1.0
 class Supervision:
     """The bench process's side: one supervisor at a time, or none."""
 
-    def __init__(self, settings: BenchSettings, store: Store, waker: Waker, is_stuck: Callable[[], bool]) -> None:
-        """`is_stuck`: whether this process lives and its engine does not; then no beat is sent, and it is replaced."""
+    def __init__(
+        self,
+        settings: BenchSettings,
+        store: Store,
+        waker: Waker,
+        is_stuck: Callable[[], bool],
+        address: HeldAddress,
+        is_at_rest: Callable[[], bool] = lambda: True,
+        on_charge: Callable[[BenchSettings], None] = lambda _: None,
+    ) -> None:
+        """`is_stuck`: whether this process lives and its engine does not; then no beat is sent, and it is replaced.
+
+        A supervisor sends its listening socket, which `address` holds. Each beat says whether the table is known to
+        stand (`is_at_rest`). `on_charge` is called with the settings of every supervisor that takes charge.
+        """
         self._settings, self._store, self._waker = settings, store, waker
-        self._is_stuck = is_stuck
+        self._is_stuck, self._is_at_rest, self._on_charge = is_stuck, is_at_rest, on_charge
+        self._address = address
         self._guard = threading.Lock()
         self._line: Connection | None = None
         self._alone = Elapsed()
@@ -55,14 +72,23 @@ class Supervision:
         self._store.note_address(ServiceAddress(wanted.url, str(wanted.folder)))
         with contextlib.suppress(StoreError):  # a hint for other processes; a stop does not need it
             self._store.leases.note_address(this_machine(), os.getpid())
+        self._address.close_page()
+        self._on_charge(wanted)
         threading.Thread(target=self._hear, args=(line,), name="supervisor", daemon=True).start()
         threading.Thread(target=self._beat, args=(line,), name="beat", daemon=True).start()
+
+    @property
+    def settings(self) -> BenchSettings:
+        """What the supervisor that is in charge, or was last, wants."""
+        return self._settings
 
     def _hear(self, line: Connection) -> None:
         with contextlib.suppress(EOFError, OSError):
             while True:
                 said = line.recv()
-                if said == "begin":
+                if said == "listener":
+                    self._address.take(socket.socket(fileno=recv_handle(line)))
+                elif said == "begin":
                     self.begin = True
                     self._waker.wake()
                 elif said == "end":
@@ -76,7 +102,7 @@ class Supervision:
             while self._line is line:
                 never.wait(BEAT_S)
                 if not self._is_stuck():
-                    line.send("beat")
+                    line.send("at rest" if self._is_at_rest() else "beat")
 
     def _let_go(self, line: Connection) -> None:
         with self._guard:

@@ -1,13 +1,15 @@
 """The supervisor: what `labctl serve` runs. It starts the bench process and the web process, and watches both.
 
 It computes nothing and has no database open, so that little can stop it. A process that has ended, or has given no
-sign of life for `SILENT_S`, is started again; a bench process starts with the safe state. The end of the supervisor
-ends the web process, not the bench process: the next supervisor on the same database takes charge of it.
+sign of life for some seconds, is started again. As the guardian of the bench it stops the instruments through their
+drivers as soon as a bench process has ended without having done so. The end of the supervisor ends the web process, not
+the bench process: the next supervisor on the same database takes charge of it.
 """
 
 from __future__ import annotations
 
 import contextlib
+import os
 import shutil
 import signal
 import tempfile
@@ -18,27 +20,41 @@ from logging import ERROR, INFO
 from pathlib import Path
 
 from instruments.clock import WallClock
+from labctl.config import os_user
 from labctl.errors import BenchSilent, BenchUnconfirmed, Conflict, LabctlError
 from labctl.log import get_logger
 from labctl.processes import systemd
 from labctl.processes.bench_line import BenchLine, bench_process_of
+from labctl.processes.calls import Caller
 from labctl.processes.children import Child
+from labctl.processes.guardian import Guardian, GuardianStop
 from labctl.processes.listening import Listening, listening
-from labctl.processes.liveness import Elapsed
-from labctl.processes.settings import BenchSettings, ServeRequest, WebSettings, ahead_of
+from labctl.processes.liveness import Elapsed, Restarts
+from labctl.processes.settings import CALLS, BenchSettings, ServeRequest, WebSettings, ahead_of
 from labctl.processes.waker import Waker
+from labctl.processes.web_keeper import WebKeeper
 from labctl.services.benches.bench_left import BenchLeft
+from labctl.services.campaigns.stop_requests import NotHere
+from labctl.services.planning.loading import load_bench, with_drivers
+from labctl.stop.client import AttemptedStop, StopAttempt
+from labctl.stop.latch import StopRequest
+from labctl.stop.places import BenchPlace, place_of
+from labctl.stop.priority import first_of_all
+from labctl.stop.wire import Stopping
 from procedures.execution.signals import ENDING, restore
 
 log = get_logger()
 
-LOOK_S = 0.5
-#: A process that gave no sign of life for so long is ended and started again, s.
-SILENT_S = 15.0
-#: Processes that end so often within a quarter of an hour are not started again.
-MOST_RESTARTS, RESTARTS_WITHIN_S = 5, 900.0
-#: The web process cuts its requests and ends within this, s.
-WEB_END_S = 15.0
+LOOK_S = 0.25
+#: A bench process that gave no sign of life for so long is ended, its bench stopped, and another one started, s.
+SILENT_S = 3.0
+#: A bench process that starts may take this long to answer for the first time, s.
+STARTS_WITHIN_S = 15.0
+#: A supervisor that was itself so late cannot tell whether another process was silent, s.
+LATE_S = 1.0
+#: From the request to end to the end of what has not ended by then, s. A bench process whose table is known to stand
+#: may take longer: a chamber is asked several times.
+ENDS_WITHIN_S, SAFE_WITHIN_S = 5.0, 180.0
 
 
 @dataclass(frozen=True)
@@ -50,22 +66,8 @@ class Ready:
     web_pid: int
 
 
-class _Restarts:
-    """Counts how often something had to be started again lately."""
-
-    def __init__(self) -> None:
-        self._age = Elapsed()
-        self._at_s: list[float] = []
-
-    def one_more(self, what: str) -> None:
-        """Count one. Raises LabctlError when there are too many."""
-        now_s = self._age.s
-        self._at_s = [at_s for at_s in self._at_s if now_s - at_s < RESTARTS_WITHIN_S] + [now_s]
-        if len(self._at_s) > MOST_RESTARTS:
-            raise LabctlError(
-                f"{what} ended {len(self._at_s)} times within {RESTARTS_WITHIN_S / 60:g} min; labctl stops. Read the "
-                "log for the cause, then start labctl again"
-            )
+#: A bench process that answers at the address of its service gives it back within this, s.
+ADDRESS_S = 3.0
 
 
 def serve_forever(request: ServeRequest, ready: Callable[[Ready], None]) -> str:
@@ -75,12 +77,21 @@ def serve_forever(request: ServeRequest, ready: Callable[[Ready], None]) -> str:
     BenchUnconfirmed for a bench that at the end is not known to be safe.
     """
     request.check()
-    with listening(request.host, request.port) as at, ending_signals() as waker:
+    first_of_all()
+    with listening(request.host, request.port, lambda: _ask_for_address(request)) as at, ending_signals() as waker:
         left = Supervisor(request, at, waker).run(ready)
     log.log(ERROR if left.unconfirmed else INFO, "process.ended", left=left.text, unconfirmed=left.unconfirmed)
     if left.unconfirmed:
         raise BenchUnconfirmed(f"stopped; {left.text}")
     return left.text
+
+
+def _ask_for_address(request: ServeRequest) -> None:
+    """Ask a bench process whose service is gone, and which answers at its address, to give the address back."""
+    with contextlib.suppress(LabctlError):
+        holder = bench_process_of(request)
+        if holder is not None and holder.calls is not None:
+            Caller(Path(holder.calls) / CALLS, ADDRESS_S).call("address.give_back")
 
 
 @contextmanager
@@ -102,30 +113,63 @@ class Supervisor:
     def __init__(self, request: ServeRequest, at: Listening, waker: Waker) -> None:
         self._request, self._at, self._waker = request, at, waker
         self._ahead = ahead_of(WallClock().utc(), request.simulated_start)
-        self._restarts = _Restarts()
+        self._restarts = Restarts()
+        self._bench: BenchLine | None = None
+        self._guardian: Guardian | None = None
+        self._place: BenchPlace | None = None
 
     def run(self, ready: Callable[[Ready], None]) -> BenchLeft:
         """Serve until asked to end; returns how the bench was left."""
-        self._web = self._new_web()  # both load their modules at the same time
+        web = WebKeeper(self._at, self._waker, self._web_settings, self._respond)  # both load modules at the same time
         try:
-            bench = self._open_bench()
+            self._begin_guarding()
+            bench = self._bench = self._open_bench()
         except BaseException:
-            self._web.kill()
+            web.close()
+            self._end_guarding()
             raise
-        self._bench, self._web_heard = bench, Elapsed()
         try:
-            self._web.open(self._web_settings())
-            self._web_heard.restart()
-            log.info("process.started", url=self._at.url, bench_pid=bench.pid, web_pid=self._web.pid)
-            ready(Ready(self._at.url, bench.pid, self._web.pid))
+            web.open()
+            log.info("process.started", url=self._at.url, bench_pid=bench.pid, web_pid=web.pid)
+            ready(Ready(self._at.url, bench.pid, web.pid))
             bench.tell("begin")
+            web.keep()
             systemd.ready()
-            self._watch_on()
+            self._watch_on(web)
         finally:
             systemd.stopping()
-            left = self._end_bench(self._bench)
-            self._end_web()
+            left = self._end(web)
         return left
+
+    # -- the guardian of the bench
+
+    def _begin_guarding(self) -> None:
+        if self._request.bench_name is None:
+            return
+        bench = with_drivers(load_bench(self._request.bench_name))  # loads what the guardian needs
+        self._place = place_of(self._request.location, bench.name)
+        self._guardian = Guardian(bench, self._place, lambda: 0 if self._bench is None else self._bench.pid)
+
+    def _end_guarding(self) -> None:
+        if self._guardian is not None:
+            self._guardian.close()
+
+    def _respond(self, stop: StopRequest) -> Stopping:
+        """Begin a stop that came over HTTP while no web process answered."""
+        if self._place is None:
+            return NotHere("this service drives no bench")
+        return AttemptedStop(StopAttempt(self._place, stop))
+
+    def _secured(self) -> GuardianStop | None:
+        """Let the guardian make safe the bench of a process that has ended; returns what came of it."""
+        if self._guardian is None:
+            return None
+        while self._guardian.busy:  # it was asked for a stop, and has ended the process itself
+            self._waker.wait(LOOK_S)
+        securing = self._guardian.begin()
+        while not securing.wait(LOOK_S):
+            systemd.alive()
+        return securing
 
     # -- the bench process
 
@@ -133,7 +177,9 @@ class Supervisor:
         request = self._request
         return BenchSettings(
             request.location, request.bench_name, request.simulate, request.speed, folder, self._at.url,
-            request.simulated_start, self._ahead,
+            request.simulated_start, self._ahead, os.getpid(),
+            "" if self._guardian is None else str(self._guardian.socket),
+            request.host, self._at.name, request.asks_for_keys,
         )  # fmt: skip
 
     def _open_bench(self) -> BenchLine:
@@ -151,7 +197,7 @@ class Supervisor:
             except Conflict:
                 holder = bench_process_of(self._request)
                 starting = holder is not None and holder.calls is not None
-                if not starting or self._waker.ending or trying.s > SILENT_S:
+                if not starting or self._waker.ending or trying.s > STARTS_WITHIN_S:
                     raise
             self._waker.wait(LOOK_S)
 
@@ -165,7 +211,7 @@ class Supervisor:
             return None
         with contextlib.suppress(BenchSilent, ProcessLookupError):
             self._folder = Path(holder.calls)
-            line = BenchLine(self._settings(self._folder), holder.pid)
+            line = BenchLine(self._settings(self._folder), holder.pid, listener=self._at.socket)
             log.info("bench_process.found", child_pid=holder.pid)
             return line
         return None
@@ -176,97 +222,106 @@ class Supervisor:
         settings = self._settings(self._folder)
         child = Child("labctl.processes.bench_process")
         try:
-            child.open(settings)
-            return BenchLine(settings, child.pid, child)
+            child.open(settings, lambda: self._waker.ending)
+            return BenchLine(settings, child.pid, child, self._at.socket)
         except BaseException:
             child.signal(signal.SIGTERM)
-            child.wait(SILENT_S)
+            child.wait(ENDS_WITHIN_S)
             child.kill()
             shutil.rmtree(self._folder, ignore_errors=True)
             raise
 
-    def _end_bench(self, bench: BenchLine) -> BenchLeft:
-        """Let the bench process leave its bench safe, however long that takes; returns how it was left."""
-        log.info("process.ending", stopped=self._waker.ending)
+    def _end_bench(self, bench: BenchLine, ending: Elapsed, web: WebKeeper) -> BenchLeft:
+        """Let the bench process leave its bench safe, or do it in its place; returns how the bench was left."""
         bench.tell("end")
         while not bench.wait(LOOK_S):
             systemd.alive()
-            if bench.heard_s > SILENT_S:
-                self._kill("bench", bench, bench.heard_s)
+            if ending.s > ENDS_WITHIN_S / 2:
+                web.end_soon()
+            if self._may_take_longer(bench, ending):
+                continue
+            self._latch_end()
+            self._kill_bench(bench)
         bench.close()
         shutil.rmtree(self._folder, ignore_errors=True)
         if bench.left is not None:
             return bench.left
-        text = "the bench process ended without a report: the state of the bench is not known; inspect the bench"
-        return BenchLeft(text, unconfirmed=self._request.bench_name is not None)
+        securing = self._secured()
+        if securing is None:
+            return BenchLeft("the bench process ended without a report; this service drives no bench")
+        text = f"the bench process ended without a report; {securing.text}"
+        if not securing.safe:
+            text += "; the state of the bench is not known; inspect the bench"
+        return BenchLeft(text, unconfirmed=not securing.safe)
 
-    # -- the web process
+    def _may_take_longer(self, bench: BenchLine, ending: Elapsed) -> bool:
+        """Return whether a bench process that was asked to end may go on with that."""
+        if bench.heard_s > SILENT_S:
+            return False
+        at_rest = bench.at_rest and (self._guardian is None or not self._guardian.simulated)
+        return ending.s < (SAFE_WITHIN_S if at_rest else ENDS_WITHIN_S)
 
-    def _new_web(self) -> Child:
-        return Child("labctl.processes.web_process", pass_fds=[self._at.socket.fileno()])
+    def _latch_end(self) -> None:
+        """Remember that what runs is to end: the next process would take the campaign up again."""
+        if self._place is None:
+            return
+        user = os_user()
+        with contextlib.suppress(OSError):
+            reason = f"the service was asked to end, and its bench process did not ({user})"
+            self._place.latch.request(StopRequest.new(user, "signal", reason, holds=False))
 
-    def _web_settings(self) -> WebSettings:
-        return WebSettings(self._request, self._folder, self._at.socket.fileno(), self._at.name, self._ahead)
-
-    def _end_web(self) -> None:
-        self._web.signal(signal.SIGTERM)
-        self._web.wait(WEB_END_S)
-        self._web.kill()
+    @staticmethod
+    def _kill_bench(bench: BenchLine) -> None:
+        log.error("child.silent", child="bench", child_pid=bench.pid, silent_s=round(bench.heard_s, 1))
+        bench.signal(signal.SIGKILL)
 
     # -- watching
 
-    @staticmethod
-    def _kill(name: str, process: BenchLine | Child, silent_s: float) -> None:
-        log.error("child.silent", child=name, child_pid=process.pid, silent_s=round(silent_s, 1))
-        process.signal(signal.SIGKILL)
-
-    def _watch_on(self) -> None:
+    def _watch_on(self, web: WebKeeper) -> None:
         try:
             self._watch()
+            web.check()
         except LabctlError as error:
             log.critical("process.gives_up", reason=str(error))
             raise
 
     def _watch(self) -> None:
-        notified = Elapsed()
+        notified, since = Elapsed(), Elapsed()
         while not self._waker.ending:
+            since.restart()
             self._waker.wait(LOOK_S)
+            if since.s > LOOK_S + LATE_S and self._bench is not None:
+                self._bench.excuse()
             self._look_after_bench()
-            self._look_after_web()
             if notified.s > systemd.period_s():
                 notified.restart()
                 systemd.alive()
 
     def _look_after_bench(self) -> None:
-        if self._bench.heard_s > SILENT_S:
-            self._kill("bench", self._bench, self._bench.heard_s)
-        if not self._bench.wait(0.0) or self._waker.ending:
+        bench = self._bench
+        assert bench is not None
+        if bench.heard_s > SILENT_S:
+            self._kill_bench(bench)
+        if not bench.wait(0.0) or self._waker.ending:
             return
-        log.error("child.ended", child="bench", child_pid=self._bench.pid)
-        self._bench.close()
+        log.error("child.ended", child="bench", child_pid=bench.pid)
+        bench.close()
+        self._secured()
         self._restarts.one_more("the bench process")
-        self._bench = self._start_bench()
-        log.warning("child.restarted", child="bench", child_pid=self._bench.pid)
-        self._bench.tell("begin")
+        self._bench = bench = self._start_bench()
+        log.warning("child.restarted", child="bench", child_pid=bench.pid)
+        bench.tell("begin")
 
-    def _look_after_web(self) -> None:
-        while self._web.line.poll(0):
-            try:
-                self._web.line.recv()
-            except (EOFError, OSError):
-                break
-            self._web_heard.restart()
-        if self._web_heard.s > SILENT_S:
-            self._kill("web", self._web, self._web_heard.s)
-        if not self._web.has_ended() or self._waker.ending:
-            return
-        log.error("child.ended", child="web", child_pid=self._web.pid, status=self._web.status)
-        self._web.kill()
-        self._restarts.one_more("the web process")
-        self._web, self._web_heard = self._new_web(), Elapsed()
+    def _end(self, web: WebKeeper) -> BenchLeft:
+        """End both processes, the bench safe first; returns how the bench was left."""
+        ending = Elapsed()
+        log.info("process.ending", stopped=self._waker.ending)
         try:
-            self._web.open(self._web_settings())
-        except (LabctlError, OSError) as error:  # it is looked after again
-            log.warning("child.refused", child="web", error=str(error))
-        else:
-            log.warning("child.restarted", child="web", child_pid=self._web.pid)
+            assert self._bench is not None
+            return self._end_bench(self._bench, ending, web)
+        finally:
+            web.close()
+            self._end_guarding()
+
+    def _web_settings(self) -> WebSettings:
+        return WebSettings(self._request, self._folder, self._at.socket.fileno(), self._at.name, self._ahead)

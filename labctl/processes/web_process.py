@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import ipaddress
 import os
 import signal
 import socket
@@ -14,25 +13,28 @@ from multiprocessing.connection import Connection
 import uvicorn
 
 from instruments.clock import WallClock
-from labctl.api.access_policy import LOOPBACK_NAMES, MIB, AccessPolicy
+from labctl.api.access_policy import MIB, AccessPolicy
 from labctl.api.app import create_app
 from labctl.api.connection_limits import limits_for, raise_open_files
 from labctl.api.http_protocol import bounded_http
 from labctl.log import get_logger
 from labctl.processes.children import begin_child_log, end_with_parent, line_to_parent, tell
 from labctl.processes.remote_bench import RemoteBench, RemoteWriter
-from labctl.processes.settings import ServeRequest, WebSettings
+from labctl.processes.settings import KEYS, LOOPBACK_NAMES, ServeRequest, WebSettings, is_loopback
 from labctl.services.admin.api_keys import require_an_api_key
+from labctl.services.admin.key_memory import KeyMemory
 from labctl.services.computation import InWorkers
 from labctl.services.lab_service import VERSION, LabService
 from labctl.services.planning.loading import load_bench
+from labctl.stop.page import write_keys
+from labctl.stop.priority import of_the_pages
 from labctl.store import Store
 from labctl.store.connection.database import Database
 
 log = get_logger()
 
 #: A request that has not ended so long after the end was asked for is cut, s.
-GRACE_S = 5
+GRACE_S = 2
 BEAT_S = 1
 #: What a worker needs, loaded once for all of them.
 WORKER_MODULES = (
@@ -50,28 +52,23 @@ def create_service(settings: WebSettings) -> LabService:
     store = Store(Database(request.location, write=False, writer=RemoteWriter(folder)))
     store.imports.discard_unfinished()  # of a web process that was killed
     computation = InWorkers(store, preload=WORKER_MODULES)
-    return LabService(store, WallClock(settings.ahead), computation=computation, access=RemoteBench(folder, bench))
+    return LabService(
+        store, WallClock(settings.ahead), computation=computation, access=RemoteBench(folder, bench, request.location)
+    )
 
 
 def access_for(request: ServeRequest, store: Store, at: str) -> AccessPolicy:
     """Return who is admitted: on loopback this machine's users, elsewhere callers with a key. Raises BadInput."""
     upload = request.max_upload_mib * MIB
-    if _is_loopback(request.host) and not request.require_keys:
+    if not request.asks_for_keys:
         return AccessPolicy(hosts=LOOPBACK_NAMES | {at.lower()}, upload_bytes=upload)
     asked = (
         "--require-keys"
-        if _is_loopback(request.host)
+        if is_loopback(request.host)
         else f"--host {request.host}: this address can be reached from other computers"
     )
     require_an_api_key(store, asked)
     return AccessPolicy(keys=True, upload_bytes=upload)
-
-
-def _is_loopback(host: str) -> bool:
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"
 
 
 def _end_with(line: Connection) -> None:
@@ -81,11 +78,19 @@ def _end_with(line: Connection) -> None:
     os.kill(os.getpid(), signal.SIGTERM)
 
 
+def _keys_of(store: Store, settings: WebSettings) -> KeyMemory:
+    """Return the keys in force, which also lie beside the bench process's sockets, for a page without a database."""
+    memory = KeyMemory(store, lambda digests: write_keys(settings.folder / KEYS, digests))
+    memory.start()
+    return memory
+
+
 def serve(line: Connection, settings: WebSettings) -> None:
     """Serve until the supervisor ends it. Raises BadInput without a key where one is needed."""
     service = create_service(settings)
     access = access_for(settings.request, service.store, settings.at)
-    app = create_app(service, access)
+    keys = _keys_of(service.store, settings) if access.keys else None
+    app = create_app(service, access, keys)
 
     async def beat() -> None:
         tell(line, "beat")
@@ -105,6 +110,8 @@ def serve(line: Connection, settings: WebSettings) -> None:
     with socket.socket(fileno=settings.listener) as listener, contextlib.suppress(KeyboardInterrupt):
         signal.signal(signal.SIGTERM, signal.default_int_handler)  # the server raises it again at its end
         server.run(sockets=[listener])
+    if keys is not None:
+        keys.close()
     service.close()
     log.info("process.ended")
 
@@ -112,6 +119,7 @@ def serve(line: Connection, settings: WebSettings) -> None:
 def main() -> int:
     """Run the process that the supervisor has started; returns its exit status."""
     end_with_parent()
+    of_the_pages()
     line, settings = line_to_parent()
     signal.signal(signal.SIGHUP, signal.SIG_IGN)  # the supervisor hears it
     begin_child_log("web", settings.request.location)

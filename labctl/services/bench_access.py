@@ -8,7 +8,7 @@ from typing import Protocol
 from instruments.bench_config import BenchFile
 from labctl.services.benches.bench_left import BenchLeft
 from labctl.services.commands.context import CampaignControl
-from labctl.services.schemas.benches import BenchDescription
+from labctl.services.schemas.benches import BenchDescription, StopResponse
 from labctl.services.schemas.campaigns import CampaignResponse
 
 
@@ -43,6 +43,15 @@ class BenchAccess(Protocol):
     @property
     def heard_s(self) -> float:
         """Time since the last answer of the process that drives the bench, s; 0 for this process."""
+        ...
+
+    @property
+    def not_stopped(self) -> str:
+        """What is known of a stop that is late; empty where none is. Asks no database."""
+        ...
+
+    def stop(self, reason: str) -> StopResponse:
+        """Stop the bench, whatever runs there. Raises NotStopped, Conflict without a bench."""
         ...
 
     def runs(self, campaign: int) -> bool:

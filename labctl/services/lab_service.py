@@ -28,7 +28,7 @@ from labctl.services.drafts.answers import with_drafts
 from labctl.services.drafts.watch import DraftWatch
 from labctl.services.local_bench import LocalBench
 from labctl.services.recordings.staging import remove_abandoned
-from labctl.services.schemas.benches import BenchResponse
+from labctl.services.schemas.benches import BenchResponse, StopResponse
 from labctl.services.schemas.campaigns import (
     CampaignResponse,
     EventResponse,
@@ -172,7 +172,12 @@ class LabService:
 
     def heartbeat(self) -> HeartbeatResponse:
         """Return what every open page asks once a second: that the service answers; reads no database."""
-        return HeartbeatResponse(version=VERSION, heard_s=round(self.bench_access.heard_s, 1))
+        access = self.bench_access
+        return HeartbeatResponse(version=VERSION, heard_s=round(access.heard_s, 1), not_stopped=access.not_stopped)
+
+    def stop_bench(self, reason: str) -> StopResponse:
+        """Stop whatever runs on the bench of this service. Raises NotStopped, Conflict without a bench."""
+        return self.bench_access.stop(reason)
 
     def health(self) -> HealthResponse:
         """Return whether the service is well."""

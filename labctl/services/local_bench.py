@@ -6,16 +6,23 @@ from collections.abc import Callable
 
 from instruments.bench_config import BenchFile
 from instruments.clock import Clock
-from labctl.acting_user import ITSELF, acting
-from labctl.errors import StoreError
+from labctl.acting_user import ITSELF, acting, actor
+from labctl.errors import Conflict, NotStopped, StoreError
 from labctl.services.benches.bench_left import BenchLeft
 from labctl.services.benches.confirmation import describe_bench, describe_safe_state
 from labctl.services.campaigns.bench_runner import BenchRunner
-from labctl.services.commands.service_control import ServiceControl
+from labctl.services.campaigns.stop_requests import NotHere
+from labctl.services.commands.service_control import NO_BENCH, ServiceControl
 from labctl.services.schedule.scheduler import Scheduler
-from labctl.services.schemas.benches import BenchDescription
+from labctl.services.schemas.benches import BenchDescription, StopResponse
 from labctl.services.schemas.campaigns import CampaignResponse
+from labctl.stop.client import NOT_STOPPED, SWITCH
+from labctl.stop.latch import StopRequest
+from labctl.stop.wire import Stopping
 from labctl.store import Store
+
+#: Who asks for a stop is told within this whether the table stands, s.
+STOP_S = 4.5
 
 
 class LocalBench:
@@ -68,17 +75,50 @@ class LocalBench:
         """
         with acting(ITSELF):  # no request asked for it
             if self.runner is not None:
+                self.runner.watch_latch()
                 self.runner.safe_state.start()
                 self.runner.resume_unfinished()
             if self.scheduler is not None:
                 self.scheduler.start()
 
-    def stop_now(self, campaign: int | None, reason: str) -> bool:
-        """Ask for the end of this campaign, with None of whatever runs; returns whether it was asked.
+    def request_stop(self, stop: StopRequest) -> Stopping:
+        """Begin a stop; returns how it goes on. Waits for no lock, no disk and no database."""
+        if self.runner is None:
+            return NotHere("this service drives no bench")
+        return self.runner.request_stop(stop)
 
-        Waits for no lock and for no database.
-        """
-        return self.runner is not None and self.runner.stop_now(campaign, reason)
+    @property
+    def is_at_rest(self) -> bool:
+        """Whether no campaign runs, or the one that ends has brought the table to rest."""
+        return self.runner is None or self.runner.is_at_rest
+
+    @property
+    def not_stopped(self) -> str:
+        """What is known of a stop that is late; empty where none is."""
+        return "" if self.runner is None else self.runner.not_stopped
+
+    def stop(self, reason: str) -> StopResponse:
+        """Stop the bench, whatever runs there. Raises NotStopped, Conflict without a bench."""
+        if self.runner is None:
+            raise Conflict(NO_BENCH)
+        stopping = self.runner.request_stop(StopRequest.new(actor().name, actor().via, reason))
+        if not stopping.is_over(STOP_S) or not stopping.stands:
+            raise NotStopped(f"{NOT_STOPPED}: {stopping.text}. {SWITCH}.")
+        return StopResponse(bench=self.runner.bench.name, stands=True, text=stopping.text, campaign=stopping.campaign)
+
+    def note_unsupervised(self) -> None:
+        """End what runs, to be resumed, where its recipe says so: no supervisor guards the bench any more."""
+        if self.runner is not None:
+            self.runner.note_unsupervised()
+
+    def describe_running(self) -> str:
+        """Say in one sentence what runs, from memory."""
+        if self.runner is None:
+            return "This service drives no bench."
+        campaign = self.runner.running
+        if campaign is None:
+            return f"No campaign runs on bench {self.runner.bench.name}."
+        return f"Campaign {campaign} runs on bench {self.runner.bench.name}, without its service."
 
     @property
     def polls(self) -> tuple[int, int] | None:

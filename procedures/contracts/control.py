@@ -33,7 +33,11 @@ class Control:
         self._request = ControlRequest()
         self._end: ControlRequest | None = None  # beside the lock: an abort waits for nothing
         self._heard = threading.Event()
+        self._at_rest = threading.Event()
         self._loss = loss
+        self._driver: int | None = None  # thread that drives the bench
+        self._released = False
+        self.hindrance = ""  #: what keeps the bench from its safe state, in words; empty while nothing does
         self.polls = 0  #: number of polls by the thread that drives the bench: it rises while the thread runs
 
     @property
@@ -47,12 +51,43 @@ class Control:
         For the thread that drives the bench.
         """
         self.polls += 1
+        self._driver = threading.get_ident()
         if reason := self._loss():
             self.interrupt(reason)
         request = self.request
         if request.abort:
             self._heard.set()
         return request
+
+    def ends_here(self) -> ControlRequest | None:
+        """Return the request to end, in the thread that drives the bench, until it has left its step; else None.
+
+        What waits inside a driver call asks this, so that a stop does not wait for the end of a ramp or a homing.
+        """
+        request = self._end
+        if request is None or self._released or threading.get_ident() != self._driver:
+            return None
+        self._heard.set()
+        return request
+
+    def leave_step(self) -> None:
+        """Note that the thread that drives the bench makes it safe from now on: no wait of it is cut short."""
+        self._released = True
+        self._heard.set()
+
+    def note_heard(self) -> None:
+        """Note that another thread has the bench and stops its table, in place of the one that drives it."""
+        self._heard.set()
+
+    def note_safe_state(self, hindrance: str, *, at_rest: bool) -> None:
+        """Note how far the safe state is: what keeps it, and whether the table is confirmed to stand."""
+        self.hindrance = hindrance
+        if at_rest:
+            self._at_rest.set()
+
+    def is_at_rest(self, within_s: float) -> bool:
+        """Wait until the table is confirmed to stand after a request to end, s of wall time; returns whether it is."""
+        return self._at_rest.wait(within_s)
 
     def is_heard(self, within_s: float) -> bool:
         """Wait until the thread that drives the bench has seen the abort, s of wall time; returns whether it has."""

@@ -14,19 +14,37 @@ from procedures.contracts.bench import Bench
 STANDSTILL_TIMEOUT_S = 30.0
 #: Before each further round of what could not be confirmed: a link may come back.
 PAUSES_S = (2.0, 10.0, 30.0)
+#: The first part of the safe state.
+TABLE = "table to rest"
+
+#: Is told of each part that was tried: which, and what could not be confirmed, empty when it is confirmed.
+Note = Callable[[str, str], None]
 
 
-def make_safe(bench: Bench, clock: Clock, pauses_s: Sequence[float] = PAUSES_S) -> tuple[str, ...]:
+def _no_note(_what: str, _complaint: str) -> None:
+    pass
+
+
+def make_safe(
+    bench: Bench, clock: Clock, pauses_s: Sequence[float] = PAUSES_S, note: Note = _no_note
+) -> tuple[str, ...]:
     """Bring the bench to its safe state; returns what could not be confirmed, empty when all is well.
 
     Every part is tried even when another fails; what failed is tried again after each of the pauses, after all the
-    others. An interrupt (Ctrl-C) during a part makes it be tried once more.
+    others. An interrupt (Ctrl-C) during a part makes it be tried once more. `note` is told of each part; it may
+    neither block nor raise.
     """
+    if bench.table is None:
+        note(TABLE, "")
     open_parts = [(what, part, "") for what, part in _parts(bench, clock)]
     for pause_s in (0.0, *pauses_s):
         with contextlib.suppress(KeyboardInterrupt):  # without the pause the next try only comes earlier
             clock.sleep(pause_s)
-        tried = [(what, part, _tried(what, part)) for what, part, _ in open_parts]
+        tried = []
+        for what, part, _ in open_parts:
+            complaint = _tried(what, part)
+            note(what, complaint.removeprefix(f"{what}: "))
+            tried.append((what, part, complaint))
         open_parts = [each for each in tried if each[2]]
         if not open_parts:
             break
@@ -35,7 +53,7 @@ def make_safe(bench: Bench, clock: Clock, pauses_s: Sequence[float] = PAUSES_S) 
 
 def _parts(bench: Bench, clock: Clock) -> Iterator[tuple[str, Callable[[], str | None]]]:
     if bench.table is not None:
-        yield "table to rest", partial(stop_table, bench.table, clock)
+        yield TABLE, partial(stop_table, bench.table, clock)
     if bench.chamber is not None:
         yield "chamber to its safe set point", partial(_make_chamber_safe, bench.chamber)
     for name, gyro in bench.gyros.items():

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from procedures.contracts.campaign_state import CampaignState
 from procedures.contracts.journal import NOT_SAFE, Event
 from procedures.execution.context import ExecutionContext
-from procedures.execution.safe_state import make_safe
+from procedures.execution.safe_state import TABLE, make_safe
 from procedures.execution.signals import ignore_signals
 
 
@@ -35,6 +35,7 @@ class Shutdown:
 
         Signals are ignored meanwhile; an interrupt from before that begins the shutdown again, `on_ending` first.
         """
+        self._context.control.leave_step()
         while True:
             try:
                 on_ending()
@@ -47,7 +48,10 @@ class Shutdown:
         recorder = self._context.recorder
         if not bench_is_safe:
             recorder.tracker.update(step_text="setting the bench to its safe state")
-        self.complaints = () if bench_is_safe else make_safe(self._context.full_bench, self._context.clock)
+        self.complaints = ()
+        if not bench_is_safe:
+            self.complaints = make_safe(self._context.full_bench, self._context.clock, note=self._note)
+        self._context.control.note_safe_state("; ".join(self.complaints), at_rest=bench_is_safe)
         if self.complaints:
             text = NOT_SAFE + "; ".join(self.complaints)
             reason = f"{reason}. {text}"
@@ -55,3 +59,10 @@ class Shutdown:
             recorder.event(Event("safe_state", text, level="error"))
         recorder.change_state(state, reason)
         return Outcome(state, reason, safe=not self.complaints)
+
+    def _note(self, what: str, complaint: str) -> None:
+        """Show how far the safe state is: an instrument that is silent is no campaign that runs."""
+        hindrance = f"{what}: {complaint}" if complaint else ""
+        self._context.control.note_safe_state(hindrance, at_rest=what == TABLE and not complaint)
+        if complaint:
+            self._context.recorder.tracker.update(step_text=f"stopping: {hindrance}", last_error=hindrance)

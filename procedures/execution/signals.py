@@ -15,7 +15,7 @@ from types import FrameType
 Handler = Callable[[int, FrameType | None], object] | int | None
 
 #: The signals that end a process.
-ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+ENDING = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 
 
 @contextmanager

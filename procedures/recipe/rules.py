@@ -100,6 +100,9 @@ class GuardRules(Table):
     release_s: Number = Field(default=60.0, ge=0)  #: a suspended campaign goes on after the limits held for this long
     suspend_timeout_s: Number = Field(default=7200.0, gt=0)  #: and fails when they did not within this
     max_suspensions: Whole = Field(default=10, ge=0)  #: of one step; once more fails
+    #: What a campaign of a service does when the supervisor is gone, which would end a bench process that hangs: go on
+    #: to its end, or go to the safe state, to be resumed by the next service.
+    unsupervised: Literal["continue", "stop"] = "continue"
 
 
 class OnFailure(Table):

@@ -4,11 +4,19 @@ from __future__ import annotations
 
 from fastapi import APIRouter
 
-from labctl.api.dependencies import ServiceDep, command_route
+from labctl.api.dependencies import ControlPoolDep, ServiceDep, command_route
 from labctl.services.campaigns.bench_status import bench_statuses
 from labctl.services.commands.registry import CHECK_BENCH, CLEAR_BENCH
 from labctl.services.commands.requests import ToBench
-from labctl.services.schemas.benches import BenchCheckResponse, BenchResponse, BenchStatus, CheckRequest, ClearRequest
+from labctl.services.schemas.benches import (
+    BenchCheckResponse,
+    BenchResponse,
+    BenchStatus,
+    CheckRequest,
+    ClearRequest,
+    StopResponse,
+)
+from labctl.services.schemas.campaigns import ReasonRequest
 
 router = APIRouter(prefix="/api", tags=["catalogue"])
 
@@ -23,6 +31,15 @@ def benches(service: ServiceDep) -> list[BenchResponse]:
 def bench_states(service: ServiceDep) -> list[BenchStatus]:
     """Every bench of this database, with what its last safe state could not confirm."""
     return bench_statuses(service.store)
+
+
+@router.post("/stop", summary="Stop the bench")
+async def stop(request: ReasonRequest, service: ServiceDep, control: ControlPoolDep) -> StopResponse:
+    """Stop whatever runs on this service's bench, now, and keep the bench from moving until a person lets it.
+
+    Status 503 (`not-stopped`) where it is not known within some seconds that the table stands: use the stop switch.
+    """
+    return await control.run(lambda: service.stop_bench(request.text))
 
 
 @command_route(router, CLEAR_BENCH, "Record that a bench was inspected")

@@ -91,6 +91,29 @@ def _found(source: str, database: str | None) -> tuple[str, str]:
         return unconfirmed, describe_recovery(store, name)
 
 
+def stop(
+    bench: Annotated[
+        str | None, typer.Option("--bench", metavar="FILE", help="Stop this bench only: bench file or name.")
+    ] = None,
+    by: Annotated[
+        str | None, typer.Option("--by", metavar="NAME", help="Who stops; default: the user who is logged in.")
+    ] = None,
+    reason: Annotated[
+        str, typer.Option("--reason", metavar="TEXT", help="Reason for the stop; it is recorded.")
+    ] = "stopped from the command line",
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Stop the bench now, whichever process of labctl still runs; exit status 0 only when the table stands.
+
+    Without options: every bench that this user has driven on this computer. What was stopped moves again only when a
+    person starts or resumes a campaign, or runs `labctl bench clear`.
+    """
+    from labctl.stop.program import Asked, run
+
+    raise typer.Exit(run(Asked(bench, database, by, reason, as_json)))
+
+
 def simulator(
     bench: Annotated[str, typer.Argument(metavar="BENCH", help="Bench file, or the name of a shipped bench.")],
     out: Annotated[

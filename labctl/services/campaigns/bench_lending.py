@@ -48,11 +48,15 @@ class BenchLending:
             self._lock.acquire()
             self._driver = threading.get_ident()
 
-    def stop(self, table: RateTable, clock: Clock, within_s: float) -> str | None:
-        """Stop the table once the bench is lent; returns what could not be confirmed, None when it stands."""
+    def stop(self, table: RateTable, clock: Clock, within_s: float, begun: Callable[[], None]) -> str | None:
+        """Stop the table once the bench is lent; returns what could not be confirmed, None when it stands.
+
+        `begun` is called when this thread has the bench.
+        """
         if not self._lock.acquire(timeout=within_s):
             return "the running campaign did not release the bench in time; try again"
         try:
+            begun()
             return stop_table(table, clock)
         finally:
             self._lock.release()

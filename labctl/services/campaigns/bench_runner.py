@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 
 from instruments.bench_config import BenchFile
-from instruments.clock import Clock
+from instruments.clock import Clock, WallClock
+from labctl.acting_user import actor
 from labctl.errors import BenchBusy, Conflict, StoreError
 from labctl.log import get_logger
 from labctl.services.benches.check import checked, description
 from labctl.services.benches.confirmation import SafeStateRetry
 from labctl.services.benches.lease import BenchHold
 from labctl.services.benches.start_confirmation import confirmation_text
+from labctl.services.benches.stops import BenchStops
 from labctl.services.campaigns.bench_lending import BenchLending
 from labctl.services.campaigns.campaign_job import CampaignJob
 from labctl.services.campaigns.execution import run
@@ -21,6 +24,7 @@ from labctl.services.campaigns.preparation import Prepared, prepare, refuse_unco
 from labctl.services.campaigns.recovery import CampaignRecovery, secure_bench
 from labctl.services.campaigns.resume import prepare_resume, with_original_simulation
 from labctl.services.campaigns.status import answer_of, campaign_status
+from labctl.services.campaigns.stop_requests import CampaignStop, IdleStop, NotHere
 from labctl.services.planning.loading import with_drivers
 from labctl.services.schemas.benches import BenchCheckResponse, BenchDescription
 from labctl.services.schemas.campaigns import (
@@ -31,12 +35,15 @@ from labctl.services.schemas.campaigns import (
     ResumeRequest,
 )
 from labctl.services.simulation.hidden_effects import with_hidden_effects
+from labctl.stop.latch import StopRequest
+from labctl.stop.wire import Stopping
 from labctl.store import Store
 from procedures.contracts.campaign_state import ENDED, CampaignState
 from procedures.contracts.control import Control
 from procedures.contracts.errors import StalePrompt
 from procedures.contracts.operator import Answer, HumanOperator
 from procedures.execution.signals import ignore_signals
+from procedures.execution.stoppable_clock import stoppable
 from procedures.monitoring.progress import Progress
 
 log = get_logger()
@@ -44,6 +51,8 @@ log = get_logger()
 #: How long an abort waits for the safe state before it returns how far the campaign is.
 SAFE_WITHIN_S = 120.0
 STOPS = "the service stops"
+#: How often the latch is looked at, s of wall time.
+LATCH_LOOK_S = 0.5
 
 
 class BenchRunner:
@@ -67,7 +76,11 @@ class BenchRunner:
         self._job: CampaignJob | None = None
         self._recovery = CampaignRecovery(store, bench, make_clock)
         self._stops = False
-        self._stop_requested: int | None = None  #: the campaign that was stopped last
+        self._requested: StopRequest | None = None  #: the stop of the campaign that was stopped last
+        self.stop_latch = BenchStops(store, bench)
+        self._is_safe = False  #: whether the safe state was confirmed here since anything moved
+        self._over = threading.Event()
+        self._latch_watch: threading.Thread | None = None
         self._last_check: BenchCheckResponse | None = None
         self.used = False  #: whether anything was asked of the bench here
         self._listeners = ChangeListeners()
@@ -93,7 +106,9 @@ class BenchRunner:
     @property
     def free(self) -> bool:
         """Whether a campaign may begin now: nothing runs, or waits to be resumed, and the bench may be driven."""
-        return self._job is None and not self._recovery.pending and not self._stops and self._may_drive
+        if self._job is not None or self._recovery.pending or self._stops or not self._may_drive:
+            return False
+        return not self.stop_latch.state.held
 
     @property
     def _may_drive(self) -> bool:
@@ -104,27 +119,40 @@ class BenchRunner:
 
     def runs_or_was_stopped(self, campaign: int) -> bool:
         """Return whether a campaign runs, or was the last one asked to stop: its abort may not be recorded yet."""
-        return campaign == self._stop_requested or self.runs(campaign)
+        stop = self._requested
+        return (stop is not None and campaign == stop.campaign) or self.runs(campaign)
 
     def runs(self, campaign: int) -> bool:
         """Whether this campaign runs here now."""
         return self.running == campaign
 
-    def start(self, request: CampaignRequest) -> CampaignResponse:
-        """Plan, write down and begin a campaign.
+    def start(self, request: CampaignRequest, *, attended: bool = True) -> CampaignResponse:
+        """Plan, write down and begin a campaign; not `attended`: no person starts it now.
 
-        Raises BenchBusy while another runs or without the lease on the bench, StartNotConfirmed where no person has
-        confirmed that a real bench is clear, and whatever planning raises.
+        Raises BenchBusy while another runs, without the lease on the bench, or while the bench is stopped;
+        StartNotConfirmed where no person has confirmed that a real bench is clear, and whatever planning raises.
         """
         with self._guard:
             self._refuse_unless_free()
             bench = with_hidden_effects(self._bench, request.hide)
             refuse_unconfirmed(self._store, bench.name)
             clear = confirmation_text(bench, request)
-            recipe, clock = request.recipe, self._make_clock()
-            prepared = prepare(self._store, recipe, bench, clock, clip=request.clip, fit=request.fit, bench_clear=clear)
-            self._begin(prepared)
+            self._let_move(request.confirmed_by or actor().name if attended else None)
+            control = self._new_control()
+            clock = stoppable(self._make_clock(), control)
+            prepared = prepare(
+                self._store, request.recipe, bench, clock, clip=request.clip, fit=request.fit, bench_clear=clear
+            )
+            self._begin(prepared, control)
         return campaign_status(self._store, prepared.id)
+
+    def _let_move(self, by: str | None) -> None:
+        """Carry out the stops that are open, then let the bench move in a person's name. Raises BenchBusy."""
+        self._carry_out_stops()
+        self.stop_latch.refuse_moving(by)
+
+    def _new_control(self) -> Control:
+        return Control() if self._hold is None else self._hold.control()
 
     def check(self) -> BenchCheckResponse:
         """Ask every instrument what it is and how it does; nothing moves. Raises BenchBusy while a campaign runs."""
@@ -143,21 +171,22 @@ class BenchRunner:
         if self._hold is not None:
             self._hold.check()
 
-    def _begin(self, prepared: Prepared) -> None:
-        control = Control() if self._hold is None else self._hold.control()
+    def _begin(self, prepared: Prepared, control: Control) -> None:
         job = CampaignJob(self._store.campaigns.get(prepared.id), prepared, control, BenchLending())
         job.thread = threading.Thread(target=self._run, args=(job, prepared), name=f"campaign-{prepared.id}")
         self._job = job
-        self.used = True
+        self.used, self._is_safe = True, False
         if self._stops:  # while the bench was being opened
             control.abort(STOPS)
+        if stops := self.stop_latch.state.open:
+            control.abort(stops[-1].reason)
         job.thread.start()
 
-    def resume(self, campaign: int, request: ResumeRequest) -> CampaignResponse:
+    def resume(self, campaign: int, request: ResumeRequest, *, attended: bool = True) -> CampaignResponse:
         """Continue a paused campaign, or resume one that was interrupted, failed or aborted.
 
-        Raises BenchBusy while another runs or without the lease on the bench, Conflict when it is done, or when the
-        bench waits to be inspected.
+        Not `attended`: no person resumes it now. Raises BenchBusy while another runs, without the lease on the bench,
+        or while the bench is stopped; Conflict when it is done, or when the bench waits to be inspected.
         """
         with self._guard:
             job = self._job
@@ -167,26 +196,38 @@ class BenchRunner:
                 job.control.resume(f"{request.reason or 'goes on'} ({request.by})")
             else:
                 self._refuse_unless_free()
-                make_clock = self._make_clock
                 bench = with_original_simulation(self._store.campaigns.get(campaign), self._bench)
-                self._begin(prepare_resume(self._store, campaign, bench, lambda _: make_clock(), request))
+                self._let_move(request.by if attended else None)
+                control = self._new_control()
+                clock = stoppable(self._make_clock(), control)
+                self._begin(prepare_resume(self._store, campaign, bench, lambda _: clock, request), control)
         return self.status(campaign) or campaign_status(self._store, campaign)
 
     def resume_unfinished(self) -> None:
         """Resume the campaign that was left unfinished on this bench; what prevents it becomes its reason.
 
-        Without the lease nothing is changed: the process that has it by now may be resuming the campaign.
+        Without the lease nothing is changed: the process that has it by now may be resuming the campaign. A stop that
+        an earlier process did not carry out is carried out first.
         """
         self._recovery.expect_resume()
-        if self._may_drive:
-            self._recovery.resume_newest(
-                lambda number: self.resume(number, ResumeRequest(by="the service")), self._secure
-            )
+        if not self._may_drive:
+            return
+        with self._guard:
+            self._carry_out_stops()
+        self._recovery.resume_newest(
+            lambda number: self.resume(number, ResumeRequest(by="the service"), attended=False), self._secure
+        )
 
     def _secure(self) -> None:
         with self._guard:
-            self.used = True
-            secure_bench(self._store, self._bench, self._make_clock())
+            self._secure_now()
+
+    def _secure_now(self) -> str:
+        """Make the bench safe, under the guard; returns what is not confirmed."""
+        self.used = True
+        left = secure_bench(self._store, self._bench, self._make_clock())
+        self._is_safe = not left
+        return left
 
     def resume_interrupted(self) -> None:
         """Once the bench may be driven again, resume the campaign that was interrupted when it was lost."""
@@ -231,6 +272,7 @@ class BenchRunner:
             self._recovery.expect_end(job.row.id, str(error))
             raise
         finally:
+            self._is_safe = job.control.is_at_rest(0.0) and not job.control.hindrance
             self._job = None
             self._listeners.notify()
 
@@ -245,29 +287,129 @@ class BenchRunner:
             return None
         return answer_of(self._store.campaigns.get(campaign), job.progress, job.control.request)
 
-    def stop_now(self, campaign: int | None, reason: str) -> bool:
-        """Ask for the end of what runs, or of this campaign; returns whether it was asked, and waits for no lock."""
+    def request_stop(self, stop: StopRequest) -> Stopping:
+        """Begin a stop; returns how it goes on. Waits for no lock, no disk and no database."""
         job = self._job
-        if job is None or campaign not in {None, job.row.id}:
-            return False
-        job.control.abort(reason)
-        self._stop_requested = job.row.id
-        log.warning("campaign.stop", campaign=job.row.id, bench=self._bench.name, reason=reason)
+        if job is not None and stop.campaign not in {None, job.row.id}:
+            return NotHere(f"bench {self._bench.name} runs campaign {job.row.id}, not campaign {stop.campaign}")
+        if job is None:
+            if stop.campaign is None:
+                self.stop_latch.remember(stop)
+            return IdleStop(lambda: self._stop_idle(stop))
+        stop = replace(stop, campaign=job.row.id)
+        job.control.abort(stop.reason)
+        self._requested = stop
+        self.stop_latch.remember(stop)
+        log.warning("campaign.stop", campaign=job.row.id, bench=self._bench.name, reason=stop.reason)
         threading.Thread(target=job.stop_if_stuck, name="stop", daemon=True).start()
-        return True
+        return CampaignStop(job)
 
-    def abort(self, campaign: int, reason: str) -> CampaignResponse:
+    def _stop_idle(self, stop: StopRequest) -> CampaignStop | str:
+        """Make a bench safe on which no campaign runs; a campaign that has begun meanwhile is ended."""
+        with self._guard:
+            job = self._job
+            if job is not None and stop.campaign in {None, job.row.id}:
+                job.control.abort(stop.reason)
+                return CampaignStop(job)
+            if job is not None:
+                return ""
+            left = self._secure_now()
+            self._carry_out_stops()
+            return left
+
+    def _carry_out_stops(self) -> None:
+        """Carry out what the latch holds open, under the guard, while no campaign runs. Raises StoreError.
+
+        The bench is made safe, what was left unfinished is ended, and each stop is in the audit trail, before the
+        latch is told.
+        """
+        stops = self.stop_latch.state.open
+        if not stops or self._job is not None or not self._may_drive:
+            return
+        left = "" if self._is_safe else self._secure_now()
+        at = self._make_clock().utc() if self._bench.is_simulated else WallClock().utc()
+        for stop in stops:
+            self._recovery.close_stopped(stop.campaign, stop.reason)
+            self.stop_latch.record(stop, at)
+        self.stop_latch.carried_out(stops, left or "the bench is in its safe state")
+        log.warning("stop.carried_out", bench=self._bench.name, stops=[stop.reason for stop in stops], unconfirmed=left)
+        self._listeners.notify()
+
+    def watch_latch(self) -> None:
+        """Look at the latch from now on, in a thread: a stop may have been asked for while nobody could be told."""
+        self.stop_latch.prepare()
+        self._latch_watch = threading.Thread(target=self._watch_latch, name="latch-watch", daemon=True)
+        self._latch_watch.start()
+
+    def _watch_latch(self) -> None:
+        while not self._over.wait(LATCH_LOOK_S):
+            try:
+                self.look_at_latch()
+            except Exception as error:  # noqa: BLE001  the stop stays open, and is tried again
+                log.error("stop.not_carried_out", bench=self._bench.name, error=str(error) or type(error).__name__)
+
+    def look_at_latch(self) -> None:
+        """Stop what runs if the latch asks for it, else carry out what is open."""
+        stops = self.stop_latch.state.open
+        if not stops:
+            return
+        job = self._job
+        if job is None:
+            if self._guard.acquire(blocking=False):
+                try:
+                    self._carry_out_stops()
+                finally:
+                    self._guard.release()
+            return
+        for stop in stops:
+            if stop.campaign in {None, job.row.id} and not job.control.request.abort:
+                self.request_stop(stop)
+
+    def abort(self, campaign: int, stop: StopRequest) -> CampaignResponse:
         """End the running campaign in the safe state; returns once it is there, or how far it is after a while."""
         job = self._job
-        if job is not None and self.stop_now(campaign, reason) and job.thread is not None:
-            job.thread.join(self.safe_within_s)
-        self._stop_requested = None
+        if job is not None and job.row.id == campaign:
+            if not job.control.request.abort:
+                self.request_stop(stop)
+            if job.thread is not None:
+                job.thread.join(self.safe_within_s)
+        self._requested = None
         return self.status(campaign) or campaign_status(self._store, campaign)
+
+    @property
+    def is_at_rest(self) -> bool:
+        """Whether no campaign runs, or the one that ends has brought the table to rest."""
+        job = self._job
+        return job is None or job.control.is_at_rest(0.0)
+
+    @property
+    def not_stopped(self) -> str:
+        """What is known of a stop that is late: it was asked for some seconds ago, and the table is not at rest."""
+        job = self._job
+        if job is None or not job.control.request.abort or job.control.is_at_rest(0.0):
+            return ""
+        return self.stop_latch.late_text(job.control.hindrance)
+
+    def note_unsupervised(self) -> None:
+        """Interrupt what runs where its recipe says so: the supervisor is gone."""
+        job = self._job
+        if job is not None and job.prepared.plan.recipe.guards.unsupervised == "stop":
+            job.control.interrupt("the service's supervisor is gone, and the recipe ends a campaign then")
+
+    def stop_of(self, campaign: int) -> StopRequest | None:
+        """Return the stop that was asked of a campaign last, here; None where none was."""
+        stop = self._requested
+        return stop if stop is not None and stop.campaign == campaign else None
 
     def describe(self) -> BenchDescription:
         """Return the bench and what it is doing."""
-        unconfirmed = self._store.benches.unconfirmed(self._bench.name)
-        return description(self._bench, self.running, unconfirmed, self._last_check)
+        unconfirmed, job = self._store.benches.unconfirmed(self._bench.name), self._job
+        ends = job is not None and job.control.request.abort
+        hindrance = job.control.hindrance if job is not None and ends else ""
+        if hindrance:
+            unconfirmed = "; ".join(filter(None, (unconfirmed, f"stopping: {hindrance}")))
+        found = description(self._bench, self.running, unconfirmed, self._last_check)
+        return found.model_copy(update={"stop": self.stop_latch.describe(hindrance, stopping=ends)})
 
     @property
     def polls(self) -> tuple[int, int] | None:
@@ -289,10 +431,22 @@ class BenchRunner:
         """
         with ignore_signals():  # an impatient Ctrl-C must not leave the bench as it is
             self.end_soon()
+            self._over.set()
+            if self._latch_watch is not None:
+                self._latch_watch.join()
             with self._guard:  # what is being begun is begun, and ended
                 job = self._job
             if job is not None and job.thread is not None:
                 job.thread.join()
             self.safe_state.close()
+            self._carry_out_at_the_end()
             if self._hold is not None:
                 self._hold.close()
+
+    def _carry_out_at_the_end(self) -> None:
+        """Carry out what is still open; what cannot be written stays open for the next process."""
+        try:
+            with self._guard:
+                self._carry_out_stops()
+        except (StoreError, OSError) as error:
+            log.error("stop.not_carried_out", bench=self._bench.name, error=str(error))

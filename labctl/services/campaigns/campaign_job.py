@@ -11,8 +11,9 @@ from labctl.store import CampaignRow
 from procedures.contracts.control import Control
 from procedures.monitoring.progress import Progress
 
-#: An engine that runs sees an abort within this, s; another thread may take the bench from one that writes, until then.
-HEARD_WITHIN_S, STUCK_S = 1.5, 60.0
+#: An engine that does not see an abort within this, s, may be waiting for its database; another thread then takes the
+#: bench from it while it writes. Who asked for the stop waits longer, before the process is ended.
+HEARD_WITHIN_S, STUCK_S = 0.7, 60.0
 
 
 @dataclass
@@ -29,5 +30,10 @@ class CampaignJob:
     def stop_if_stuck(self) -> None:
         """Stop the table from here where the engine does not see an abort because it waits for its database."""
         table = self.prepared.bench.table
-        if table is not None and not self.control.is_heard(HEARD_WITHIN_S):
-            self.lending.stop(table, self.prepared.clock, STUCK_S)
+        if table is None or self.control.is_heard(HEARD_WITHIN_S):
+            return
+        try:
+            complaint = self.lending.stop(table, self.prepared.clock, STUCK_S, self.control.note_heard)
+        except Exception as error:  # noqa: BLE001  the engine tries again in its safe state
+            complaint = str(error) or type(error).__name__
+        self.control.note_safe_state(complaint or "", at_rest=complaint is None)

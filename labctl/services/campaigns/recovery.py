@@ -6,6 +6,7 @@ from collections.abc import Callable
 from contextlib import closing
 from dataclasses import dataclass
 from logging import INFO, WARNING
+from typing import Literal
 
 from instruments.bench import open_bench
 from instruments.bench_config import BenchFile
@@ -16,10 +17,12 @@ from labctl.log import get_logger
 from labctl.services.campaigns.resumability import retries_exhausted
 from labctl.services.campaigns.status import from_rows, how_far
 from labctl.store import Store
-from procedures.contracts.campaign_state import ENDED
+from procedures.contracts.campaign_state import ENDED, CampaignState
 from procedures.execution.safe_state import make_safe
 
 log = get_logger()
+
+EndState = Literal[CampaignState.FAILED, CampaignState.ABORTED]
 
 
 def describe_recovery(store: Store, bench: str) -> str:
@@ -35,10 +38,10 @@ def describe_recovery(store: Store, bench: str) -> str:
     return f"{text}; labctl sets the safe state and then resumes the campaign"
 
 
-def secure_bench(store: Store, bench_file: BenchFile, clock: Clock) -> None:
-    """Make a bench safe whose campaign is not resumed; what cannot be confirmed stays on its status."""
+def secure_bench(store: Store, bench_file: BenchFile, clock: Clock) -> str:
+    """Make a bench safe whose campaign is not resumed; returns what cannot be confirmed, which stays on its status."""
     if bench_file.is_simulated:  # it ended with its process
-        return
+        return ""
     complaints: tuple[str, ...] = ()
     try:
         with closing(open_bench(bench_file, clock)) as bench:
@@ -48,6 +51,7 @@ def secure_bench(store: Store, bench_file: BenchFile, clock: Clock) -> None:
     log.log(WARNING if complaints else INFO, "bench.made_safe", bench=bench_file.name, unconfirmed=list(complaints))
     if complaints:
         store.benches.mark(bench_file.name, "; ".join(complaints), clock.utc())
+    return "; ".join(complaints)
 
 
 @dataclass(frozen=True)
@@ -129,6 +133,12 @@ class CampaignRecovery:
             self._close(row.id, why_not)
         self._unfinished = False
 
-    def _close(self, campaign: int, why: str) -> None:
-        self._store.campaigns.close_unfinished(campaign, why, self._make_clock().utc())
+    def close_stopped(self, campaign: int | None, why: str) -> None:
+        """End what was left unfinished on this bench and was stopped since; None: all of it. Raises StoreError."""
+        for row in self._store.campaigns.unfinished():
+            if row.bench_name == self._bench.name and campaign in {None, row.id}:
+                self._close(row.id, f"aborted: {why}", CampaignState.ABORTED)
+
+    def _close(self, campaign: int, why: str, state: EndState = CampaignState.FAILED) -> None:
+        self._store.campaigns.close_unfinished(campaign, why, self._make_clock().utc(), state)
         log.warning("campaign.closed", campaign=campaign, bench=self._bench.name, reason=why)

@@ -17,6 +17,7 @@ from labctl.services.schedule import queue
 from labctl.services.schemas.benches import BenchCheckResponse, CheckRequest
 from labctl.services.schemas.campaigns import CampaignResponse, ConfirmRequest, ReasonRequest
 from labctl.services.schemas.schedule import ScheduledResponse
+from labctl.stop.latch import StopRequest
 
 log = get_logger()
 
@@ -75,25 +76,27 @@ class ServiceControl:
         runner = self._runner
         if runner is None or not runner.runs_or_was_stopped(asked.campaign):
             return abort_abandoned(context.store, asked.campaign, reason, context.now())
-        answer = runner.abort(asked.campaign, reason)
-        if missing := self._recorded(context, asked.campaign, reason, runner.safe_within_s):
+        stop = runner.stop_of(asked.campaign) or StopRequest.new(actor().name, actor().via, reason, asked.campaign)
+        answer = runner.abort(asked.campaign, stop)
+        if missing := self._recorded(context, runner, stop):
             text = f"the campaign was aborted, but that is not in the audit trail{missing}"
             return answer.model_copy(update={"unrecorded": text})
         return answer
 
-    def _recorded(self, context: CommandContext, campaign: int, reason: str, within_s: float) -> str:
+    @staticmethod
+    def _recorded(context: CommandContext, runner: BenchRunner, stop: StopRequest) -> str:
         """Write an abort down in a thread of its own; returns what keeps it from being written in time, or nothing."""
         failed: list[str] = []
 
         def record() -> None:
             try:
-                self._record(context, "abort", campaign, reason)
+                runner.stop_latch.record(stop, context.now())
             except StoreError as error:
                 failed.append(f": {error.cause}")
 
         thread = threading.Thread(target=copy_context().run, args=(record,), name="record-abort", daemon=True)
         thread.start()
-        thread.join(within_s)
+        thread.join(runner.safe_within_s)
         return " yet: the database is busy" if thread.is_alive() else "".join(failed)
 
     def confirm(self, context: CommandContext, asked: ToCampaign[ConfirmRequest]) -> CampaignResponse:

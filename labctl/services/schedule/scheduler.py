@@ -40,8 +40,8 @@ class Runs(Protocol):
         """Resume what was interrupted, as soon as that is allowed."""
         ...
 
-    def start(self, request: CampaignRequest) -> CampaignResponse:
-        """Begin a campaign."""
+    def start(self, request: CampaignRequest, *, attended: bool) -> CampaignResponse:
+        """Begin a campaign; not `attended`: no person starts it now."""
         ...
 
 
@@ -147,7 +147,7 @@ class Scheduler:
     def _start(self, claim: StartEventRow, row: StartRow, due: datetime, now: datetime) -> None:
         starts = self._store.starts
         try:
-            campaign = self._runner.start(_request(row)).id
+            campaign = self._runner.start(_request(row), attended=False).id
         except BenchBusy:  # another campaign began first: this one waits
             starts.put_back(claim)
         except (LabctlError, InstrumentError, ProcedureError) as error:

@@ -98,6 +98,31 @@ class BenchUnit(ResponseModel):
     driver: str
 
 
+class BenchStop(ResponseModel):
+    """A stop that is not carried out yet, or that keeps the bench from moving by itself."""
+
+    id: str = Field(description="Identifier of the stop, as in the audit trail.")
+    at: str = Field(description="When the stop was asked for, ISO 8601, UTC.")
+    by: str = Field(description="Who asked for the stop.")
+    reason: str = Field(description="Why the stop was asked for.")
+    campaign: int | None = Field(description="The campaign that the stop ends; null: whatever runs on the bench.")
+    phase: Literal["asked", "stopping", "stopped"] = Field(
+        description="asked: no process has confirmed the stop, the table may turn. stopping: the bench is being made "
+        "safe. stopped: the stop is carried out; nothing moves by itself until a person starts or resumes a campaign, "
+        "or clears the bench."
+    )
+    text: str = Field(description="How far the stop is, and what keeps it, in words.")
+
+
+class StopResponse(ResponseModel):
+    """What came of a stop of the whole bench."""
+
+    bench: str = Field(description="Name of the bench.")
+    stands: bool = Field(description="Whether it is confirmed that the table stands.")
+    text: str = Field(description="How the bench was stopped, in words.")
+    campaign: int | None = Field(description="The campaign that the stop has ended; null: none ran.")
+
+
 class BenchDescription(ResponseModel):
     """A bench and what it is doing."""
 
@@ -116,6 +141,9 @@ class BenchDescription(ResponseModel):
         default=0.0,
         description="Time since the last answer of the process that drives the bench, s; 0: this "
         "process drives the bench.",
+    )
+    stop: BenchStop | None = Field(
+        default=None, description="The newest stop that is not carried out yet, or not taken back; null: none."
     )
 
 

@@ -34,6 +34,11 @@ class HeartbeatResponse(ResponseModel):
     status: Literal["ok"] = "ok"
     version: str
     heard_s: float = Field(description="Time since the last answer of the process that drives the bench, s.")
+    not_stopped: str = Field(
+        default="",
+        description="What is known of a stop that was asked for more than 3 s ago while it is not confirmed that the "
+        "table stands; empty: there is no such stop.",
+    )
 
 
 class ServiceReady(ResponseModel):

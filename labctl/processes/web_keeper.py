@@ -1,0 +1,140 @@
+"""Keeps a web process at the service's address, and answers stops there while there is none that answers."""
+
+from __future__ import annotations
+
+import contextlib
+import signal
+import threading
+from collections.abc import Callable
+
+from labctl.errors import LabctlError
+from labctl.log import get_logger
+from labctl.processes.children import Child
+from labctl.processes.held_address import HeldAddress
+from labctl.processes.listening import Listening
+from labctl.processes.liveness import Elapsed, Restarts
+from labctl.processes.settings import WebSettings, page_access
+from labctl.processes.waker import Waker
+from labctl.stop.latch import StopRequest
+from labctl.stop.wire import Stopping
+
+log = get_logger()
+
+LOOK_S = 0.25
+#: A web process that gave no sign of life for so long: the supervisor answers stops at its address, s.
+PAGE_AFTER_S = 2.0
+#: And for so long: it is ended, and another one started, s.
+SILENT_S = 6.0
+#: A look that was itself so late cannot tell whether the web process was silent, s.
+LATE_S = 1.0
+#: The web process cuts its requests and ends within this, s.
+ENDS_WITHIN_S = 4.0
+
+
+class WebKeeper:
+    """One web process after the other."""
+
+    def __init__(
+        self,
+        at: Listening,
+        waker: Waker,
+        settings: Callable[[], WebSettings],
+        respond: Callable[[StopRequest], Stopping],
+    ) -> None:
+        """Start a process, which loads its modules; `respond` begins a stop that is asked for meanwhile."""
+        self._at, self._waker, self._settings = at, waker, settings
+        self._address = HeldAddress(respond, lambda: "labctl starts its web process again.")
+        self._restarts = Restarts()
+        self._over = threading.Event()
+        self._failure: LabctlError | None = None
+        self._heard = Elapsed()
+        self._end_asked = False
+        self._thread = threading.Thread(target=self._keep, name="web-keeper", daemon=True)
+        self._process = self._new()
+
+    def _new(self) -> Child:
+        return Child("labctl.processes.web_process", pass_fds=[self._at.socket.fileno()])
+
+    @property
+    def pid(self) -> int:
+        """The process's number."""
+        return self._process.pid
+
+    def open(self) -> None:
+        """Let the first process answer requests; raises what keeps it from that."""
+        self._process.open(self._settings(), lambda: self._waker.ending)
+        self._heard.restart()
+
+    def keep(self) -> None:
+        """Watch the process from now on, in a thread."""
+        self._address.take(self._at.socket.dup())
+        self._thread.start()
+
+    def check(self) -> None:
+        """Raise LabctlError where the process ended too often."""
+        if self._failure is not None:
+            raise self._failure
+
+    def end_soon(self) -> None:
+        """Ask the process to end; returns at once."""
+        if not self._end_asked:
+            self._end_asked = True
+            self._over.set()
+            self._process.signal(signal.SIGTERM)
+
+    def close(self) -> None:
+        """End the process, and give the address back."""
+        self.end_soon()
+        if self._thread.is_alive():
+            self._thread.join()
+        self._process.signal(signal.SIGTERM)
+        self._process.wait(ENDS_WITHIN_S)
+        self._process.kill()
+        self._address.give_back()
+
+    def _keep(self) -> None:
+        since = Elapsed()
+        try:
+            while not self._over.wait(LOOK_S):
+                if since.s > LOOK_S + LATE_S:
+                    self._heard.restart()
+                since.restart()
+                self._hear()
+                self._look()
+        except LabctlError as error:
+            self._failure = error
+            self._waker.end()
+
+    def _hear(self) -> None:
+        while self._process.line.poll(0):
+            try:
+                self._process.line.recv()
+            except (EOFError, OSError):
+                return
+            self._heard.restart()
+            self._address.close_page()
+
+    def _look(self) -> None:
+        if self._heard.s > PAGE_AFTER_S or self._process.has_ended():
+            settings = self._settings()
+            self._address.open_page(page_access(settings.request.asks_for_keys, settings.at, settings.folder))
+        if self._heard.s > SILENT_S:
+            log.error("child.silent", child="web", child_pid=self.pid, silent_s=round(self._heard.s, 1))
+            self._process.signal(signal.SIGKILL)
+            self._process.wait(LATE_S)
+        if self._process.has_ended() and not self._over.is_set():
+            self._start_again()
+
+    def _start_again(self) -> None:
+        log.error("child.ended", child="web", child_pid=self.pid, status=self._process.status)
+        self._process.kill()
+        self._restarts.one_more("the web process")
+        self._process = self._new()
+        with contextlib.suppress(OSError):
+            try:
+                self._process.open(self._settings(), self._over.is_set)
+            except LabctlError as error:  # it is looked after again
+                log.warning("child.refused", child="web", error=str(error))
+            else:
+                log.warning("child.restarted", child="web", child_pid=self.pid)
+        self._heard.restart()

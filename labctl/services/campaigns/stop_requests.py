@@ -1,0 +1,116 @@
+"""A stop that was asked of a bench, as the one who asked follows it: of a campaign that runs, or of a bench at rest."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+
+from labctl.services.campaigns.campaign_job import CampaignJob
+
+#: How often the end of a campaign's thread is looked for while its table is not known to stand, s.
+LOOK_S = 0.2
+
+
+class CampaignStop:
+    """The end of a campaign that runs, in the safe state."""
+
+    def __init__(self, job: CampaignJob) -> None:
+        self._job = job
+        self.campaign: int | None = job.row.id
+
+    def is_heard(self, within_s: float) -> bool:
+        """Wait until the engine has left its step; returns whether it has."""
+        return self._job.control.is_heard(within_s)
+
+    def is_over(self, within_s: float) -> bool:
+        """Wait until the table stands, or the engine has ended without that; returns whether either came."""
+        waited_s = 0.0
+        while not self._job.control.is_at_rest(min(LOOK_S, within_s)):
+            waited_s += LOOK_S
+            if self._has_ended or waited_s >= within_s:
+                return self._has_ended
+        return True
+
+    @property
+    def _has_ended(self) -> bool:
+        thread = self._job.thread
+        return thread is not None and thread.ident is not None and not thread.is_alive()
+
+    @property
+    def stands(self) -> bool:
+        """Whether the table is confirmed to stand."""
+        return self._job.control.is_at_rest(0.0)
+
+    @property
+    def text(self) -> str:
+        """How far the stop is, or what keeps it."""
+        if self._job.control.hindrance:
+            return f"campaign {self.campaign}: {self._job.control.hindrance}"
+        return f"campaign {self.campaign}: {'the table is at rest' if self.stands else 'the table is being stopped'}"
+
+
+class IdleStop:
+    """A stop while no campaign runs: the instruments are made safe, once what has the bench now has let it go."""
+
+    campaign: int | None = None
+
+    def __init__(self, make_safe: Callable[[], CampaignStop | str]) -> None:
+        """Call `make_safe` in a thread; it returns what is not confirmed, or the campaign that has begun meanwhile."""
+        self._make_safe = make_safe
+        self._over = threading.Event()
+        self._begun: CampaignStop | None = None
+        self._trouble = "the bench is being made safe"
+        threading.Thread(target=self._work, name="stop-idle", daemon=True).start()
+
+    def _work(self) -> None:
+        try:
+            found = self._make_safe()
+        except Exception as error:  # noqa: BLE001  the one who asked is told, whatever it is
+            found = str(error) or type(error).__name__
+        if isinstance(found, CampaignStop):
+            self._begun = found
+        else:
+            self._trouble = found
+        self._over.set()
+
+    def is_heard(self, within_s: float) -> bool:  # noqa: ARG002  no engine runs that would have to hear it
+        """Return True: nothing runs that would have to leave a step."""
+        return True
+
+    def is_over(self, within_s: float) -> bool:
+        """Wait until the instruments have answered; returns whether they have."""
+        if not self._over.wait(within_s):
+            return False
+        return self._begun is None or self._begun.is_over(within_s)
+
+    @property
+    def stands(self) -> bool:
+        """Whether the bench is confirmed to be safe."""
+        if self._begun is not None:
+            return self._begun.stands
+        return self._over.is_set() and not self._trouble
+
+    @property
+    def text(self) -> str:
+        """What is known of the bench."""
+        if self._begun is not None:
+            return self._begun.text
+        return self._trouble or "no campaign runs, and the table is at rest"
+
+
+class NotHere:
+    """A stop of a campaign that does not run here, or of a service that drives no bench."""
+
+    campaign: int | None = None
+    stands = True
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+
+    def is_heard(self, within_s: float) -> bool:  # noqa: ARG002  there is nothing to wait for
+        """Return True."""
+        return True
+
+    def is_over(self, within_s: float) -> bool:  # noqa: ARG002  as above
+        """Return True."""
+        return True

@@ -1,0 +1,69 @@
+"""Stopping a bench through its drivers, with no process left that could do it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import dataclass
+from typing import Any
+
+from instruments.bench import open_bench
+from instruments.bench_config import BenchFile
+from instruments.clock import Clock, ScaledClock, SystemClock
+from procedures.execution.safe_state import TABLE, make_safe
+
+#: Before the second try of what could not be confirmed, s: a port that a process had open is free a moment later.
+PAUSES_S = (0.5,)
+
+
+@dataclass(frozen=True)
+class InstrumentsLeft:
+    """How the instruments of a bench were left."""
+
+    stands: bool  #: whether the table is confirmed to stand
+    safe: bool  #: whether all of the safe state is confirmed
+    text: str
+
+
+def stop_instruments(
+    document: dict[str, Any],
+    say: Callable[[str], None] = lambda _: None,
+    stands: Callable[[], None] = lambda: None,
+) -> InstrumentsLeft:
+    """Bring table and chamber of a bench to their safe state. Raises nothing.
+
+    `document` is the bench file as JSON; `say` gets what could not be confirmed yet, `stands` is called as soon as the
+    table is at rest.
+    """
+    try:
+        found = BenchFile.model_validate(document)
+        return _stopped(found.model_copy(update={"gyros": (), "references": ()}), say, stands)
+    except Exception as error:  # noqa: BLE001  whatever it is, the answer is that the bench is not known to stand
+        return InstrumentsLeft(stands=False, safe=False, text=f"the instruments cannot be reached: {error}")
+
+
+def clock_of(bench: BenchFile) -> Clock:
+    """Return the clock of instruments outside this process: that of `labctl simulator`, or the computer's."""
+    simulation = bench.simulation
+    return ScaledClock(simulation.speed) if simulation is not None and simulation.control else SystemClock()
+
+
+def _stopped(bench: BenchFile, say: Callable[[str], None], stands: Callable[[], None]) -> InstrumentsLeft:
+    at_rest = False
+
+    def note(what: str, complaint: str) -> None:
+        nonlocal at_rest
+        if complaint:
+            say(f"{what}: {complaint}")
+        elif what == TABLE:
+            at_rest = True
+            stands()
+
+    clock = clock_of(bench)
+    with closing(open_bench(bench, clock)) as opened:
+        complaints = make_safe(opened, clock, PAUSES_S, note)
+    if complaints:
+        return InstrumentsLeft(at_rest, safe=False, text="; ".join(complaints))
+    sections = (("table at rest", bench.table), ("chamber at its safe set point", bench.chamber))
+    parts = ", ".join(name for name, section in sections if section is not None)
+    return InstrumentsLeft(at_rest, safe=True, text=parts or "nothing on this bench moves by itself")

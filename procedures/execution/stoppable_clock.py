@@ -1,0 +1,51 @@
+"""A clock whose sleep ends with a stop: what waits inside a driver, for a ramp or a homing, does not delay it."""
+
+from __future__ import annotations
+
+from datetime import datetime
+
+from instruments.clock import Clock
+from procedures.contracts.control import Control
+from procedures.contracts.errors import Aborted, Interrupted
+
+#: How long the bench's thread sleeps at most before it looks for a stop, s of real time.
+LOOK_S = 0.1
+
+
+class StoppableClock:
+    """The clock of one campaign on a bench that runs in real or scaled time.
+
+    `sleep` raises Aborted or Interrupted in the thread that drives the bench, as a Ctrl-C raises KeyboardInterrupt
+    there; not once the bench is being made safe, and in no other thread.
+    """
+
+    def __init__(self, clock: Clock, control: Control, speed: float) -> None:
+        """Wrap `clock`, of which `speed` seconds pass in a second of real time."""
+        self._clock, self._control = clock, control
+        self._slice_s = LOOK_S * speed
+
+    def now_s(self) -> float:
+        return self._clock.now_s()
+
+    def utc(self) -> datetime:
+        return self._clock.utc()
+
+    def wall_s(self, duration_s: float) -> float:
+        return self._clock.wall_s(duration_s)
+
+    def sleep(self, duration_s: float) -> None:
+        until_s = self._clock.now_s() + duration_s
+        self._look()
+        while (left_s := until_s - self._clock.now_s()) > 0:
+            self._clock.sleep(min(self._slice_s, left_s))
+            self._look()
+
+    def _look(self) -> None:
+        if (request := self._control.ends_here()) is not None:
+            raise Interrupted(request.reason) if request.resumable else Aborted(request.reason)
+
+
+def stoppable(clock: Clock, control: Control) -> Clock:
+    """Return a clock whose sleep ends with a stop; virtual time, in which no sleep lasts, as it is."""
+    speed = getattr(clock, "speed", None)
+    return clock if speed is None else StoppableClock(clock, control, float(speed))
