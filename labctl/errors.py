@@ -21,6 +21,7 @@ LabctlError              exit 2, HTTP 400
 ├── TooLarge             a request carries more than this service takes              HTTP 413
 ├── BenchSilent          the bench process does not answer; the bench may move       HTTP 503
 │   └── NotStopped       a stop was asked for, and it is not known that the bench stands    HTTP 503, exit 1
+├── NotRecorded          the bench stands, but that is not written down yet      exit 0
 ├── Overloaded           there is no room for a request now; it may come again soon              HTTP 503
 ├── TooBusy              as much is computed, and waits, as there is place for; says when to ask again   HTTP 429
 ├── ComputationEnded     a worker process ended before its result: memory, time, a crash     HTTP 503
@@ -206,6 +207,13 @@ class NotStopped(BenchSilent):
 
     exit_status = 1
     slug = "not-stopped"
+
+
+class NotRecorded(LabctlError):
+    """The bench stands, but that could not be written down yet; the process that drives it next does it."""
+
+    exit_status = 0
+    slug = "not-recorded"
 
 
 class StoreError(LabctlError):

@@ -12,8 +12,10 @@ __all__ = ["main"]
 def main() -> None:
     """Run the command line; a stop is carried out before anything else is loaded."""
     if sys.argv[1:2] == ["stop"] and "--help" not in sys.argv:
+        from labctl.stop.priority import first_of_all
         from labctl.stop.program import main as stop
 
+        first_of_all()
         sys.exit(stop(sys.argv[2:]))
     from labctl.cli.app import main as run
 

@@ -39,7 +39,6 @@ from labctl.services.planning.loading import load_bench, with_drivers
 from labctl.stop.client import AttemptedStop, StopAttempt
 from labctl.stop.latch import StopRequest
 from labctl.stop.places import BenchPlace, place_of
-from labctl.stop.priority import first_of_all
 from labctl.stop.wire import Stopping
 from procedures.execution.signals import ENDING, restore
 
@@ -77,7 +76,6 @@ def serve_forever(request: ServeRequest, ready: Callable[[Ready], None]) -> str:
     BenchUnconfirmed for a bench that at the end is not known to be safe.
     """
     request.check()
-    first_of_all()
     with listening(request.host, request.port, lambda: _ask_for_address(request)) as at, ending_signals() as waker:
         left = Supervisor(request, at, waker).run(ready)
     log.log(ERROR if left.unconfirmed else INFO, "process.ended", left=left.text, unconfirmed=left.unconfirmed)

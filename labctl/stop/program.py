@@ -20,7 +20,6 @@ from typing import Any
 from labctl.stop.client import NOT_STOPPED, SWITCH, StopResult, at_instruments, stop_bench
 from labctl.stop.latch import StopRequest
 from labctl.stop.places import BenchPlace, DriverNote, folder_name, known_places, place_of, places_of
-from labctl.stop.priority import first_of_all
 
 DATABASE_VARIABLE = "LABCTL_DATABASE"
 WHY = "stopped from the command line"
@@ -43,7 +42,6 @@ class Asked:
 
 def main(words: Sequence[str]) -> int:
     """Carry out `labctl stop WORDS`; returns the exit status."""
-    first_of_all()
     parser = argparse.ArgumentParser(prog="labctl stop", description="Stop the bench, whatever of labctl still lives.")
     parser.add_argument("--bench", metavar="FILE", help="stop this bench only: bench file or name")
     parser.add_argument("--database", metavar="URL_OR_PATH", help="stop the benches of this database only")

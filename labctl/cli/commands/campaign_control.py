@@ -9,7 +9,7 @@ import typer
 
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import BenchName, CampaignId, Database, Json
-from labctl.cli.output import console, print_json
+from labctl.cli.output import console, print_json, stderr
 from labctl.cli.printing.campaigns import print_campaign, print_drafts, print_end
 from labctl.cli.turn_text import turn_text
 
@@ -129,15 +129,25 @@ def abort(
     database: Database = None,
 ) -> None:
     """End a running campaign now, in the safe state. The data measured so far are stored."""
+    from labctl.errors import BenchSilent, NotRecorded, StoreError
+    from labctl.services.campaigns.stop_first import stop_first
     from labctl.services.commands.open import execute
     from labctl.services.commands.registry import ABORT_CAMPAIGN
     from labctl.services.commands.requests import ToCampaign
     from labctl.services.schemas.campaigns import ReasonRequest
 
     with one_clear_line():
-        answer = execute(database, ABORT_CAMPAIGN, ToCampaign(campaign, ReasonRequest(reason=reason)))
-        answer = _at_its_end(database, answer)
+        stopped = stop_first(database, campaign, reason, say=lambda text: stderr.print(f"labctl: {text}", markup=False))
+        try:
+            answer = execute(database, ABORT_CAMPAIGN, ToCampaign(campaign, ReasonRequest(reason=reason)))
+            answer = _at_its_end(database, answer)
+        except (StoreError, BenchSilent) as error:
+            if stopped is None or not stopped.stands:
+                raise
+            raise NotRecorded(f"{stopped.text}; that is not recorded yet: {error}") from error
     print_json(answer) if as_json else print_campaign(answer)
+    if stopped is not None and not stopped.stands:
+        raise typer.Exit(1)
 
 
 def _at_its_end(database: str | None, answer: CampaignResponse) -> CampaignResponse:

@@ -10,7 +10,6 @@ import threading
 from collections.abc import Sequence
 from datetime import datetime, timedelta
 
-from instruments.bench_config import BenchFile
 from instruments.clock import WallClock
 from labctl.errors import BenchBusy
 from labctl.log import get_logger
@@ -30,9 +29,10 @@ LATE = timedelta(seconds=3)
 class BenchStops:
     """The latch of one bench, and the audit rows of its stops. Any thread may use it."""
 
-    def __init__(self, store: Store, bench: BenchFile) -> None:
+    def __init__(self, store: Store, bench: str) -> None:
+        """Use the latch of a bench, by its name, beside the database."""
         self._store, self._bench = store, bench
-        self.place = place_of(store.location, bench.name)
+        self.place = place_of(store.location, bench)
         self._latch = self.place.latch
         self._guard = threading.Lock()
         self._recorded: set[str] = set()
@@ -43,7 +43,7 @@ class BenchStops:
         try:
             self._latch.prepare()
         except OSError as error:
-            log.error("latch.unwritable", bench=self._bench.name, error=str(error))
+            log.error("latch.unwritable", bench=self._bench, error=str(error))
         self.place.register()
 
     @property
@@ -61,7 +61,7 @@ class BenchStops:
             try:
                 self._latch.request(stop)
             except OSError as error:
-                log.error("latch.unwritable", bench=self._bench.name, error=str(error))
+                log.error("latch.unwritable", bench=self._bench, error=str(error))
 
         threading.Thread(target=write, name="latch", daemon=True).start()
 
@@ -70,7 +70,7 @@ class BenchStops:
         with self._guard:
             if stop.id in self._recorded or self._is_recorded(stop):
                 return
-            about = f"campaign {stop.campaign}" if stop.campaign is not None else f"bench {self._bench.name}"
+            about = f"campaign {stop.campaign}" if stop.campaign is not None else f"bench {self._bench}"
             act = "campaign abort" if stop.campaign is not None else "bench stop"
             detail = {"reason": stop.reason, "stop": stop.id, "asked_at": stop.at, "asked_via": stop.via}
             self._store.audit.record(at, act, about, detail, who=stop.by or None)
@@ -89,7 +89,13 @@ class BenchStops:
         try:
             self._latch.carried_out([stop.id for stop in stops], text)
         except OSError as error:
-            log.error("latch.unwritable", bench=self._bench.name, error=str(error))
+            log.error("latch.unwritable", bench=self._bench, error=str(error))
+
+    def note_closed(self, campaign: int, text: str) -> None:
+        """Note that the open stops of a campaign that no process ran were carried out, with its end."""
+        if stops := [stop for stop in self.state.open if stop.campaign == campaign]:
+            self._recorded.update(stop.id for stop in stops)
+            self.carried_out(stops, text)
 
     def refuse_moving(self, by: str | None) -> None:
         """Let the bench move again in the name of a person; None: in nobody's.
@@ -99,7 +105,7 @@ class BenchStops:
         state = self.state
         if state.open:
             raise BenchBusy(
-                f"bench {self._bench.name} is being stopped ({state.open[-1].reason}); wait until it is in its safe "
+                f"bench {self._bench} is being stopped ({state.open[-1].reason}); wait until it is in its safe "
                 "state, then start again"
             )
         if state.held and by is None:
@@ -114,27 +120,27 @@ class BenchStops:
         held = [stop for stop in state.held if stop.id not in still]
         if held:
             self._latch.take_back([stop.id for stop in held], by)
-            log.warning("stop.taken_back", bench=self._bench.name, by=by, stops=[stop.reason for stop in held])
+            log.warning("stop.taken_back", bench=self._bench, by=by, stops=[stop.reason for stop in held])
         return bool(held)
 
     def _held_text(self, state: LatchState) -> str:
         stop = state.held[-1]
         return (
-            f"bench {self._bench.name} was stopped at {stop.at[:19].replace('T', ' ')} UTC ({stop.reason}) and does "
+            f"bench {self._bench} was stopped at {stop.at[:19].replace('T', ' ')} UTC ({stop.reason}) and does "
             "not move by itself until a person starts or resumes a campaign, or runs `labctl bench clear "
-            f"{self._bench.name} --by NAME`"
+            f"{self._bench} --by NAME`"
         )
 
     def late_text(self, hindrance: str) -> str:
         """Return what is known of a stop that was asked for more than `LATE` ago and is open; empty where none is."""
-        return late_stop(self.state, self._bench.name, hindrance)
+        return late_stop(self.state, self._bench, hindrance)
 
     def describe(self, hindrance: str = "", *, stopping: bool = False) -> BenchStop | None:
         """Return the newest stop that is open or holds; None where there is none.
 
         `stopping`: whether what drives the bench makes it safe now; `hindrance`: what keeps it from that.
         """
-        return describe_stop(self.state, self._bench.name, hindrance, stopping=stopping)
+        return describe_stop(self.state, self._bench, hindrance, stopping=stopping)
 
 
 def late_stop(state: LatchState, bench: str, hindrance: str = "") -> str:

@@ -77,7 +77,7 @@ class BenchRunner:
         self._recovery = CampaignRecovery(store, bench, make_clock)
         self._stops = False
         self._requested: StopRequest | None = None  #: the stop of the campaign that was stopped last
-        self.stop_latch = BenchStops(store, bench)
+        self.stop_latch = BenchStops(store, bench.name)
         self._is_safe = False  #: whether the safe state was confirmed here since anything moved
         self._over = threading.Event()
         self._latch_watch: threading.Thread | None = None
@@ -302,7 +302,7 @@ class BenchRunner:
         self.stop_latch.remember(stop)
         log.warning("campaign.stop", campaign=job.row.id, bench=self._bench.name, reason=stop.reason)
         threading.Thread(target=job.stop_if_stuck, name="stop", daemon=True).start()
-        return CampaignStop(job)
+        return CampaignStop.of(job)
 
     def _stop_idle(self, stop: StopRequest) -> CampaignStop | str:
         """Make a bench safe on which no campaign runs; a campaign that has begun meanwhile is ended."""
@@ -310,7 +310,7 @@ class BenchRunner:
             job = self._job
             if job is not None and stop.campaign in {None, job.row.id}:
                 job.control.abort(stop.reason)
-                return CampaignStop(job)
+                return CampaignStop.of(job)
             if job is not None:
                 return ""
             left = self._secure_now()

@@ -3,15 +3,37 @@
 from __future__ import annotations
 
 from dataclasses import asdict
+from datetime import datetime
 
+from labctl.errors import Conflict
+from labctl.services.benches.stops import BenchStops
 from labctl.services.campaigns.status import abandoned_campaigns, describe_interrupted, outlives_its_process
-from labctl.services.schemas.benches import BenchStatus
+from labctl.services.schemas.benches import BenchStatus, ClearRequest
 from labctl.store import BenchRow, Store
 
 
-def bench_status(row: BenchRow) -> BenchStatus:
+def bench_status(store: Store, row: BenchRow) -> BenchStatus:
     """Return a bench as the services report it."""
-    return BenchStatus(**asdict(row))
+    return BenchStatus(**asdict(row), stop=BenchStops(store, row.name).describe())
+
+
+def clear_bench(store: Store, name: str, request: ClearRequest, at: datetime) -> BenchStatus:
+    """Record that a person has inspected a bench, and lets it move again after a stop.
+
+    Raises NotFound, and Conflict when there is nothing to clear, or while a stop is not carried out.
+    """
+    stops, row = BenchStops(store, name), store.benches.get(name)
+    if row is not None and stops.state.open:
+        raise Conflict(
+            f"bench {name}: the stop ({stops.state.open[-1].reason}) is not carried out yet; start the service of the "
+            "bench, which makes the bench safe first, then clear the bench"
+        )
+    stopped = row is not None and stops.take_back(request.by)
+    if row is not None and stopped and not row.unconfirmed:
+        detail = {"reason": request.reason, "was": "stopped"}
+        store.audit.record(at, "bench clear", f"bench {name}", detail, who=request.by)
+        return bench_status(store, row)
+    return bench_status(store, store.benches.clear(name, request.by, request.reason, at))
 
 
 def bench_statuses(store: Store) -> list[BenchStatus]:
@@ -23,4 +45,4 @@ def bench_statuses(store: Store) -> list[BenchStatus]:
     for answer in abandoned_campaigns(store):
         if outlives_its_process(store.campaigns.get(answer.id)):
             left.setdefault(answer.bench, []).append(describe_interrupted(answer))
-    return [bench_status(row).model_copy(update={"left": left.get(row.name, [])}) for row in store.benches.all()]
+    return [bench_status(store, row).model_copy(update={"left": left.get(row.name, [])}) for row in store.benches.all()]

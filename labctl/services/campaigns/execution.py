@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping
 from contextlib import ExitStack, closing, suppress
 
 from instruments.bench_config import BenchFile
+from instruments.clock import WallClock
+from labctl.acting_user import actor
 from labctl.config import default_database
 from labctl.errors import Conflict, DiskFull, Stopped, StoreError
 from labctl.log import get_logger
@@ -16,6 +18,7 @@ from labctl.services.benches.lease import holding, open_for
 from labctl.services.benches.standards import overdue_events
 from labctl.services.benches.start_confirmation import confirmation_text, start_questions
 from labctl.services.campaigns.bench_lending import BenchLending, lending_journal
+from labctl.services.campaigns.foreground_stop import answering_stops, let_move, note_carried_out
 from labctl.services.campaigns.preparation import (
     Prepared,
     clock_for,
@@ -35,6 +38,7 @@ from procedures.contracts.control import Control
 from procedures.contracts.operator import Operator
 from procedures.execution.engine import Engine
 from procedures.execution.signals import ignore_signals
+from procedures.execution.stoppable_clock import stoppable
 from procedures.monitoring.progress import Progress
 
 log = get_logger()
@@ -170,6 +174,8 @@ def run_here(
         if questions and not request.confirmed_by and ask_clear is not None and (by := ask_clear(questions)):
             request = request.model_copy(update={"confirmed_by": by, "checks": list(BENCH_CHECKS)})
         clear = confirmation_text(bench_file, request)
+        let_move(store, bench_file.name, request.confirmed_by or actor().name, WallClock().utc())
+        clock = stoppable(clock, control)
         prepared = prepare(
             store, request.recipe, bench_file, clock, clip=request.clip, fit=request.fit, bench_clear=clear
         )
@@ -198,7 +204,12 @@ def run_attended(
 
     seen = None if observe is None else lambda progress: observe(answer_of(row, progress))
     engine = _engine(store, prepared, control, seen)
+    bench = BenchFile.model_validate({**row.bench, "simulation": None})
     try:
-        return _drive(store, prepared, engine)
+        with answering_stops(store, bench, row.id, control):
+            try:
+                return _drive(store, prepared, engine)
+            finally:
+                note_carried_out(store, row.bench_name, WallClock().utc())
     except StoreError as error:
         raise type(error)(_unwritten(store, row.id, row.bench_name, engine, error)) from error

@@ -18,6 +18,7 @@ from labctl.services.benches.identity import pinned, reported_in
 from labctl.services.benches.lease import holding, open_for
 from labctl.services.benches.power_failure import boot_id, power_failed
 from labctl.services.campaigns.execution import Attend, Observe, run_attended
+from labctl.services.campaigns.foreground_stop import let_move
 from labctl.services.campaigns.preparation import (
     Prepared,
     clock_for,
@@ -30,6 +31,7 @@ from labctl.services.schemas.campaigns import CampaignResponse, ResumeRequest
 from labctl.store import CampaignRow, ResumePoint, Resumption, Store, open_store
 from procedures.contracts.campaign_state import CampaignState
 from procedures.execution.resume import Restart
+from procedures.execution.stoppable_clock import stoppable
 from procedures.monitoring.campaign_time import CampaignTime
 from procedures.planning.plan import Plan
 from procedures.recipe.recipe import Recipe
@@ -168,9 +170,11 @@ def resume_here(
     with open_for(bench_file, location) as store, holding(store, bench_file) as control:
 
         def make_clock(standing: ResumePoint) -> Clock:
-            return clock_for(bench_file, speed, _simulated_start(bench_file, speed, standing.last_at))
+            clock = clock_for(bench_file, speed, _simulated_start(bench_file, speed, standing.last_at))
+            return stoppable(clock, control)
 
         SafeStateRetry(store, bench_file, lambda: clock_for(bench_file, speed)).attempt()
+        let_move(store, bench_file.name, request.by, SystemClock().utc())
         prepared = prepare_resume(store, row.id, bench_file, make_clock, request)
         return run_attended(store, prepared, control, observe, attend)
 

@@ -6,6 +6,7 @@ import threading
 from collections.abc import Callable
 
 from labctl.services.campaigns.campaign_job import CampaignJob
+from procedures.contracts.control import Control
 
 #: How often the end of a campaign's thread is looked for while its table is not known to stand, s.
 LOOK_S = 0.2
@@ -14,38 +15,45 @@ LOOK_S = 0.2
 class CampaignStop:
     """The end of a campaign that runs, in the safe state."""
 
-    def __init__(self, job: CampaignJob) -> None:
-        self._job = job
-        self.campaign: int | None = job.row.id
+    def __init__(self, campaign: int, control: Control, has_ended: Callable[[], bool]) -> None:
+        """Follow the end of a campaign; `has_ended`: whether its engine has ended, the table at rest or not."""
+        self._control, self._has_ended = control, has_ended
+        self.campaign: int | None = campaign
+
+    @classmethod
+    def of(cls, job: CampaignJob) -> CampaignStop:
+        """Follow the end of a campaign that runs in a thread."""
+
+        def has_ended() -> bool:
+            thread = job.thread
+            return thread is not None and thread.ident is not None and not thread.is_alive()
+
+        return cls(job.row.id, job.control, has_ended)
 
     def is_heard(self, within_s: float) -> bool:
         """Wait until the engine has left its step; returns whether it has."""
-        return self._job.control.is_heard(within_s)
+        return self._control.is_heard(within_s)
 
     def is_over(self, within_s: float) -> bool:
         """Wait until the table stands, or the engine has ended without that; returns whether either came."""
         waited_s = 0.0
-        while not self._job.control.is_at_rest(min(LOOK_S, within_s)):
+        while not self._control.is_at_rest(min(LOOK_S, within_s)):
             waited_s += LOOK_S
-            if self._has_ended or waited_s >= within_s:
-                return self._has_ended
+            ended = self._has_ended()
+            if ended or waited_s >= within_s:
+                return ended
         return True
-
-    @property
-    def _has_ended(self) -> bool:
-        thread = self._job.thread
-        return thread is not None and thread.ident is not None and not thread.is_alive()
 
     @property
     def stands(self) -> bool:
         """Whether the table is confirmed to stand."""
-        return self._job.control.is_at_rest(0.0)
+        return self._control.is_at_rest(0.0)
 
     @property
     def text(self) -> str:
         """How far the stop is, or what keeps it."""
-        if self._job.control.hindrance:
-            return f"campaign {self.campaign}: {self._job.control.hindrance}"
+        if self._control.hindrance:
+            return f"campaign {self.campaign}: {self._control.hindrance}"
         return f"campaign {self.campaign}: {'the table is at rest' if self.stands else 'the table is being stopped'}"
 
 

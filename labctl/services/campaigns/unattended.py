@@ -7,6 +7,7 @@ from datetime import datetime
 from labctl.errors import Conflict
 from labctl.log import get_logger
 from labctl.services.benches.lease import described, driver_of
+from labctl.services.benches.stops import BenchStops
 from labctl.services.campaigns.status import campaign_status, outlives_its_process
 from labctl.services.schemas.campaigns import CampaignResponse
 from labctl.store import Store
@@ -40,6 +41,7 @@ def abort_abandoned(store: Store, campaign: int, reason: str, at: datetime) -> C
         store.benches.mark(row.bench_name, text, at)
         said += f". Bench {row.bench_name} has not been made safe: check it, then run `labctl bench clear`"
     store.campaigns.close_unfinished(campaign, said, at, CampaignState.ABORTED)
+    BenchStops(store, row.bench_name).note_closed(campaign, said)
     log.warning("campaign.closed", campaign=campaign, bench=row.bench_name, reason=said)
     return campaign_status(store, campaign)
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from labctl.services.admin import api_keys
 from labctl.services.calibrations import certification, fitting, revision
-from labctl.services.campaigns.bench_status import bench_status
+from labctl.services.campaigns.bench_status import clear_bench
 from labctl.services.certificates import issue as certificates
 from labctl.services.commands.command import Command, Newest, NoContent
 from labctl.services.commands.context import CommandContext
@@ -121,8 +121,7 @@ def _make_drafts(context: CommandContext, asked: ToCampaign[DraftsRequest]) -> D
 
 
 def _clear_bench(context: CommandContext, asked: ToBench[ClearRequest]) -> BenchStatus:
-    by, reason = asked.body.by, asked.body.reason
-    return bench_status(context.store.benches.clear(asked.bench, by, reason, context.now()))
+    return clear_bench(context.store, asked.bench, asked.body, context.now())
 
 
 def _check_bench(context: CommandContext, asked: ToBench[CheckRequest]) -> BenchCheckResponse:

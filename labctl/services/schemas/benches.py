@@ -21,6 +21,22 @@ class CheckRequest(Request):
     """A check of the whole bench; it needs no answers."""
 
 
+class BenchStop(ResponseModel):
+    """A stop that is not carried out yet, or that keeps the bench from moving by itself."""
+
+    id: str = Field(description="Identifier of the stop, as in the audit trail.")
+    at: str = Field(description="When the stop was asked for, ISO 8601, UTC.")
+    by: str = Field(description="Who asked for the stop.")
+    reason: str = Field(description="Why the stop was asked for.")
+    campaign: int | None = Field(description="The campaign that the stop ends; null: whatever runs on the bench.")
+    phase: Literal["asked", "stopping", "stopped"] = Field(
+        description="asked: no process has confirmed the stop, the table may turn. stopping: the bench is being made "
+        "safe. stopped: the stop is carried out; nothing moves by itself until a person starts or resumes a campaign, "
+        "or clears the bench."
+    )
+    text: str = Field(description="How far the stop is, and what keeps it, in words.")
+
+
 class BenchStatus(ResponseModel):
     """A bench, and what its last safe state could not confirm."""
 
@@ -42,6 +58,9 @@ class BenchStatus(ResponseModel):
     )
     left: list[str] = Field(
         default_factory=list, description="Interrupted campaigns: their process ended before they did."
+    )
+    stop: BenchStop | None = Field(
+        default=None, description="The newest stop that is not carried out yet, or not taken back; null: none."
     )
 
 
@@ -96,22 +115,6 @@ class BenchUnit(ResponseModel):
     name: str
     serial: str
     driver: str
-
-
-class BenchStop(ResponseModel):
-    """A stop that is not carried out yet, or that keeps the bench from moving by itself."""
-
-    id: str = Field(description="Identifier of the stop, as in the audit trail.")
-    at: str = Field(description="When the stop was asked for, ISO 8601, UTC.")
-    by: str = Field(description="Who asked for the stop.")
-    reason: str = Field(description="Why the stop was asked for.")
-    campaign: int | None = Field(description="The campaign that the stop ends; null: whatever runs on the bench.")
-    phase: Literal["asked", "stopping", "stopped"] = Field(
-        description="asked: no process has confirmed the stop, the table may turn. stopping: the bench is being made "
-        "safe. stopped: the stop is carried out; nothing moves by itself until a person starts or resumes a campaign, "
-        "or clears the bench."
-    )
-    text: str = Field(description="How far the stop is, and what keeps it, in words.")
 
 
 class StopResponse(ResponseModel):

@@ -40,8 +40,8 @@ def test_an_engine_that_cannot_write_stops_its_table(store: Store, monkeypatch: 
     monkeypatch.setattr(writer_turn, "OVERDUE_DEADLINE_S", 0.05)
     real, left = shutdown.make_safe, []
 
-    def make_safe(bench: Any, clock: Any) -> tuple[str, ...]:
-        complaints = real(bench, clock)
+    def make_safe(bench: Any, clock: Any, note: Any) -> tuple[str, ...]:
+        complaints = real(bench, clock, note=note)
         left.append((complaints, bench.table.is_moving()))
         return complaints
 
