@@ -267,7 +267,9 @@ class BenchRunner:
     def describe(self) -> BenchDescription:
         """Return the bench and what it is doing."""
         unconfirmed = self._store.benches.unconfirmed(self._bench.name)
-        return description(self._bench, self.running, unconfirmed, self._last_check)
+        job = self._job
+        running, clock = (None, None) if job is None else (job.row.id, job.prepared.clock)
+        return description(self._bench, running, unconfirmed, self._last_check, clock)
 
     @property
     def polls(self) -> tuple[int, int] | None:
