@@ -174,7 +174,7 @@ class PacedClock:
     #: Longest wait between two advances of a sleep, s of real time.
     STEP_S = 0.1
     #: Without another wait in so long, the threads that wait for the interpreter are given it for `GIVE_WAY_S`.
-    GIVE_WAY_EVERY_S, GIVE_WAY_S = 0.005, 0.0002
+    GIVE_WAY_EVERY_S, GIVE_WAY_S = 0.002, 0.0002
     #: `reached_speed` is that of the last so many seconds of real time, and unknown during the first.
     WINDOW_S, MARK_EVERY_S, LEAST_WINDOW_S = 10.0, 0.5, 1.0
     #: Every time-out, s of real time, as that of a VirtualClock.

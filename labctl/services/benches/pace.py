@@ -11,9 +11,10 @@ from procedures.monitoring.progress import Observer, Progress
 
 log = get_logger()
 
-#: Below this share of the asked speed, for so long, s of real time, the clock is slow.
-SLOW_SHARE, SLOW_FOR_S = 0.9, 5.0
-#: Another speed is logged again once it has changed by this factor.
+#: A clock is slow below this share of the asked speed, for so long, s of real time: then the speed that the clock tells
+#: is that of the slow time alone.
+SLOW_SHARE, SLOW_FOR_S = 0.9, PacedClock.WINDOW_S
+#: Another speed is logged again once it differs by this factor.
 CHANGED = 1.5
 #: From one look at the speed to the next, s of real time.
 LOOK_S = 1.0
@@ -37,8 +38,8 @@ class PaceWatch:
         self._clock, self._wall = clock, wall or SystemClock()
         self._asked = asked_speed(clock)
         self._looked_s = -math.inf
-        self._slow_since_s: float | None = None
-        self._logged: float | None = None
+        self._news_since_s: float | None = None  #: since when the speed is slow, and another than was logged
+        self._logged: float | None = None  #: the speed that was logged last
 
     def look(self) -> None:
         """Compare the speeds, at most every `LOOK_S`."""
@@ -47,13 +48,13 @@ class PaceWatch:
             return
         self._looked_s = now_s
         reached = reached_speed(self._clock)
-        if reached is None or reached >= SLOW_SHARE * self._asked:
-            self._slow_since_s = self._logged = None
+        if reached is None or reached >= SLOW_SHARE * self._asked or not self._is_news(reached):
+            self._news_since_s = None
             return
-        if self._slow_since_s is None:
-            self._slow_since_s = now_s
-        if now_s - self._slow_since_s >= SLOW_FOR_S and self._is_news(reached):
-            self._logged = reached
+        if self._news_since_s is None:
+            self._news_since_s = now_s
+        if now_s - self._news_since_s >= SLOW_FOR_S:
+            self._logged, self._news_since_s = reached, None
             log.warning("clock.slow", asked=self._asked, reached=reached)
 
     def _is_news(self, reached: float) -> bool:
