@@ -138,7 +138,7 @@ class Wall(Protocol):
         ...
 
     def wait(self, changed: threading.Condition, duration_s: float) -> None:
-        """Wait at most `duration_s` for a change; `changed` is held by this thread, and let go meanwhile."""
+        """Wait at most `duration_s` for a change; `changed` is held by this thread, and released meanwhile."""
         ...
 
 

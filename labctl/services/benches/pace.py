@@ -1,4 +1,4 @@
-"""Whether the simulated time of a campaign keeps the speed that was asked for: its figures, and a warning in the log."""
+"""Whether the simulated time of a campaign keeps the speed that was asked for: figures, and a warning in the log."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ log = get_logger()
 SLOW_SHARE, SLOW_FOR_S = 0.9, PacedClock.WINDOW_S
 #: Another speed is logged again once it differs by this factor.
 CHANGED = 1.5
-#: From one look at the speed to the next, s of real time.
+#: From one comparison of the speeds to the next, s of real time.
 LOOK_S = 1.0
 
 
@@ -62,7 +62,7 @@ class PaceWatch:
 
 
 def with_pace_watch(clock: Clock, observe: Callable[[Progress], None] | None) -> Observer | None:
-    """Return an observer of a campaign that looks at the speed of its clock, too; the same where there is no speed."""
+    """Return an observer of a campaign that compares the speeds of its clock, too; the same where there is no speed."""
     if asked_speed(clock) is None:
         return observe
     watch = PaceWatch(clock)
