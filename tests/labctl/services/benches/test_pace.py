@@ -20,7 +20,7 @@ SPEED = 200.0
 
 
 def look_for(watch: PaceWatch, clock: PacedClock, wall: VirtualWall, wall_s: float, per_s: float) -> None:
-    """Let a computer run a campaign that does `per_s` clock seconds per second, and look at it."""
+    """Let a computer run a campaign that does `per_s` clock seconds per second, and compare its speeds."""
     until_s = wall.now_s() + wall_s
     while wall.now_s() < until_s:
         wall.pass_s(1.0 / per_s)
