@@ -1,13 +1,19 @@
 """The clock of a bench: no other module of the runtime reads the time or sleeps.
 
 Durations are seconds of the clock's own monotonic time, which starts at 0; records carry aware UTC. In virtual time a
-sleep advances the clock at once, so a 45-hour campaign takes the time of its arithmetic; in scaled time (demos,
-simulators in another process) one second of real time is `speed` clock seconds.
+sleep advances the clock at once, so a 45-hour campaign takes the time of its arithmetic; in paced time (simulators in
+this process) a sleep advances it too, but at most `speed` times as fast as real time; in scaled time (simulators in
+another process) one second of real time is `speed` clock seconds, whatever the computer manages to do in it.
 """
 
 from __future__ import annotations
 
+import math
+import threading
 import time
+from bisect import insort
+from collections import deque
+from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from typing import Protocol
 
@@ -123,3 +129,152 @@ class VirtualClock:
 
     def wall_s(self, duration_s: float) -> float:  # noqa: ARG002  virtual time-outs do not depend on their length
         return self.WALL_TIMEOUT_S
+
+
+class Wall(Protocol):
+    """Real time, as a paced clock needs it: to read, and to wait for a change."""
+
+    def now_s(self) -> float:
+        """Get the monotonic real time in seconds."""
+        ...
+
+    def wait(self, changed: threading.Condition, duration_s: float) -> None:
+        """Wait at most `duration_s` for a change; `changed` is held by this thread, and released meanwhile."""
+        ...
+
+
+class RealWall:
+    """The real time of this computer."""
+
+    def now_s(self) -> float:
+        return time.monotonic()
+
+    def wait(self, changed: threading.Condition, duration_s: float) -> None:
+        changed.wait(duration_s)
+
+
+def _nothing() -> None:
+    """Let a sleep go on."""
+
+
+class PacedClock:
+    """Time that advances only by `sleep`, and at most `speed` times as fast as real time.
+
+    For simulators in this process. Computation takes no time of this clock: where the computer is too slow for the
+    speed, or the process stands still, the clock runs slower, and at most `BACKLOG_S` of real time is caught up later.
+    With an infinite speed it never waits for real time, but still leaves the other threads of the process room.
+
+    Any thread may sleep. The clock never runs past the end of a sleep before its thread has seen that end: sleeps of
+    several threads overlap, and each ends exactly `duration_s` after it began. So with one thread every reading of the
+    clock is that of a `VirtualClock`. A long sleep advances the clock in steps, for those who read it meanwhile.
+
+    `start` is the instant at which the clock is made, default now. Raises ValueError for a speed that is not positive,
+    and for a start without a time zone.
+    """
+
+    #: Real time by which the clock may be late and still catch up: what a busy scheduler takes, s.
+    BACKLOG_S = 0.1
+    #: The clock waits once it is this far ahead of real time: shorter waits cost more than they last, s.
+    LEAST_WAIT_S = 0.002
+    #: Longest wait between two advances of a sleep, s of real time.
+    STEP_S = 0.1
+    #: Without another wait in so long, the threads that wait for the interpreter are given it for `GIVE_WAY_S`.
+    GIVE_WAY_EVERY_S, GIVE_WAY_S = 0.002, 0.0002
+    #: `reached_speed` is that of the last so many seconds of real time, and unknown during the first.
+    WINDOW_S, MARK_EVERY_S, LEAST_WINDOW_S = 10.0, 0.5, 1.0
+    #: Every time-out, s of real time, as that of a VirtualClock.
+    WALL_TIMEOUT_S = 10.0
+
+    def __init__(self, speed: float = math.inf, *, start: datetime | None = None, wall: Wall | None = None) -> None:
+        if not speed > 0:
+            raise ValueError(f"the speed of a clock is {speed}; give a number above 0 (1 is real time)")
+        self.speed = speed
+        self._start = datetime.now(UTC) if start is None else _aware(start)
+        self._wall = wall or RealWall()
+        #: Called before each wait of a sleep, by the thread that sleeps; it ends the sleep by raising.
+        self.before_wait: Callable[[], None] = _nothing
+        self._changed = threading.Condition()
+        self._now_s = 0.0  # a float is read without the lock, also by a signal handler
+        self._ends_s: list[float] = []  # of the sleeps under way, rising
+        wall_s = self._wall.now_s()
+        self._pace = (wall_s, 0.0)  # real time, and the clock time from which the speed is counted
+        self._waited_s = wall_s  # real time at which the last wait ended
+        self._marks = deque([(wall_s, 0.0)])  # real time and clock time, rising
+
+    def now_s(self) -> float:
+        return self._now_s
+
+    def utc(self) -> datetime:
+        return self._start + timedelta(seconds=self._now_s)
+
+    def sleep(self, duration_s: float) -> None:
+        if not duration_s > 0:
+            return
+        with self._changed:
+            end_s = self._now_s + duration_s
+            insort(self._ends_s, end_s)
+            try:
+                while self._now_s < end_s:
+                    self.before_wait()
+                    self._advance()
+            finally:
+                self._ends_s.remove(end_s)
+                if self._ends_s:
+                    self._changed.notify_all()
+
+    def wall_s(self, duration_s: float) -> float:  # noqa: ARG002  no time-out depends on its length, as in virtual time
+        return self.WALL_TIMEOUT_S
+
+    @property
+    def reached_speed(self) -> float | None:
+        """Clock seconds per second of real time in the last `WINDOW_S`; None in the first `LEAST_WINDOW_S`."""
+        with self._changed:
+            wall_s = self._wall.now_s()
+            self._forget_before(wall_s - self.WINDOW_S)
+            since_s, then_s = self._marks[0]
+            if wall_s - since_s < self.LEAST_WINDOW_S:
+                return None
+            return (self._now_s - then_s) / (wall_s - since_s)
+
+    def _advance(self) -> None:
+        """Advance to the end of the first sleep, or towards it as far as real time allows, and wait; holds the lock."""
+        first_s, wall_s = self._ends_s[0], self._wall.now_s()
+        if first_s <= self._now_s:  # its thread has yet to wake up
+            self._wait(self.STEP_S)
+            return
+        self._drop_backlog(wall_s)
+        since_s, then_s = self._pace
+        ahead_s = (first_s - then_s) / self.speed - (wall_s - since_s)
+        if ahead_s >= self.LEAST_WAIT_S:
+            self._now_s = min(max(self._now_s, then_s + (wall_s - since_s) * self.speed), first_s)
+            self._mark(wall_s)
+            self._wait(min(ahead_s, self.STEP_S))
+            return
+        self._now_s = first_s
+        self._mark(wall_s)
+        if len(self._ends_s) > 1:
+            self._changed.notify_all()
+        if wall_s - self._waited_s >= self.GIVE_WAY_EVERY_S:
+            self._wait(self.GIVE_WAY_S)
+
+    def _wait(self, duration_s: float) -> None:
+        self._wall.wait(self._changed, duration_s)
+        self._waited_s = self._wall.now_s()
+
+    def _drop_backlog(self, wall_s: float) -> None:
+        """Count the speed from a later moment where the clock is later than may be caught up."""
+        since_s, then_s = self._pace
+        late_s = (wall_s - since_s) - (self._now_s - then_s) / self.speed
+        if late_s > self.BACKLOG_S:
+            self._pace = (wall_s - self.BACKLOG_S, self._now_s)
+
+    def _mark(self, wall_s: float) -> None:
+        """Note where the clock is, for the speed that it reaches."""
+        if wall_s - self._marks[-1][0] >= self.MARK_EVERY_S:
+            self._marks.append((wall_s, self._now_s))
+            self._forget_before(wall_s - self.WINDOW_S)
+
+    def _forget_before(self, wall_s: float) -> None:
+        """Keep one mark that is older than the window, so that the window is covered whole."""
+        while len(self._marks) > 1 and self._marks[1][0] <= wall_s:
+            self._marks.popleft()

@@ -32,6 +32,8 @@ CHANGES: Mapping[str, str] = {
 TROUBLE: Mapping[str, str] = {
     "bench.made_safe": "bench {bench} is not confirmed safe: {unconfirmed}; inspect it",
     "safe_state.retried": "bench {bench} is still not confirmed safe: {unconfirmed}; inspect it",
+    "clock.slow": "campaign {campaign} on {bench}: simulated time runs at {reached:g} times real time; {asked:g} was "
+    "asked for, which this computer does not reach now",
     "campaign.event": "campaign {campaign} on {bench}: {message}",
     "step.ended": "campaign {campaign} on {bench}: step {step} of {steps} ({kind}) {outcome}: {reason}",
     "dataset.closed": "campaign {campaign} on {bench}: data set {dataset} {state}: {reason}",

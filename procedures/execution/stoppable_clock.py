@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from datetime import datetime
+from functools import partial
 
-from instruments.clock import Clock
+from instruments.clock import Clock, PacedClock, ScaledClock
 from procedures.contracts.control import Control
 from procedures.contracts.errors import Aborted, Interrupted
 
@@ -41,11 +42,18 @@ class StoppableClock:
             self._look()
 
     def _look(self) -> None:
-        if (request := self._control.ends_here()) is not None:
-            raise Interrupted(request.reason) if request.resumable else Aborted(request.reason)
+        end_here(self._control)
+
+
+def end_here(control: Control) -> None:
+    """Raise Aborted or Interrupted in the thread that drives the bench, once its end was asked for."""
+    if (request := control.ends_here()) is not None:
+        raise Interrupted(request.reason) if request.resumable else Aborted(request.reason)
 
 
 def stoppable(clock: Clock, control: Control) -> Clock:
-    """Return a clock whose sleep ends with a stop; virtual time, in which no sleep lasts, as it is."""
-    speed = getattr(clock, "speed", None)
-    return clock if speed is None else StoppableClock(clock, control, float(speed))
+    """Return a clock whose sleep ends with a stop; purely virtual time, in which no sleep lasts, as it is."""
+    if isinstance(clock, PacedClock):  # it waits in steps of its own, which leave its readings as they are
+        clock.before_wait = partial(end_here, control)
+        return clock
+    return StoppableClock(clock, control, clock.speed) if isinstance(clock, ScaledClock) else clock

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from instruments.clock import SystemClock
+from labctl.services.benches import check
 from labctl.services.campaigns import preparation
 from tests.helpers.browser import Faults, Service
 from tests.helpers.paced_hand import PacedClock, PacedPerson
@@ -90,6 +91,21 @@ def test_what_cannot_be_done_ends_the_campaign(service: Service, visit: Callable
     expect(last).to_contain_text("labctl stopped the table")
     expect(last).to_contain_text("Next:")
     expect(last).to_contain_text("simulated time")
+
+
+def test_says_that_simulated_time_is_slower_than_was_asked_for(
+    service: Service, visit: Callable[..., Page], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from playwright.sync_api import expect
+
+    monkeypatch.setattr(check, "asked_speed", lambda _: 200.0)
+    monkeypatch.setattr(check, "reached_speed", lambda _: 37.4)
+    start(service)
+    page = visit("/bench")
+    said = page.get_by_text("Simulated time runs at 37 times real time; 200 was asked for")
+    expect(said).to_be_visible()
+    monkeypatch.setattr(check, "reached_speed", lambda _: 199.9)
+    expect(said).not_to_be_visible()
 
 
 def test_says_that_it_is_stale_and_goes_on_where_it_was(

@@ -12,6 +12,7 @@ from instruments.checks.findings import DeviceReport
 from instruments.clock import Clock, ScaledClock, SystemClock, VirtualClock, WallClock
 from instruments.simulation import Simulation, serve_simulation
 from labctl.errors import BadInput
+from labctl.services.benches.pace import asked_speed, reached_speed
 from labctl.services.planning.loading import load_bench
 from labctl.services.schemas.benches import (
     BenchCheckResponse,
@@ -43,9 +44,13 @@ def response_of(bench: BenchFile, source: str, reports: Sequence[DeviceReport]) 
 
 
 def description(
-    bench: BenchFile, campaign: int | None, unconfirmed: str, check_: BenchCheckResponse | None
+    bench: BenchFile,
+    campaign: int | None,
+    unconfirmed: str,
+    check_: BenchCheckResponse | None,
+    clock: Clock | None = None,
 ) -> BenchDescription:
-    """Return a bench, what runs on it, what its safe state did not confirm, and its last check."""
+    """Return a bench, what runs on it and on which clock, what its safe state did not confirm, and its last check."""
     return BenchDescription(
         name=bench.name,
         simulated=bench.is_simulated,
@@ -54,6 +59,8 @@ def description(
         campaign=campaign,
         unconfirmed=unconfirmed,
         check=check_,
+        speed=None if clock is None else asked_speed(clock),
+        speed_reached=None if clock is None else reached_speed(clock),
     )
 
 

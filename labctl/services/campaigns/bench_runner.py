@@ -327,7 +327,7 @@ class BenchRunner:
         if not stops or self._job is not None or not self._may_drive:
             return
         left = "" if self._is_safe else self._secure_now()
-        at = self._make_clock().utc() if self._bench.is_simulated else WallClock().utc()
+        at = WallClock().utc()
         for stop in stops:
             self._recovery.close_stopped(stop.campaign, stop.reason)
             self.stop_latch.record(stop, at)
@@ -408,7 +408,8 @@ class BenchRunner:
         hindrance = job.control.hindrance if job is not None and ends else ""
         if hindrance:
             unconfirmed = "; ".join(filter(None, (unconfirmed, f"stopping: {hindrance}")))
-        found = description(self._bench, self.running, unconfirmed, self._last_check)
+        running, clock = (None, None) if job is None else (job.row.id, job.prepared.clock)
+        found = description(self._bench, running, unconfirmed, self._last_check, clock)
         return found.model_copy(update={"stop": self.stop_latch.describe(hindrance, stopping=ends)})
 
     @property

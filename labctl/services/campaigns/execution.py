@@ -15,6 +15,7 @@ from labctl.log.campaign_journal import LoggedJournal
 from labctl.log.context import for_campaign
 from labctl.services.benches.confirmation import SafeStateRetry, describe_safe_state
 from labctl.services.benches.lease import holding, open_for
+from labctl.services.benches.pace import with_pace_watch
 from labctl.services.benches.standards import overdue_events
 from labctl.services.benches.start_confirmation import confirmation_text, start_questions
 from labctl.services.campaigns.bench_lending import BenchLending, lending_journal
@@ -84,7 +85,7 @@ def _engine(
         prepared.clock,
         prepared.operator,
         control=control or Control(),
-        observer=observe,
+        observer=with_pace_watch(prepared.clock, observe),
         time=prepared.time,
         notices=overdue_events(bench.standards, prepared.clock.utc().date()),
     )

@@ -8,7 +8,7 @@ from datetime import datetime
 
 from instruments.bench import Bench, open_bench
 from instruments.bench_config import BenchFile, SimulationSettings
-from instruments.clock import VIRTUAL_START, Clock, ScaledClock, SystemClock, VirtualClock
+from instruments.clock import VIRTUAL_START, Clock, PacedClock, ScaledClock, SystemClock
 from instruments.drivers.unit_handlers import ManualUnitHandler
 from instruments.errors import InstrumentError
 from instruments.interfaces.gyro import Gyro, GyroIdentity
@@ -115,7 +115,7 @@ def on_date(bench: BenchFile, start: datetime | None) -> BenchFile:
 
 
 def clock_for(bench: BenchFile, speed: float | None, start: datetime | None = None) -> Clock:
-    """Return the system's clock for real instruments; for simulated ones a scaled or a virtual clock.
+    """Return the system's clock for real instruments; for simulated ones a paced clock, without a speed at no pace.
 
     Simulators in another process set the pace themselves. `start` is the aware instant at which simulated time begins.
     Raises BadInput for a speed or a start on a bench that has its own.
@@ -130,7 +130,7 @@ def clock_for(bench: BenchFile, speed: float | None, start: datetime | None = No
             raise BadInput(f"--speed {speed:g}: bench {bench.name} runs in real time; leave the option out")
         simulation = bench.simulation
         return ScaledClock(simulation.speed) if simulation is not None and simulation.control else SystemClock()
-    return VirtualClock(start or VIRTUAL_START) if speed is None else ScaledClock(speed, start=start)
+    return PacedClock(start=start or VIRTUAL_START) if speed is None else PacedClock(speed, start=start)
 
 
 def load_libraries() -> None:

@@ -148,6 +148,16 @@ class BenchDescription(ResponseModel):
     stop: BenchStop | None = Field(
         default=None, description="The newest stop that is not carried out yet, or not taken back; null: none."
     )
+    speed: float | None = Field(
+        default=None,
+        description="Speed of simulated time that was asked for, times real time; null: no campaign runs, the time is "
+        "that of this computer, or it runs as fast as possible.",
+    )
+    speed_reached: float | None = Field(
+        default=None,
+        description="Speed of simulated time that was reached in the last 10 s, times real time: a busy computer does "
+        "not reach every speed. null: no campaign runs, not known yet, or the time is that of this computer.",
+    )
 
 
 class BenchResponse(BenchDescription):

@@ -1850,6 +1850,16 @@ export interface components {
              * @default 0
              */
             heard_s: number;
+            /**
+             * Speed
+             * @description Speed of simulated time that was asked for, times real time; null: no campaign runs, the time is that of this computer, or it runs as fast as possible.
+             */
+            speed: number | null;
+            /**
+             * Speed Reached
+             * @description Speed of simulated time that was reached in the last 10 s, times real time: a busy computer does not reach every speed. null: no campaign runs, not known yet, or the time is that of this computer.
+             */
+            speed_reached: number | null;
         };
         /**
          * BenchResponse
@@ -1882,6 +1892,16 @@ export interface components {
              * @default 0
              */
             heard_s: number;
+            /**
+             * Speed
+             * @description Speed of simulated time that was asked for, times real time; null: no campaign runs, the time is that of this computer, or it runs as fast as possible.
+             */
+            speed: number | null;
+            /**
+             * Speed Reached
+             * @description Speed of simulated time that was reached in the last 10 s, times real time: a busy computer does not reach every speed. null: no campaign runs, not known yet, or the time is that of this computer.
+             */
+            speed_reached: number | null;
             /**
              * Start Questions
              * @description For each check: the question that a person must confirm before a start; empty for a simulated bench.

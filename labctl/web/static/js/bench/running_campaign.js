@@ -16,6 +16,7 @@ import { gauges } from "./gauges.js";
 import { liveOutput } from "./live_output.js";
 import { campaignHistory, remainingSeconds, appendStatus } from "./campaign_history.js";
 import { operatorPrompt } from "./operator_prompt.js";
+import { slowText } from "./speed_text.js";
 import { turnNow } from "./turn_now.js";
 import { lastDataset } from "./last_dataset.js";
 import { historyPlot } from "./history_plot.js";
@@ -24,6 +25,8 @@ import { historyPlot } from "./history_plot.js";
 
 const MAX_EVENTS = 8;
 const PLAN_REFRESH_MS = 2500;
+/** The service does not know the speed of simulated time in the first second of a campaign. */
+const SPEED_REFRESH_MS = 2500;
 
 /**
  * `over()` is called when the campaign has ended.
@@ -35,9 +38,10 @@ export function runningCampaign(status, plan, { signal, over }) {
   const { timeline } = plan;
   const history = campaignHistory(status.id);
   const bar = statusBar(status, plan);
-  const [connection, prompt, warningList] = [
+  const [connection, prompt, speed, warningList] = [
     h("div", { "aria-live": "assertive" }),
     h("div", {}),
+    h("p", { class: "small muted", hidden: true }),
     h("div", { class: "stack", "aria-live": "polite" }),
   ];
   const dials = gauges(timeline);
@@ -92,7 +96,23 @@ export function runningCampaign(status, plan, { signal, over }) {
       // the event stream reports a silent service
     }
   }
+  /** Say at which speed simulated time runs, where that is not the one that was asked for. */
+  async function showSpeed() {
+    if (document.hidden) return;
+    try {
+      const [bench] = await get("/api/benches", { signal });
+      speed.textContent = bench ? slowText(bench) : "";
+      speed.hidden = !speed.textContent;
+    } catch {
+      // the event stream reports a silent service
+    }
+  }
   show(status);
+  if (status.simulated_time) {
+    showSpeed();
+    const timer = setInterval(showSpeed, SPEED_REFRESH_MS);
+    signal.addEventListener("abort", () => clearInterval(timer));
+  }
   followCampaign(
     status.id,
     {
@@ -120,6 +140,7 @@ export function runningCampaign(status, plan, { signal, over }) {
   );
   return [
     bar,
+    speed,
     connection,
     prompt,
     turn,
