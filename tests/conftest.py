@@ -5,6 +5,7 @@ import contextlib
 import os
 import shutil
 import sys
+import tempfile
 from collections.abc import Callable, Coroutine, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -23,6 +24,8 @@ settings.load_profile("labctl")
 #: How long a coroutine of a test may take, seconds.
 LOOP_S = 60.0
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+# `labctl stop` finds benches by what is kept here: those of the tests are no benches of the user.
+os.environ["XDG_STATE_HOME"] = str(Path(tempfile.gettempdir()) / f"labctl-tests-state-{os.getuid()}-{os.getpid()}")
 # The processes that tests start would each compile all modules again.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False

@@ -97,7 +97,9 @@ class AccessMiddleware:
     async def _caller(self, scope: Scope) -> Caller:
         headers = Headers(scope=scope)
         if (authorization := headers.get("authorization")) is not None:
-            if self._keys is not None and scope["method"] == "POST" and STOPS.fullmatch(scope["path"]):
+            if self._keys is None:
+                return identify(self._service.store, authorization)
+            if scope["method"] == "POST" and STOPS.fullmatch(scope["path"]):
                 known = self._keys.caller_of(authorization)
                 if known is not None:
                     return known

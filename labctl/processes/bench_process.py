@@ -45,6 +45,7 @@ ANSWER_WITHIN_S = 0.2
 #: A bench process without a supervisor ends by itself when no campaign has run for so long, s.
 ALONE_S = 60.0
 LOOK_S = 0.5
+SWITCH_S = 0.0005
 
 
 def open_bench_service(settings: BenchSettings) -> tuple[Store, LocalBench]:
@@ -151,6 +152,7 @@ class BenchProcess:
 def main() -> int:
     """Run the process that the supervisor has started; returns its exit status."""
     of_the_bench()
+    sys.setswitchinterval(SWITCH_S)  # a stop has a thread of its own, which waits for the interpreter only so long
     line, settings = line_to_parent()
     threading.current_thread().name = "bench"
     begin_child_log("bench", settings.location)

@@ -26,7 +26,7 @@ class Listening:
 def listening(host: str, port: int, ask_for_it: Callable[[], None] = lambda: None) -> Iterator[Listening]:
     """Listen at an address while the block runs; port 0 takes a free one. Raises BadInput.
 
-    `ask_for_it` asks whoever answers there in place of a service that is gone to give the address back.
+    `ask_for_it` asks the process that answers there, in place of a service that is gone, to give the address back.
     """
     with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET) as listener:
         listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

@@ -25,7 +25,7 @@ from labctl.services.commands.service_control import NO_BENCH
 from labctl.services.schemas.benches import BenchCheckResponse, BenchDescription, CheckRequest, StopResponse
 from labctl.services.schemas.campaigns import CampaignResponse, ConfirmRequest, ReasonRequest
 from labctl.services.schemas.schedule import ScheduledResponse
-from labctl.stop.client import NOT_STOPPED, SWITCH, StopAttempt
+from labctl.stop.client import StopAttempt, not_stopped_text
 from labctl.stop.latch import LatchState, StopRequest
 from labctl.stop.places import BenchPlace, place_of
 
@@ -37,7 +37,7 @@ ANSWER_S = 3.0
 TRANSACTION_S = 30.0
 #: Opening a bench: every instrument is asked.
 OPENING_S = 180.0
-#: Who asks for a stop is told within this that it is under way, or that the bench is not stopped, s.
+#: A stop is answered within this: that it is under way, or that the bench is not stopped, s.
 HEARD_S = 4.5
 #: And whether the table stands, where it does so soon, s.
 AT_REST_S = 0.1
@@ -66,10 +66,6 @@ class RemoteWriter:
         self._caller.close()
 
 
-def _not_stopped(text: str) -> str:
-    return f"{NOT_STOPPED}: {text}. {SWITCH}."
-
-
 class RemoteControl:
     """Control over the campaigns of the bench process."""
 
@@ -81,7 +77,7 @@ class RemoteControl:
         may_run: Callable[[int], bool] = lambda _: True,
         last_live: Callable[[int], CampaignResponse | None] = lambda _: None,
     ) -> None:
-        """`may_run`: whether a campaign runs, or may; `last_live`: how a campaign was when it was last heard of."""
+        """`may_run`: whether a campaign runs, or may; `last_live`: how it was when the bench process answered last."""
         self._bench, self._place = bench, place
         self._may_run, self._last_live = may_run, last_live
         self._calls = Caller(folder / CALLS, ANSWER_S)
@@ -117,10 +113,10 @@ class RemoteControl:
             return self._recorded(asked)
         attempt = self._attempt(asked.body.text, asked.campaign)
         if not attempt.is_heard(HEARD_S):
-            raise NotStopped(_not_stopped(attempt.text))
+            raise NotStopped(not_stopped_text(attempt.text))
         found = attempt.result(AT_REST_S)
         if found is not None and not found.stands:
-            raise NotStopped(_not_stopped(found.text))
+            raise NotStopped(not_stopped_text(found.text))
         try:
             return self._recorded(asked)
         except BenchSilent as silent:
@@ -138,7 +134,7 @@ class RemoteControl:
         attempt = self._attempt(reason, None)
         found = attempt.result(HEARD_S)
         if found is None or not found.stands:
-            raise NotStopped(_not_stopped(attempt.text))
+            raise NotStopped(not_stopped_text(attempt.text))
         return StopResponse(bench=self._bench.name, stands=True, text=found.text, campaign=found.campaign)
 
     def _attempt(self, reason: str, campaign: int | None) -> StopAttempt:

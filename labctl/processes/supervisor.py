@@ -159,7 +159,7 @@ class Supervisor:
         return AttemptedStop(StopAttempt(self._place, stop))
 
     def _secured(self) -> GuardianStop | None:
-        """Let the guardian make safe the bench of a process that has ended; returns what came of it."""
+        """Let the guardian make safe the bench of a process that has ended; returns the result."""
         if self._guardian is None:
             return None
         while self._guardian.busy:  # it was asked for a stop, and has ended the process itself

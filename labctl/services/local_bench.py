@@ -16,12 +16,12 @@ from labctl.services.commands.service_control import NO_BENCH, ServiceControl
 from labctl.services.schedule.scheduler import Scheduler
 from labctl.services.schemas.benches import BenchDescription, StopResponse
 from labctl.services.schemas.campaigns import CampaignResponse
-from labctl.stop.client import NOT_STOPPED, SWITCH
+from labctl.stop.client import not_stopped_text
 from labctl.stop.latch import StopRequest
 from labctl.stop.wire import Stopping
 from labctl.store import Store
 
-#: Who asks for a stop is told within this whether the table stands, s.
+#: A stop of the whole bench is answered within this, s.
 STOP_S = 4.5
 
 
@@ -75,7 +75,7 @@ class LocalBench:
         """
         with acting(ITSELF):  # no request asked for it
             if self.runner is not None:
-                self.runner.watch_latch()
+                self.runner.stops.watch()
                 self.runner.safe_state.start()
                 self.runner.resume_unfinished()
             if self.scheduler is not None:
@@ -85,7 +85,7 @@ class LocalBench:
         """Begin a stop; returns how it goes on. Waits for no lock, no disk and no database."""
         if self.runner is None:
             return NotHere("this service drives no bench")
-        return self.runner.request_stop(stop)
+        return self.runner.stops.request(stop)
 
     @property
     def is_at_rest(self) -> bool:
@@ -101,9 +101,9 @@ class LocalBench:
         """Stop the bench, whatever runs there. Raises NotStopped, Conflict without a bench."""
         if self.runner is None:
             raise Conflict(NO_BENCH)
-        stopping = self.runner.request_stop(StopRequest.new(actor().name, actor().via, reason))
+        stopping = self.runner.stops.request(StopRequest.new(actor().name, actor().via, reason))
         if not stopping.is_over(STOP_S) or not stopping.stands:
-            raise NotStopped(f"{NOT_STOPPED}: {stopping.text}. {SWITCH}.")
+            raise NotStopped(not_stopped_text(stopping.text))
         return StopResponse(bench=self.runner.bench.name, stands=True, text=stopping.text, campaign=stopping.campaign)
 
     def note_unsupervised(self) -> None:

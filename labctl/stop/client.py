@@ -23,7 +23,7 @@ GUARDIAN_ANSWERS_S = 1.5
 SILENT_S = 3.0
 #: From the highest rate to rest a table takes some seconds, a guardian tries each part of the safe state twice, s.
 STANDS_WITHIN_S = 60.0
-#: When the one who waits is told that the bench is not stopped yet, s.
+#: From here on it is reported that the bench is not stopped yet, s.
 LATE_S = 4.0
 #: A latch on a disk that stands still does not keep a stop waiting, s.
 LATCH_S = 0.3
@@ -31,6 +31,11 @@ ENDS_WITHIN_S = 2.0
 
 NOT_STOPPED = "NOT STOPPED"
 SWITCH = "Use the stop switch of the bench"
+
+
+def not_stopped_text(text: str) -> str:
+    """Return what a person reads of a bench that is not known to stand."""
+    return f"{NOT_STOPPED}: {text}. {SWITCH}."
 
 
 @dataclass(frozen=True)
@@ -73,7 +78,7 @@ class StopAttempt:
         note = self._place.note() or DriverNote(self._place.name)
         try:
             found = self._stopped(note)
-        except Exception as error:  # noqa: BLE001  the one who waits is told, whatever it is
+        except Exception as error:  # noqa: BLE001  it is the result, whatever it is
             found = StopResult(note.bench, False, str(error) or type(error).__name__)
         latching.join(LATCH_S)
         if found.stands:
@@ -110,7 +115,7 @@ class StopAttempt:
         return self._at_instruments(note)
 
     def _by_process(self, bench: str, path: str, heard_within_s: float) -> StopResult:
-        """Stop through a process. Raises OSError where it does not answer, or is not heard by what drives the bench."""
+        """Stop through a process. Raises OSError where it does not answer, or does not reach what drives the bench."""
         begun_s, last = self._clock.now_s(), Word("asked")
         for last in ask(path, self._stop, SILENT_S, heard_within_s):
             self.text = last.text or self.text
@@ -182,11 +187,11 @@ def at_instruments(note: DriverNote, say: Callable[[str], None]) -> StopResult:
     from labctl.stop.instruments_stop import stop_instruments  # noqa: PLC0415  it loads the drivers' libraries
 
     left = stop_instruments(note.document, say)
-    return StopResult(note.bench, left.stands, f"its instruments were told directly: {left.text}")
+    return StopResult(note.bench, left.stands, f"its instruments were stopped directly: {left.text}")
 
 
 def end_process(process: ProcessId) -> str:
-    """End a process at once, so that nobody else drives its bench; returns what kept it, empty when it is gone."""
+    """End a process at once, so that no other process drives its bench; returns what kept it, empty when it is gone."""
     if not process.lives:
         return ""
     try:

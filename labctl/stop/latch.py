@@ -29,7 +29,7 @@ MARK_ID = "mark"
 
 @dataclass(frozen=True)
 class StopRequest:
-    """Somebody asked for a stop."""
+    """A stop that was asked for."""
 
     id: str
     at: str  #: ISO 8601, UTC
@@ -59,7 +59,7 @@ class LatchState:
 
     @property
     def unconfirmed(self) -> tuple[StopRequest, ...]:
-        """The open stops after which nobody has confirmed yet that the table stands."""
+        """The open stops after which it is not confirmed yet that the table stands."""
         return tuple(stop for stop in self.open if stop.id not in self.at_rest)
 
 

@@ -2,7 +2,7 @@
 
 The folder of a bench is beside the SQLite file; for a database on a server it is in the user's state folder. A pointer
 in the state folder leads to the folder of every bench that this user has driven, so that a stop finds a bench without
-being told its database.
+knowing its database.
 """
 
 from __future__ import annotations

@@ -52,7 +52,7 @@ def main(words: Sequence[str]) -> int:
 
 
 def run(asked: Asked) -> int:
-    """Stop what was asked for, print what came of it; returns the exit status."""
+    """Stop what was asked for, print the result; returns the exit status."""
     try:
         results = stop_all(asked)
     except WrongUse as error:

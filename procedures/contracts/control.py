@@ -71,7 +71,7 @@ class Control:
         return request
 
     def leave_step(self) -> None:
-        """Note that the thread that drives the bench makes it safe from now on: no wait of it is cut short."""
+        """Note that the thread that drives the bench makes it safe from now on: no wait of it is interrupted."""
         self._released = True
         self._heard.set()
 

@@ -17,7 +17,7 @@ PAUSES_S = (2.0, 10.0, 30.0)
 #: The first part of the safe state.
 TABLE = "table to rest"
 
-#: Is told of each part that was tried: which, and what could not be confirmed, empty when it is confirmed.
+#: Called for each part that was tried: which, and what could not be confirmed, empty when it is confirmed.
 Note = Callable[[str, str], None]
 
 
@@ -31,7 +31,7 @@ def make_safe(
     """Bring the bench to its safe state; returns what could not be confirmed, empty when all is well.
 
     Every part is tried even when another fails; what failed is tried again after each of the pauses, after all the
-    others. An interrupt (Ctrl-C) during a part makes it be tried once more. `note` is told of each part; it may
+    others. An interrupt (Ctrl-C) during a part makes it be tried once more. `note` is called for each part; it may
     neither block nor raise.
     """
     if bench.table is None:

@@ -144,7 +144,9 @@ def abort(
         except (StoreError, BenchSilent) as error:
             if stopped is None or not stopped.stands:
                 raise
-            raise NotRecorded(f"{stopped.text}; that is not recorded yet: {error}") from error
+            raise NotRecorded(
+                f"{stopped.text}; that is not recorded yet ({error}); start the service, which records it"
+            ) from error
     print_json(answer) if as_json else print_campaign(answer)
     if stopped is not None and not stopped.stands:
         raise typer.Exit(1)

@@ -10,7 +10,6 @@ import typer
 
 from labctl.cli.command_log import log_of_command
 from labctl.cli.error_reporting import one_clear_line
-from labctl.cli.interrupts import process_ends
 from labctl.cli.options import BenchName, Database, Json, SimulatedStart, simulated_start
 from labctl.cli.output import console, print_json, stderr
 
@@ -51,7 +50,6 @@ def serve(
     from labctl.processes.settings import ServeRequest
     from labctl.processes.supervisor import Ready, serve_forever
     from labctl.services.schemas.service import ServiceReady
-    from labctl.stop.priority import first_of_all
 
     with one_clear_line():
         start_at = simulated_start(simulated_from)
@@ -73,8 +71,6 @@ def serve(
         for text in filter(None, (unconfirmed, cut_short)):
             console.print(text, style="yellow", markup=False, soft_wrap=True)
 
-    if process_ends():
-        first_of_all()
     with one_clear_line(), log_of_command("supervisor", default="info", location=request.location):
         left = serve_forever(request, ready)
     stderr.print(f"labctl: stopped{'; ' if left else ''}{left}", markup=False)

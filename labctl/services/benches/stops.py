@@ -22,7 +22,9 @@ log = get_logger()
 
 #: The clocks of the one who asks and of the audit trail are the same, but for the time of a transaction.
 EARLIER = timedelta(minutes=1)
-#: From here on a person is told that the bench is not stopped.
+#: A disk that stands still delays what waits for the latch by so much at most, s.
+WRITTEN_WITHIN_S = 2.0
+#: From here on it is reported that the bench is not stopped.
 LATE = timedelta(seconds=3)
 
 
@@ -36,6 +38,7 @@ class BenchStops:
         self._latch = self.place.latch
         self._guard = threading.Lock()
         self._recorded: set[str] = set()
+        self._writing: list[threading.Thread] = []
         self._seen: tuple[tuple[int, int], LatchState] = ((0, 0), LatchState())
 
     def prepare(self) -> None:
@@ -48,7 +51,9 @@ class BenchStops:
 
     @property
     def state(self) -> LatchState:
-        """What the latch says now."""
+        """What the latch says now, with what is being written into it."""
+        while self._writing:
+            self._writing.pop().join(WRITTEN_WITHIN_S)
         stamp = self._latch.stamp
         if stamp == (0, 0) or stamp != self._seen[0]:
             self._seen = (stamp, self._latch.state())
@@ -63,7 +68,9 @@ class BenchStops:
             except OSError as error:
                 log.error("latch.unwritable", bench=self._bench, error=str(error))
 
-        threading.Thread(target=write, name="latch", daemon=True).start()
+        thread = threading.Thread(target=write, name="latch", daemon=True)
+        self._writing.append(thread)
+        thread.start()
 
     def record(self, stop: StopRequest, at: datetime) -> None:
         """Write a stop into the audit trail, unless it is there. Raises StoreError."""
@@ -98,9 +105,9 @@ class BenchStops:
             self.carried_out(stops, text)
 
     def refuse_moving(self, by: str | None) -> None:
-        """Let the bench move again in the name of a person; None: in nobody's.
+        """Let the bench move again in the name of a person; None: no person asks for it.
 
-        Raises BenchBusy while a stop is not carried out, and in nobody's name while one holds.
+        Raises BenchBusy while a stop is not carried out, and without a person while one holds.
         """
         state = self.state
         if state.open:

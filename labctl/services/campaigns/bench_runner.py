@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from dataclasses import replace
 
 from instruments.bench_config import BenchFile
-from instruments.clock import Clock, WallClock
+from instruments.clock import Clock
 from labctl.acting_user import actor
 from labctl.errors import BenchBusy, Conflict, StoreError
 from labctl.log import get_logger
@@ -24,7 +23,7 @@ from labctl.services.campaigns.preparation import Prepared, prepare, refuse_unco
 from labctl.services.campaigns.recovery import CampaignRecovery, secure_bench
 from labctl.services.campaigns.resume import prepare_resume, with_original_simulation
 from labctl.services.campaigns.status import answer_of, campaign_status
-from labctl.services.campaigns.stop_requests import CampaignStop, IdleStop, NotHere
+from labctl.services.campaigns.stop_execution import StopExecution
 from labctl.services.planning.loading import with_drivers
 from labctl.services.schemas.benches import BenchCheckResponse, BenchDescription
 from labctl.services.schemas.campaigns import (
@@ -36,7 +35,6 @@ from labctl.services.schemas.campaigns import (
 )
 from labctl.services.simulation.hidden_effects import with_hidden_effects
 from labctl.stop.latch import StopRequest
-from labctl.stop.wire import Stopping
 from labctl.store import Store
 from procedures.contracts.campaign_state import ENDED, CampaignState
 from procedures.contracts.control import Control
@@ -51,8 +49,6 @@ log = get_logger()
 #: How long an abort waits for the safe state before it returns how far the campaign is.
 SAFE_WITHIN_S = 120.0
 STOPS = "the service stops"
-#: How often the latch is looked at, s of wall time.
-LATCH_LOOK_S = 0.5
 
 
 class BenchRunner:
@@ -76,11 +72,10 @@ class BenchRunner:
         self._job: CampaignJob | None = None
         self._recovery = CampaignRecovery(store, bench, make_clock)
         self._stops = False
-        self._requested: StopRequest | None = None  #: the stop of the campaign that was stopped last
         self.stop_latch = BenchStops(store, bench.name)
-        self._is_safe = False  #: whether the safe state was confirmed here since anything moved
-        self._over = threading.Event()
-        self._latch_watch: threading.Thread | None = None
+        self.stops = StopExecution(
+            self.stop_latch, self._recovery, self._guard, lambda: self._job, lambda: self._may_drive, self._secure_now
+        )
         self._last_check: BenchCheckResponse | None = None
         self.used = False  #: whether anything was asked of the bench here
         self._listeners = ChangeListeners()
@@ -119,7 +114,7 @@ class BenchRunner:
 
     def runs_or_was_stopped(self, campaign: int) -> bool:
         """Return whether a campaign runs, or was the last one asked to stop: its abort may not be recorded yet."""
-        stop = self._requested
+        stop = self.stops.requested
         return (stop is not None and campaign == stop.campaign) or self.runs(campaign)
 
     def runs(self, campaign: int) -> bool:
@@ -148,7 +143,7 @@ class BenchRunner:
 
     def _let_move(self, by: str | None) -> None:
         """Carry out the stops that are open, then let the bench move in a person's name. Raises BenchBusy."""
-        self._carry_out_stops()
+        self.stops.carry_out()
         self.stop_latch.refuse_moving(by)
 
     def _new_control(self) -> Control:
@@ -175,7 +170,7 @@ class BenchRunner:
         job = CampaignJob(self._store.campaigns.get(prepared.id), prepared, control, BenchLending())
         job.thread = threading.Thread(target=self._run, args=(job, prepared), name=f"campaign-{prepared.id}")
         self._job = job
-        self.used, self._is_safe = True, False
+        self.used, self.stops.is_safe = True, False
         if self._stops:  # while the bench was being opened
             control.abort(STOPS)
         if stops := self.stop_latch.state.open:
@@ -213,7 +208,7 @@ class BenchRunner:
         if not self._may_drive:
             return
         with self._guard:
-            self._carry_out_stops()
+            self.stops.carry_out()
         self._recovery.resume_newest(
             lambda number: self.resume(number, ResumeRequest(by="the service"), attended=False), self._secure
         )
@@ -226,7 +221,7 @@ class BenchRunner:
         """Make the bench safe, under the guard; returns what is not confirmed."""
         self.used = True
         left = secure_bench(self._store, self._bench, self._make_clock())
-        self._is_safe = not left
+        self.stops.is_safe = not left
         return left
 
     def resume_interrupted(self) -> None:
@@ -272,8 +267,9 @@ class BenchRunner:
             self._recovery.expect_end(job.row.id, str(error))
             raise
         finally:
-            self._is_safe = job.control.is_at_rest(0.0) and not job.control.hindrance
+            self.stops.is_safe = job.control.is_at_rest(0.0) and not job.control.hindrance
             self._job = None
+            self.stops.settle()
             self._listeners.notify()
 
     def listen(self, listener: Callable[[], None]) -> Callable[[], None]:
@@ -287,93 +283,15 @@ class BenchRunner:
             return None
         return answer_of(self._store.campaigns.get(campaign), job.progress, job.control.request)
 
-    def request_stop(self, stop: StopRequest) -> Stopping:
-        """Begin a stop; returns how it goes on. Waits for no lock, no disk and no database."""
-        job = self._job
-        if job is not None and stop.campaign not in {None, job.row.id}:
-            return NotHere(f"bench {self._bench.name} runs campaign {job.row.id}, not campaign {stop.campaign}")
-        if job is None:
-            if stop.campaign is None:
-                self.stop_latch.remember(stop)
-            return IdleStop(lambda: self._stop_idle(stop))
-        stop = replace(stop, campaign=job.row.id)
-        job.control.abort(stop.reason)
-        self._requested = stop
-        self.stop_latch.remember(stop)
-        log.warning("campaign.stop", campaign=job.row.id, bench=self._bench.name, reason=stop.reason)
-        threading.Thread(target=job.stop_if_stuck, name="stop", daemon=True).start()
-        return CampaignStop.of(job)
-
-    def _stop_idle(self, stop: StopRequest) -> CampaignStop | str:
-        """Make a bench safe on which no campaign runs; a campaign that has begun meanwhile is ended."""
-        with self._guard:
-            job = self._job
-            if job is not None and stop.campaign in {None, job.row.id}:
-                job.control.abort(stop.reason)
-                return CampaignStop.of(job)
-            if job is not None:
-                return ""
-            left = self._secure_now()
-            self._carry_out_stops()
-            return left
-
-    def _carry_out_stops(self) -> None:
-        """Carry out what the latch holds open, under the guard, while no campaign runs. Raises StoreError.
-
-        The bench is made safe, what was left unfinished is ended, and each stop is in the audit trail, before the
-        latch is told.
-        """
-        stops = self.stop_latch.state.open
-        if not stops or self._job is not None or not self._may_drive:
-            return
-        left = "" if self._is_safe else self._secure_now()
-        at = WallClock().utc()
-        for stop in stops:
-            self._recovery.close_stopped(stop.campaign, stop.reason)
-            self.stop_latch.record(stop, at)
-        self.stop_latch.carried_out(stops, left or "the bench is in its safe state")
-        log.warning("stop.carried_out", bench=self._bench.name, stops=[stop.reason for stop in stops], unconfirmed=left)
-        self._listeners.notify()
-
-    def watch_latch(self) -> None:
-        """Look at the latch from now on, in a thread: a stop may have been asked for while nobody could be told."""
-        self.stop_latch.prepare()
-        self._latch_watch = threading.Thread(target=self._watch_latch, name="latch-watch", daemon=True)
-        self._latch_watch.start()
-
-    def _watch_latch(self) -> None:
-        while not self._over.wait(LATCH_LOOK_S):
-            try:
-                self.look_at_latch()
-            except Exception as error:  # noqa: BLE001  the stop stays open, and is tried again
-                log.error("stop.not_carried_out", bench=self._bench.name, error=str(error) or type(error).__name__)
-
-    def look_at_latch(self) -> None:
-        """Stop what runs if the latch asks for it, else carry out what is open."""
-        stops = self.stop_latch.state.open
-        if not stops:
-            return
-        job = self._job
-        if job is None:
-            if self._guard.acquire(blocking=False):
-                try:
-                    self._carry_out_stops()
-                finally:
-                    self._guard.release()
-            return
-        for stop in stops:
-            if stop.campaign in {None, job.row.id} and not job.control.request.abort:
-                self.request_stop(stop)
-
     def abort(self, campaign: int, stop: StopRequest) -> CampaignResponse:
         """End the running campaign in the safe state; returns once it is there, or how far it is after a while."""
         job = self._job
         if job is not None and job.row.id == campaign:
             if not job.control.request.abort:
-                self.request_stop(stop)
+                self.stops.request(stop)
             if job.thread is not None:
                 job.thread.join(self.safe_within_s)
-        self._requested = None
+        self.stops.requested = None
         return self.status(campaign) or campaign_status(self._store, campaign)
 
     @property
@@ -398,7 +316,7 @@ class BenchRunner:
 
     def stop_of(self, campaign: int) -> StopRequest | None:
         """Return the stop that was asked of a campaign last, here; None where none was."""
-        stop = self._requested
+        stop = self.stops.requested
         return stop if stop is not None and stop.campaign == campaign else None
 
     def describe(self) -> BenchDescription:
@@ -432,22 +350,12 @@ class BenchRunner:
         """
         with ignore_signals():  # an impatient Ctrl-C must not leave the bench as it is
             self.end_soon()
-            self._over.set()
-            if self._latch_watch is not None:
-                self._latch_watch.join()
+            self.stops.end_soon()
             with self._guard:  # what is being begun is begun, and ended
                 job = self._job
             if job is not None and job.thread is not None:
                 job.thread.join()
             self.safe_state.close()
-            self._carry_out_at_the_end()
+            self.stops.close()
             if self._hold is not None:
                 self._hold.close()
-
-    def _carry_out_at_the_end(self) -> None:
-        """Carry out what is still open; what cannot be written stays open for the next process."""
-        try:
-            with self._guard:
-                self._carry_out_stops()
-        except (StoreError, OSError) as error:
-            log.error("stop.not_carried_out", bench=self._bench.name, error=str(error))

@@ -73,7 +73,7 @@ class IdleStop:
     def _work(self) -> None:
         try:
             found = self._make_safe()
-        except Exception as error:  # noqa: BLE001  the one who asked is told, whatever it is
+        except Exception as error:  # noqa: BLE001  it is the answer, whatever it is
             found = str(error) or type(error).__name__
         if isinstance(found, CampaignStop):
             self._begun = found

@@ -13,8 +13,9 @@ from fastapi.testclient import TestClient
 from instruments.clock import SystemClock
 from labctl import web
 from labctl.api import create_app
-from labctl.api.access_policy import ASKING, LOOPBACK_NAMES, AccessPolicy
+from labctl.api.access_policy import ASKING, AccessPolicy
 from labctl.errors import BadInput, Conflict, NotFound
+from labctl.processes.settings import LOOPBACK_NAMES
 from labctl.services.admin.api_keys import create_key, digest_of, require_an_api_key, revoke_key
 from labctl.services.lab_service import LabService
 from labctl.services.schemas.admin import KeyRequest, Role
@@ -88,7 +89,7 @@ def test_wrong_missing_and_revoked_keys_are_refused_on_every_path(guarded: Guard
     for kind, authorization in guarded.refused.items():
         answer = guarded.ask(method, address(path), authorization)
         if (method, path) in OPEN:
-            assert answer.json().keys() - {"heard_s"} == {"status", "version"}, kind
+            assert answer.json().keys() - {"heard_s", "not_stopped"} == {"status", "version"}, kind
             continue
         assert answer.status_code == 401, kind
         assert answer.headers["www-authenticate"].startswith("Bearer"), kind

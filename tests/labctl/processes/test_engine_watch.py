@@ -10,11 +10,13 @@ import pytest
 
 from instruments.clock import VirtualClock
 from labctl.processes import supervision
+from labctl.processes.held_address import HeldAddress
 from labctl.processes.liveness import ENGINE_SILENT_S, EngineWatch
 from labctl.processes.settings import BenchSettings
 from labctl.processes.supervision import Supervision
 from labctl.processes.waker import Waker
 from labctl.services.campaigns.bench_runner import BenchRunner
+from labctl.services.campaigns.stop_requests import NotHere
 from labctl.services.planning.loading import load_bench
 from labctl.services.schemas.campaigns import CampaignRequest
 from labctl.store import Store, open_store
@@ -77,7 +79,8 @@ def test_a_stuck_engine_sends_one_beat_to_its_supervisor_and_no_more(
     settings = BenchSettings(str(tmp_path / "lab.sqlite"), None, False, 1.0, tmp_path, "http://127.0.0.1:1")
     waker = Waker()
     here, there = Pipe()
-    guarded = Supervision(settings, store, waker, lambda: stuck[0])
+    address = HeldAddress(lambda _: NotHere("no bench"), lambda: "")
+    guarded = Supervision(settings, store, waker, lambda: stuck[0], address, lambda: False)
     guarded.take_charge(settings, there)
     assert here.recv() == "beat"  # the answer that it is in charge
     assert not here.poll(0.2)

@@ -16,6 +16,8 @@ from labctl.acting_user import Actor, acting
 from labctl.errors import BenchSilent, Conflict, NotFound
 from labctl.processes.bench_calls import BenchCalls
 from labctl.processes.calls import CallServer
+from labctl.processes.driver_note import DriverNoteWriter
+from labctl.processes.held_address import HeldAddress
 from labctl.processes.remote_bench import RemoteBench, RemoteWriter
 from labctl.processes.settings import CALLS, STOP, BenchSettings
 from labctl.processes.supervision import Supervision
@@ -25,6 +27,7 @@ from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.lab_service import LabService
 from labctl.services.local_bench import LocalBench
 from labctl.services.planning.loading import load_bench
+from labctl.stop.wire import StopServer
 from labctl.store import Store, StoreAddress, open_store
 from labctl.store.connection.transactions import TRANSACTIONS
 
@@ -39,8 +42,11 @@ def folder(tmp_path: Path) -> Iterator[Path]:
     with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
         settings = BenchSettings(store.location, BENCH.name, simulate=True, speed=0.0, folder=tmp_path, url="")
         local = LocalBench(store, WallClock(), BenchRunner(store, BENCH, VirtualClock))
-        calls = BenchCalls(store, local, Supervision(settings, store, waker, lambda: False), WallClock())
-        servers = CallServer(tmp_path / STOP, calls.stop, in_turn=True), CallServer(tmp_path / CALLS, calls.answer)
+        address = HeldAddress(local.request_stop, local.describe_running)
+        supervision = Supervision(settings, store, waker, lambda: False, address)
+        calls = BenchCalls(store, local, supervision, address, WallClock())
+        servers = StopServer(tmp_path / STOP, local.request_stop), CallServer(tmp_path / CALLS, calls.answer)
+        DriverNoteWriter(settings, store, local).write(settings)
         for server in servers:
             server.start()
         yield tmp_path
@@ -87,7 +93,7 @@ def test_every_transaction_is_a_method_of_a_repository(store: Store) -> None:
 
 
 def test_a_campaign_is_started_followed_and_aborted_from_the_web_process(store: Store, folder: Path) -> None:
-    access = RemoteBench(folder, BENCH)
+    access = RemoteBench(folder, BENCH, str(folder / "lab.sqlite"))
     rings = threading.Semaphore(0)
     access.listen(rings.release)
     service = LabService(store, WallClock(), access=access)

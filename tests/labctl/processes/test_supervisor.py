@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 from instruments.clock import WallClock
 from labctl.cli.app import app
 from labctl.errors import BadInput, LabctlError
-from labctl.processes import supervisor
+from labctl.processes import liveness, supervisor
 from labctl.processes.bench_process import open_bench_service
 from labctl.processes.listening import listening
 from labctl.processes.settings import BenchSettings, ServeRequest
@@ -133,7 +133,7 @@ def test_a_service_that_cannot_say_where_it_is_ends_its_processes(tmp_path: Path
 
 
 def test_a_process_that_ends_again_and_again_ends_the_service(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(supervisor, "MOST_RESTARTS", 0)
+    monkeypatch.setattr(liveness, "MOST_RESTARTS", 0)
     location = str(tmp_path / "lab.sqlite")
     reported: list[supervisor.Ready] = []
 

@@ -17,7 +17,7 @@ from labctl.processes import supervisor as module
 from labctl.processes.listening import Listening
 from labctl.processes.liveness import Elapsed
 from labctl.processes.settings import BenchSettings, ServeRequest
-from labctl.processes.supervisor import LOOK_S, SILENT_S, Supervisor
+from labctl.processes.supervisor import LOOK_S, STARTS_WITHIN_S, Supervisor
 from labctl.processes.waker import Waker
 from labctl.store import Holder
 
@@ -47,7 +47,8 @@ class Machine:
     started: int = 0
     folders: list[Path] = field(default_factory=list)
 
-    def line(self, settings: BenchSettings, pid: int, _child: object = None) -> str:
+    def line(self, settings: BenchSettings, pid: int, _child: object = None, listener: object = None) -> str:
+        assert listener is None
         self.asked += 1
         self.folders.append(settings.folder)
         if self.asked <= self.answers_after:
@@ -66,6 +67,8 @@ class FakeListening:
     """Where the service would answer."""
 
     url: str = "http://127.0.0.1:1"
+    name: str = "127.0.0.1"
+    socket: None = None
 
 
 @pytest.fixture
@@ -112,7 +115,7 @@ def test_one_that_never_answers_is_named_after_the_time_in_which_it_must(
     machine, waker = Machine(holder(tmp_path), answers_after=10_000), FakeWaker(VirtualClock())
     with pytest.raises(Conflict, match="another process writes"):
         opened(machine, waker)
-    assert waker.waits == pytest.approx(SILENT_S / LOOK_S, abs=2)
+    assert waker.waits == pytest.approx(STARTS_WITHIN_S / LOOK_S, abs=2)
 
 
 def test_a_command_that_holds_the_database_is_refused_at_once(opened: Callable[[Machine, FakeWaker], object]) -> None:

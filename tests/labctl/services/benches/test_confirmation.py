@@ -281,7 +281,7 @@ def test_a_campaign_in_the_foreground_that_leaves_its_bench_unconfirmed_ends_wit
 ) -> None:
     location = str(tmp_path / "lab.sqlite")
     for module in ("step_handlers", "shutdown"):
-        monkeypatch.setattr(f"procedures.execution.{module}.make_safe", lambda *_: ("table to rest: no answer",))
+        monkeypatch.setattr(f"procedures.execution.{module}.make_safe", lambda *_, **__: ("table to rest: no answer",))
     ended = labctl(location, "campaign", "start", "short", "--bench", BENCH.name)
     assert (ended.exit_code, "NOT confirmed safe: table to rest: no answer" in ended.stdout) == (1, True)
     for again in (("start", "short", "--bench", BENCH.name), ("resume", "1")):

@@ -15,6 +15,7 @@ from labctl.services.commands.requests import ToCampaign
 from labctl.services.commands.service_control import ServiceControl
 from labctl.services.planning.loading import load_bench
 from labctl.services.schemas.campaigns import CampaignRequest, ReasonRequest
+from labctl.stop.latch import StopRequest
 from labctl.store import Store, open_store
 
 
@@ -31,7 +32,7 @@ def test_a_campaign_that_ended_by_the_stop_is_answered_and_written_down_and_the_
     control = ServiceControl(runner)
     context = CommandContext(lambda: store, VirtualClock(), control)
     campaign = runner.start(CampaignRequest(recipe="short")).id
-    assert runner.stop_now(campaign, "tea")
+    assert runner.stops.request(StopRequest.new("Ada", "key", "tea", campaign)).campaign == campaign
     runner.close()  # the campaign is over, in the safe state
     asked = ToCampaign(campaign, ReasonRequest(reason="tea"))
     answer = control.abort(context, asked)

@@ -20,6 +20,7 @@ from labctl.services.commands.requests import ToCampaign
 from labctl.services.commands.service_control import ServiceControl
 from labctl.services.planning.loading import load_bench
 from labctl.services.schemas.campaigns import CampaignRequest, CampaignResponse, ReasonRequest
+from labctl.stop.latch import StopRequest
 from labctl.store import Store, open_store
 from labctl.store.connection import writer_turn
 from procedures.execution import shutdown
@@ -104,7 +105,7 @@ def test_an_abort_stops_the_table_while_the_engine_waits_for_the_writer(
         assert turns.wait(60.0)
         job = runner._job
         assert job is not None
-        runner.abort(campaign, "a hand in the bench")
+        runner.abort(campaign, StopRequest.new("Ada", "key", "a hand in the bench", campaign))
         assert stopped.wait(15.0)  # before the writer's deadline
         assert moved == [True, False]
         assert job.thread is not None
@@ -120,14 +121,14 @@ def test_an_abort_is_written_down_after_it_is_done(store: Store, monkeypatch: py
     runner = BenchRunner(store, BENCH, VirtualClock)
     done: list[str] = []
 
-    def abort(campaign: int, reason: str) -> CampaignResponse:
-        done.append(f"aborted: {reason}")
+    def abort(campaign: int, stop: StopRequest) -> CampaignResponse:
+        done.append(f"aborted: {stop.reason}")
         return campaign_status(store, campaign)
 
     monkeypatch.setattr(runner, "runs", lambda _: True)
     monkeypatch.setattr(runner, "abort", abort)
     real = store.audit.record
-    monkeypatch.setattr(store.audit, "record", lambda *given: (done.append(given[1]), real(*given)))
+    monkeypatch.setattr(store.audit, "record", lambda *given, **who: (done.append(given[1]), real(*given, **who)))
     context = CommandContext(lambda: store, SystemClock(), ServiceControl(runner))
     asked = ToCampaign(prepared.id, ReasonRequest(reason="smoke", by="Ada"))
     assert context.control.abort(context, asked).unrecorded == ""
@@ -135,7 +136,7 @@ def test_an_abort_is_written_down_after_it_is_done(store: Store, monkeypatch: py
     last = store.audit.rows()[-1]
     assert (last.action, last.detail["reason"]) == ("campaign abort", "smoke (Ada)")
 
-    def unwritable(*_: Any) -> None:
+    def unwritable(*_: Any, **__: Any) -> None:
         raise StoreError("the disk is full; nothing was stored", cause="the disk is full")
 
     monkeypatch.setattr(store.audit, "record", unwritable)

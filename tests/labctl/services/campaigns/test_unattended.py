@@ -93,7 +93,7 @@ def test_a_campaign_that_is_given_up_leaves_its_bench_safe_first(store: Store, m
     left_running(store)
     states: list[str] = []
 
-    def safe(*_: Any) -> tuple[str, ...]:
+    def safe(*_: Any, **__: Any) -> tuple[str, ...]:
         states.append(store.campaigns.get(1).state)
         return ("table to rest: it still moves",)
 
@@ -196,7 +196,7 @@ def test_a_bench_is_closed_even_if_what_is_wrong_with_it_cannot_be_written(
     prepared = prepare(store, "short", BENCH, VirtualClock(), clip=False)
     closed: list[str] = []
     monkeypatch.setattr(type(prepared.bench), "close", lambda bench: closed.append(bench.table.name))
-    monkeypatch.setattr("procedures.execution.shutdown.make_safe", lambda *_: ("table to rest: no answer",))
+    monkeypatch.setattr("procedures.execution.shutdown.make_safe", lambda *_, **__: ("table to rest: no answer",))
 
     def full(*_: Any) -> None:
         raise StoreError("the disk is full")
@@ -309,7 +309,8 @@ def test_a_bench_whose_campaign_was_killed_says_so_and_begins_no_other(left: str
     with open_store(left, write=True) as opened:
         assert len(opened.campaigns.all()) == 1
         assert "labctl campaign" not in labctl(left, "bench", "status").stdout  # a process writes: it may be running
-    assert labctl(left, "campaign", "abort", "1").exit_code == 0
+    aborted = labctl(left, "campaign", "abort", "1")  # whose instruments do not answer
+    assert (aborted.exit_code, "NOT STOPPED: bench single-axis-sim" in aborted.stderr) == (1, True)
     again = json.loads(labctl(left, "bench", "status", "--json").stdout)[0]
     assert (again["left"], "before it could make the bench safe" in again["unconfirmed"]) == ([], True)
 
@@ -329,7 +330,7 @@ def test_a_disk_that_fills_up_below_a_campaign_says_what_is_left_and_how_it_goes
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, complaints: tuple[str, ...], said: str
 ) -> None:
     disk, location = FullDisk(monkeypatch), str(tmp_path / "lab.sqlite")
-    monkeypatch.setattr("procedures.execution.shutdown.make_safe", lambda *_: complaints)
+    monkeypatch.setattr("procedures.execution.shutdown.make_safe", lambda *_, **__: complaints)
 
     def fills(answer: Any) -> None:
         disk.full = disk.full or answer.step == 5

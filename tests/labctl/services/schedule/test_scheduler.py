@@ -47,7 +47,8 @@ class Lab:
     def resume_interrupted(self) -> None:
         self.went_on += 1
 
-    def start(self, request: CampaignRequest) -> CampaignResponse:
+    def start(self, request: CampaignRequest, *, attended: bool) -> CampaignResponse:
+        assert not attended
         if self.refusal is not None:
             raise self.refusal
         self.begun.append((self.clock.utc(), request.recipe))
