@@ -572,6 +572,28 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/stop": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Stop the bench
+         * @description Stop whatever runs on this service's bench, now, and keep the bench from moving until a person lets it.
+         *
+         *     Status 503 (`not-stopped`) where it is not known within some seconds that the table stands: use the stop switch.
+         */
+        post: operations["stop_api_stop_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/benches/{bench}/clear": {
         parameters: {
             query?: never;
@@ -1850,6 +1872,8 @@ export interface components {
              * @default 0
              */
             heard_s: number;
+            /** @description The newest stop that is not carried out yet, or not taken back; null: none. */
+            stop: components["schemas"]["BenchStop"] | null;
             /**
              * Speed
              * @description Speed of simulated time that was asked for, times real time; null: no campaign runs, the time is that of this computer, or it runs as fast as possible.
@@ -1892,6 +1916,8 @@ export interface components {
              * @default 0
              */
             heard_s: number;
+            /** @description The newest stop that is not carried out yet, or not taken back; null: none. */
+            stop: components["schemas"]["BenchStop"] | null;
             /**
              * Speed
              * @description Speed of simulated time that was asked for, times real time; null: no campaign runs, the time is that of this computer, or it runs as fast as possible.
@@ -1948,6 +1974,50 @@ export interface components {
              * @description Interrupted campaigns: their process ended before they did.
              */
             left: string[];
+            /** @description The newest stop that is not carried out yet, or not taken back; null: none. */
+            stop: components["schemas"]["BenchStop"] | null;
+        };
+        /**
+         * BenchStop
+         * @description A stop that is not carried out yet, or that keeps the bench from moving by itself.
+         */
+        BenchStop: {
+            /**
+             * Id
+             * @description Identifier of the stop, as in the audit trail.
+             */
+            id: string;
+            /**
+             * At
+             * @description When the stop was asked for, ISO 8601, UTC.
+             */
+            at: string;
+            /**
+             * By
+             * @description Who asked for the stop.
+             */
+            by: string;
+            /**
+             * Reason
+             * @description Why the stop was asked for.
+             */
+            reason: string;
+            /**
+             * Campaign
+             * @description The campaign that the stop ends; null: whatever runs on the bench.
+             */
+            campaign: number | null;
+            /**
+             * Phase
+             * @description asked: no process has confirmed the stop, the table may turn. stopping: the bench is being made safe. stopped: the stop is carried out; nothing moves by itself until a person starts or resumes a campaign, or clears the bench.
+             * @enum {string}
+             */
+            phase: "asked" | "stopping" | "stopped";
+            /**
+             * Text
+             * @description How far the stop is, and what keeps it, in words.
+             */
+            text: string;
         };
         /**
          * BenchUnit
@@ -4264,6 +4334,12 @@ export interface components {
              * @description Time since the last answer of the process that drives the bench, s.
              */
             heard_s: number;
+            /**
+             * Not Stopped
+             * @description What is known of a stop that was asked for more than 3 s ago while it is not confirmed that the table stands; empty: there is no such stop.
+             * @default
+             */
+            not_stopped: string;
         };
         /**
          * HeldCoefficientJson
@@ -6597,6 +6673,32 @@ export interface components {
             };
         };
         /**
+         * StopResponse
+         * @description What came of a stop of the whole bench.
+         */
+        StopResponse: {
+            /**
+             * Bench
+             * @description Name of the bench.
+             */
+            bench: string;
+            /**
+             * Stands
+             * @description Whether it is confirmed that the table stands.
+             */
+            stands: boolean;
+            /**
+             * Text
+             * @description How the bench was stopped, in words.
+             */
+            text: string;
+            /**
+             * Campaign
+             * @description The campaign that the stop has ended; null: none ran.
+             */
+            campaign: number | null;
+        };
+        /**
          * Surface
          * @description One axis, turned about itself, the others at rest.
          */
@@ -8295,6 +8397,39 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["BenchStatus"][];
+                };
+            };
+        };
+    };
+    stop_api_stop_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ReasonRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["StopResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
                 };
             };
         };

@@ -5,6 +5,7 @@ import { h } from "../core/elements.js";
 import { button, toast } from "../core/components.js";
 import { dialog } from "../core/dialog.js";
 import { navigate } from "../core/router.js";
+import { stopCampaign } from "../core/stop/overlay.js";
 import { canResume } from "../campaigns/states.js";
 
 /** @import { Bench, Campaign, Check, Prompt } from "../../../types/api.js" */
@@ -55,10 +56,11 @@ export const stopButton = (campaign) =>
           },
         );
         if (!answers) return;
-        const answer = await post("/api/campaigns/{campaign}/abort", {
-          path: { campaign },
-          body: { by: answers.by, reason: answers.reason },
-        });
+        const answer = await stopCampaign(campaign, { by: answers.by, reason: answers.reason });
+        if (answer === null) {
+          toast("good", "Stopped. The table stands; the service does not answer.");
+          return;
+        }
         const unsafe = (await get("/api/benches")).find((bench) => bench.unconfirmed);
         if (answer.state !== "aborted") toast("bad", `The campaign is ${answer.state}: ${answer.reason}`);
         else if (unsafe) toast("bad", `Stopped, but the safe state was not confirmed: ${unsafe.unconfirmed}`);

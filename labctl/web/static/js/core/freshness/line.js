@@ -2,6 +2,7 @@
 // State of the document: data-stale="yes" once nothing was heard for STALE_MS, "paused" while the tab was hidden.
 
 import { h, setChildren } from "../elements.js";
+import { reportStop } from "../stop/overlay.js";
 import { freshnessWords, stalenessOf } from "./state.js";
 
 /** @import { Heartbeat } from "../../../../types/api.js" */
@@ -35,6 +36,7 @@ async function ask() {
     /** @type {Heartbeat} */
     const answer = await response.json();
     answered = { at: now(), on: new Date(), bench_s: answer.heard_s ?? null };
+    reportStop(answer.not_stopped);
     window.dispatchEvent(new CustomEvent("labctl:heard"));
   } catch {
     // not heard: the time since the last answer grows

@@ -1,0 +1,188 @@
+"""A stop while processes of the service are frozen or dead, on a table at the end of a wire: by page, command, signal.
+
+What counts is what the table hears: that it is stopped, and that nothing starts it again before a person does.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from labctl.services.schemas.campaigns import BENCH_CHECKS
+from labctl.store import open_store
+from tests.helpers.processes import WAIT_S, ServiceProcess, running
+from tests.helpers.simulator_process import FIRST_DPS, RECIPE, Simulator
+from tests.helpers.waiting import before_next_request
+
+pytestmark = pytest.mark.timeout(400)  # processes that start on a busy machine
+
+ABORT, START = "!1a", {"recipe": RECIPE.format(rate=FIRST_DPS), "confirmed_by": "Ada", "checks": list(BENCH_CHECKS)}
+
+
+@pytest.fixture
+def simulator(tmp_path: Path) -> Iterator[Simulator]:
+    made = Simulator(tmp_path)
+    try:
+        yield made
+    finally:
+        made.close()
+
+
+@pytest.fixture
+def service(simulator: Simulator, tmp_path: Path) -> Iterator[ServiceProcess]:
+    with running(tmp_path / "lab.sqlite", "--bench", str(simulator.bench)) as made:
+        yield made
+
+
+def turning(service: ServiceProcess, simulator: Simulator) -> int:
+    """Start a campaign; returns its number once the table turns."""
+    started = service.http.post("/api/campaigns", json=START)
+    assert started.status_code == 201, started.text
+    wait_until(simulator, lambda line: line["table_turns"])
+    return int(started.json()["id"])
+
+
+def wait_until(simulator: Simulator, holds: Any) -> None:
+    """Wait until the newest line that the table has heard is as expected; a chamber is asked once a while."""
+    while True:  # the test has a time-out
+        lines = [line for line in simulator.heard if line["device"] in {"table", "chamber"}]
+        if lines and holds(lines[-1]):
+            return
+        before_next_request()
+
+
+def status(url: str, campaign: int) -> dict[str, Any]:
+    """Ask until the service answers; returns the campaign."""
+    while True:
+        with contextlib.suppress(httpx.TransportError, ValueError):
+            answer = httpx.get(f"{url}/api/campaigns/{campaign}", timeout=WAIT_S)
+            if answer.status_code == 200:
+                found: dict[str, Any] = answer.json()
+                return found
+        before_next_request()
+
+
+def ended(url: str, campaign: int) -> dict[str, Any]:
+    """Ask until the campaign has ended; returns it."""
+    while (found := status(url, campaign))["state"] not in {"aborted", "failed", "done"}:
+        before_next_request()
+    return found
+
+
+def starts_of(simulator: Simulator, after: int) -> list[dict[str, Any]]:
+    """Return what the table has heard while it turned after a stop was carried out."""
+    return [line for line in simulator.heard[after:] if line["table_turns"]]
+
+
+def test_a_stop_asked_of_a_frozen_bench_process_is_carried_out_and_honoured_by_its_successor(
+    service: ServiceProcess, simulator: Simulator
+) -> None:
+    campaign = turning(service, simulator)
+    os.kill(service.bench_pid, signal.SIGSTOP)
+    asked = service.http.post(f"/api/campaigns/{campaign}/abort", json={"reason": "a hand in the bench", "by": "Ada"})
+    simulator.wait_for(ABORT)
+    assert "NOT STOPPED" not in asked.text, asked.text
+    found = ended(service.url, campaign)
+    assert (found["state"], "a hand in the bench (Ada)" in found["reason"]) == ("aborted", True)
+    quiet = len(simulator.heard)
+    bench = service.http.get("/api/benches").json()[0]
+    assert (bench["campaign"], bench["stop"]["phase"]) == (None, "stopped")
+    with open_store(str(service.database), write=False) as store:
+        rows = [row for row in store.audit.rows() if row.action == "campaign abort"]
+    assert [row.detail["reason"] for row in rows] == ["a hand in the bench (Ada)"]
+    scheduled = service.http.post("/api/campaigns", json={**START, "at": "now"})
+    assert scheduled.status_code == 202, scheduled.text
+    for _ in range(20):
+        before_next_request()
+    assert starts_of(simulator, quiet) == []  # what is scheduled waits for a person
+    assert service.http.post("/api/benches/single-axis-sim/clear", json={"by": "Ada"}).status_code == 200
+    wait_until(simulator, lambda line: line["table_turns"])
+
+
+def test_with_supervisor_and_bench_process_dead_the_command_goes_to_the_instruments(
+    service: ServiceProcess, simulator: Simulator
+) -> None:
+    campaign = turning(service, simulator)
+    service.process.kill()
+    os.kill(service.bench_pid, signal.SIGKILL)
+    service.process.wait()
+    stopped = service.run("stop", "--json")
+    (bench,) = json.loads(stopped.stdout)["benches"]
+    assert (bench["stands"], "stopped directly: table at rest" in bench["text"]) == (True, True)
+    simulator.wait_for(ABORT)
+    quiet = len(simulator.heard)
+    with running(service.database, "--bench", str(simulator.bench)) as heir:
+        assert ended(heir.url, campaign)["state"] == "aborted"
+        assert heir.http.get("/api/benches").json()[0]["stop"]["phase"] == "stopped"
+        assert starts_of(simulator, quiet) == []
+
+
+def test_an_abort_with_no_process_left_stops_the_table_first(service: ServiceProcess, simulator: Simulator) -> None:
+    campaign = turning(service, simulator)
+    service.process.kill()
+    os.kill(service.bench_pid, signal.SIGKILL)
+    service.process.wait()
+    assert json.loads(service.run("campaign", "abort", str(campaign), "--json").stdout)["state"] == "aborted"
+    simulator.wait_for(ABORT)
+    wait_until(simulator, lambda line: not line["table_turns"])
+
+
+def test_a_bench_process_without_its_service_answers_at_the_address_and_gives_it_back(
+    service: ServiceProcess, simulator: Simulator
+) -> None:
+    campaign = turning(service, simulator)
+    service.process.kill()
+    service.process.wait()
+    while True:  # the page opens once the bench process knows that it is alone
+        with contextlib.suppress(httpx.TransportError):
+            shown = httpx.get(service.url, timeout=WAIT_S)
+            break
+        before_next_request()
+    assert (shown.status_code, f"Campaign {campaign} runs" in shown.text) == (503, True)
+    at = service.url.rpartition(":")[2]
+    with running(service.database, "--bench", str(simulator.bench), "--port", at) as heir:
+        assert (heir.url, heir.bench_pid) == (service.url, service.bench_pid)
+        assert heir.http.get(f"/api/campaigns/{campaign}").json()["state"] == "running"
+        heir.process.kill()
+        heir.process.wait()
+        while True:
+            with contextlib.suppress(httpx.TransportError):
+                stopped = httpx.post(f"{service.url}/api/campaigns/{campaign}/abort", json={}, timeout=WAIT_S)
+                break
+            before_next_request()
+        assert (stopped.status_code, stopped.json()["stands"]) == (200, True)
+        simulator.wait_for(ABORT)
+
+
+def test_sigterm_with_a_frozen_bench_process_leaves_the_table_at_rest_and_says_so(
+    service: ServiceProcess, simulator: Simulator
+) -> None:
+    campaign = turning(service, simulator)
+    os.kill(service.bench_pid, signal.SIGSTOP)
+    service.process.send_signal(signal.SIGTERM)
+    simulator.wait_for(ABORT)
+    _, said = service.process.communicate(timeout=WAIT_S)
+    assert (service.process.returncode, "table at rest" in said) == (0, True)
+    quiet = len(simulator.heard)
+    with running(service.database, "--bench", str(simulator.bench)) as heir:
+        found = ended(heir.url, campaign)
+        assert (found["state"], "the service was asked to end" in found["reason"]) == ("aborted", True)
+        assert heir.http.get("/api/benches").json()[0]["stop"] is None  # the end of a service holds nothing
+        assert starts_of(simulator, quiet) == []
+
+
+def test_a_frozen_web_process_keeps_no_stop_from_the_table(service: ServiceProcess, simulator: Simulator) -> None:
+    campaign = turning(service, simulator)
+    os.kill(service.web_pid, signal.SIGSTOP)
+    asked = httpx.post(f"{service.url}/api/campaigns/{campaign}/abort", json={"reason": "smoke"}, timeout=WAIT_S)
+    simulator.wait_for(ABORT)
+    assert asked.json()["stands"] is True
+    assert ended(service.url, campaign)["state"] == "aborted"
