@@ -20,6 +20,7 @@ STUDIES = (
     "crash_recovery",
     "process_kill",
     "process_pairs",
+    "stops",
     "faults",
     "attacks",
     "endurance",

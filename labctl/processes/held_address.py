@@ -17,9 +17,14 @@ log = get_logger()
 class HeldAddress:
     """One listening socket at most; any thread may use it."""
 
-    def __init__(self, respond: Callable[[StopRequest], Stopping], describe: Callable[[], str]) -> None:
-        """Answer stops with `respond`, and requests for the page with what `describe` says."""
-        self._respond, self._describe = respond, describe
+    def __init__(
+        self, respond: Callable[[StopRequest], Stopping], describe: Callable[[], str], *, relays: bool = False
+    ) -> None:
+        """Answer stops with `respond`, and requests for the page with what `describe` says.
+
+        With `relays` a web process will answer there again: what is no stop waits for it.
+        """
+        self._respond, self._describe, self._relays = respond, describe, relays
         self._guard = threading.Lock()
         self._listener: socket.socket | None = None
         self._page: StopPage | None = None
@@ -35,7 +40,7 @@ class HeldAddress:
         with self._guard:
             if self._listener is None or self._page is not None:
                 return
-            self._page = StopPage(self._listener, access, self._respond, self._describe)
+            self._page = StopPage(self._listener, access, self._respond, self._describe, relays=self._relays)
             self._page.start()
             log.warning("stop_page.opened", address="{}:{}".format(*self._listener.getsockname()[:2]))
 

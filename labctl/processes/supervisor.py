@@ -36,9 +36,9 @@ from labctl.processes.web_keeper import WebKeeper
 from labctl.services.benches.bench_left import BenchLeft
 from labctl.services.campaigns.stop_requests import NotHere
 from labctl.services.planning.loading import load_bench, with_drivers
-from labctl.stop.client import AttemptedStop, StopAttempt
+from labctl.stop.client import AttemptedStop, StopAttempt, end_process
 from labctl.stop.latch import StopRequest
-from labctl.stop.places import BenchPlace, place_of
+from labctl.stop.places import BenchPlace, ProcessId, place_of
 from labctl.stop.wire import Stopping
 from procedures.execution.signals import ENDING, restore
 
@@ -85,11 +85,19 @@ def serve_forever(request: ServeRequest, ready: Callable[[Ready], None]) -> str:
 
 
 def _ask_for_address(request: ServeRequest) -> None:
-    """Ask a bench process whose service is gone, and which answers at its address, to give the address back."""
+    """Ask a bench process whose service is gone, and which answers at its address, to give the address back.
+
+    One that does not answer is ended: it would be ended when this service takes charge, and its bench is made safe.
+    """
     with contextlib.suppress(LabctlError):
         holder = bench_process_of(request)
-        if holder is not None and holder.calls is not None:
+        if holder is None or holder.calls is None:
+            return
+        try:
             Caller(Path(holder.calls) / CALLS, ADDRESS_S).call("address.give_back")
+        except BenchSilent:
+            log.error("child.silent", child="bench", child_pid=holder.pid, silent_s=ADDRESS_S)
+            end_process(ProcessId.of(holder.pid))
 
 
 @contextmanager
@@ -158,6 +166,12 @@ class Supervisor:
             return NotHere("this service drives no bench")
         return AttemptedStop(StopAttempt(self._place, stop))
 
+    def _secure_orphan(self) -> None:
+        """Make safe a bench whose process has ended without doing so, before another one starts."""
+        note = None if self._place is None else self._place.note()
+        if note is not None and not note.left and not note.simulated and not note.driver.lives:
+            self._secured()
+
     def _secured(self) -> GuardianStop | None:
         """Let the guardian make safe the bench of a process that has ended; returns the result."""
         if self._guardian is None:
@@ -190,6 +204,7 @@ class Supervisor:
             if (found := self._find_bench()) is not None:
                 return found
             self._folder = Path(tempfile.mkdtemp(prefix="labctl-"))
+            self._secure_orphan()
             try:
                 return self._start_bench()
             except Conflict:

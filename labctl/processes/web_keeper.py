@@ -43,7 +43,7 @@ class WebKeeper:
     ) -> None:
         """Start a process, which loads its modules; `respond` begins a stop that is asked for meanwhile."""
         self._at, self._waker, self._settings = at, waker, settings
-        self._address = HeldAddress(respond, lambda: "labctl starts its web process again.")
+        self._address = HeldAddress(respond, lambda: "labctl starts its web process again.", relays=True)
         self._restarts = Restarts()
         self._over = threading.Event()
         self._failure: LabctlError | None = None

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import closing
 from dataclasses import dataclass
-from typing import Any
 
 from instruments.bench import open_bench
 from instruments.bench_config import BenchFile
@@ -26,7 +25,7 @@ class InstrumentsLeft:
 
 
 def stop_instruments(
-    document: dict[str, Any],
+    document: Mapping[str, object],
     say: Callable[[str], None] = lambda _: None,
     stands: Callable[[], None] = lambda: None,
 ) -> InstrumentsLeft:

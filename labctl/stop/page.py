@@ -18,9 +18,11 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 from http.server import BaseHTTPRequestHandler
+from io import BufferedReader, BytesIO
 from pathlib import Path
 from typing import Any
 
+from instruments.clock import SystemClock
 from labctl.stop.latch import StopRequest
 from labctl.stop.wire import LAST, Stopping, Word, phases
 
@@ -29,6 +31,10 @@ PATIENCE_S = 5.0
 #: A stop is answered after this at the latest, with how far it is, s.
 ANSWER_S = 4.0
 MOST_CALLERS = 32
+#: Requests that wait for the web process, and for how long, s.
+MOST_WAITING, WAITS_S = 200, 60.0
+#: A web process that was only late is back within this, s.
+WEB_BACK_S = 1.0
 BODY_BYTES = 16 * 1024
 STOP_PATH = re.compile(r"/api/(?:stop|campaigns/(\d+)/abort)")
 OPERATORS = frozenset({"operator", "approver"})
@@ -60,11 +66,19 @@ class StopPage:
         access: PageAccess,
         respond: Callable[[StopRequest], Stopping],
         describe: Callable[[], str],
+        *,
+        relays: bool = False,
     ) -> None:
-        """Answer with what `describe` says of the bench; a stop begins with `respond`."""
+        """Answer with what `describe` says of the bench; a stop begins with `respond`.
+
+        With `relays` a web process will answer here again: a request that is no stop waits for `close`, and is then
+        passed on; a stop is carried out at once, and answered here if that takes longer than `WEB_BACK_S`.
+        """
         self._listener, self._access, self._respond, self._describe = listener, access, respond, describe
+        self._relays, self._closed = relays, threading.Event()
         self._waker, self._woken = socket.socketpair()
         self._callers = threading.Semaphore(MOST_CALLERS)
+        self._waiting = threading.Semaphore(MOST_WAITING)
         self._thread = threading.Thread(target=self._accept, name="stop-page", daemon=True)
 
     def start(self) -> None:
@@ -77,6 +91,7 @@ class StopPage:
         self._waker.send(b"!")
         if self._thread.is_alive():
             self._thread.join()
+        self._closed.set()
         self._waker.close()
         self._woken.close()
 
@@ -93,17 +108,83 @@ class StopPage:
                 threading.Thread(target=self._serve, args=(caller, address), name="stop-caller", daemon=True).start()
 
     def _serve(self, caller: socket.socket, address: Any) -> None:
+        with caller, contextlib.suppress(OSError, ValueError):
+            try:
+                caller.settimeout(PATIENCE_S)
+                request = _peeked(caller)
+                is_stop = request.startswith(b"POST /api/stop") or (
+                    request.startswith(b"POST /api/campaigns/") and b"/abort" in request.partition(b"\r\n")[0]
+                )
+                relayed = self._relays and not is_stop
+                if not relayed:
+                    relayed = not self._answer(caller, address, request)
+            finally:
+                self._callers.release()
+            if relayed:
+                self._pass_on(caller)
+
+    def _answer(self, caller: socket.socket, address: Any, request: bytes) -> bool:
+        """Answer a request; returns False where the web process is back and answers it itself."""
         page = self
 
         class Handler(_Handler):
             access, respond, describe = page._access, staticmethod(page._respond), staticmethod(page._describe)
+            content = request
+
+            def web_is_back(self) -> bool:
+                return page._relays and page._closed.wait(WEB_BACK_S)
 
         try:
-            caller.settimeout(PATIENCE_S)
-            with caller, contextlib.suppress(OSError, ValueError):
-                Handler(caller, address, None)  # type: ignore[arg-type]  # it asks its server for nothing
+            Handler(caller, address, None)  # type: ignore[arg-type]  # it asks its server for nothing
+        except _WebIsBack:
+            return False
+        caller.recv(len(request))  # what is left unread would reset the connection before the answer is read
+        return True
+
+    def _pass_on(self, caller: socket.socket) -> None:
+        """Pass a connection on to the web process, once that answers again."""
+        if not self._waiting.acquire(blocking=False):
+            return
+        try:
+            if self._closed.wait(WAITS_S):
+                caller.settimeout(None)
+                with socket.create_connection(self._listener.getsockname()[:2], PATIENCE_S) as web:
+                    web.settimeout(None)
+                    back = threading.Thread(target=_copy, args=(web, caller), name="relay", daemon=True)
+                    back.start()
+                    _copy(caller, web)
+                    back.join()
         finally:
-            self._callers.release()
+            self._waiting.release()
+
+
+class _WebIsBack(Exception):
+    """The web process answers this request itself."""
+
+
+def _peeked(caller: socket.socket) -> bytes:
+    """Return the head of a request and its body, as far as it is short, and leave it in the socket."""
+    clock = SystemClock()
+    until_s = clock.now_s() + PATIENCE_S
+    while True:
+        found = caller.recv(BODY_BYTES, socket.MSG_PEEK)
+        head, end, body = found.partition(b"\r\n\r\n")
+        length = re.search(rb"\r\ncontent-length: *(\d+)", head, re.IGNORECASE)
+        wanted = int(length[1]) if length else 0
+        if not found or len(found) >= BODY_BYTES or (end and len(body) >= min(wanted, BODY_BYTES)):
+            return found
+        if clock.now_s() > until_s:
+            raise TimeoutError("the request does not come to its end")
+        clock.sleep(0.01)
+
+
+def _copy(source: socket.socket, target: socket.socket) -> None:
+    """Copy bytes until a side has ended."""
+    with contextlib.suppress(OSError):
+        while data := source.recv(65536):
+            target.sendall(data)
+    with contextlib.suppress(OSError):
+        target.shutdown(socket.SHUT_WR)
 
 
 class _Handler(BaseHTTPRequestHandler):
@@ -113,6 +194,16 @@ class _Handler(BaseHTTPRequestHandler):
     access: PageAccess
     respond: Callable[[StopRequest], Stopping]
     describe: Callable[[], str]
+    content: bytes  #: the request, which is still in the socket
+
+    def setup(self) -> None:
+        """Read the request from memory."""
+        super().setup()
+        self.rfile = BufferedReader(BytesIO(self.content))
+
+    def web_is_back(self) -> bool:
+        """Wait a moment for the web process; returns whether it answers again."""
+        return False
 
     def do_GET(self) -> None:
         """Show the page; anything else than a page is answered with 503."""
@@ -141,6 +232,8 @@ class _Handler(BaseHTTPRequestHandler):
         reason = f"{given.get('reason') or 'stopped on the page'} ({by})"
         stop = StopRequest.new(by, "stop page", reason, campaign)
         last = _followed(self.respond(stop))
+        if last.phase == "stands" and self.web_is_back():
+            raise _WebIsBack
         self._tell(last, as_page="text/html" in self.headers.get("Accept", ""))
 
     def _tell(self, last: Word, *, as_page: bool) -> None:

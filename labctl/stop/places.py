@@ -53,7 +53,7 @@ class DriverNote:
     guardian: ProcessId = field(default_factory=ProcessId)
     guardian_socket: str = ""
     simulated: bool = False  #: whether the instruments are in the process itself, and end with it
-    document: dict[str, Any] = field(default_factory=dict)  #: the bench file, for a stop at the instruments
+    document: dict[str, object] = field(default_factory=dict)  #: the bench file, for a stop at the instruments
     left: str = ""  #: how the bench was left, once its process has ended in order
     left_safe: bool = False
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from labctl.store import open_store
+from labctl.store import AuditRow, open_store
 from studies.postgresql_cluster import Cluster
 from tests.helpers.paths import RECIPES
 from tests.helpers.postgresql import running_cluster
@@ -55,15 +55,21 @@ def test_commands_about_a_bench_go_to_the_service_that_drives_it(service: Servic
         assert store.benches.unconfirmed("single-axis-sim") == ""
 
 
-def test_another_process_closes_no_campaign_that_a_terminal_runs(service: ServiceProcess) -> None:
+def test_another_process_ends_a_campaign_through_the_process_that_runs_it(service: ServiceProcess) -> None:
     campaign = begin(service)
     with open_store(service.database, write=True) as store:
         found = store.leases.holder("single-axis-sim")
         assert found is not None
         store.leases.note_address(found.machine, found.pid)  # a driver without a service, as a terminal is
-    refused = service.run("campaign", "abort", str(campaign), status=2)
-    assert f"process {service.bench_pid}" in refused.stderr
-    assert service.http.get(f"/api/campaigns/{campaign}").json()["state"] == "running"
+    aborted = json.loads(service.run("campaign", "abort", str(campaign), "--reason", "tea", "--json").stdout)
+    assert (aborted["state"], "tea" in aborted["reason"]) == ("aborted", True)
+    rows = [row for row in _audit(service) if row.action == "campaign abort"]
+    assert [row.detail["reason"] for row in rows] == ["tea"]
+
+
+def _audit(service: ServiceProcess) -> list[AuditRow]:
+    with open_store(service.database, write=False) as store:
+        return store.audit.rows()
 
 
 def test_a_bench_process_that_was_killed_has_an_heir(service: ServiceProcess) -> None:

@@ -131,16 +131,11 @@ def abort(
     """End a running campaign now, in the safe state. The data measured so far are stored."""
     from labctl.errors import BenchSilent, NotRecorded, StoreError
     from labctl.services.campaigns.stop_first import stop_first
-    from labctl.services.commands.open import execute
-    from labctl.services.commands.registry import ABORT_CAMPAIGN
-    from labctl.services.commands.requests import ToCampaign
-    from labctl.services.schemas.campaigns import ReasonRequest
 
     with one_clear_line():
         stopped = stop_first(database, campaign, reason, say=lambda text: stderr.print(f"labctl: {text}", markup=False))
         try:
-            answer = execute(database, ABORT_CAMPAIGN, ToCampaign(campaign, ReasonRequest(reason=reason)))
-            answer = _at_its_end(database, answer)
+            answer = _at_its_end(database, _recorded(database, campaign, reason, stopped is not None))
         except (StoreError, BenchSilent) as error:
             if stopped is None or not stopped.stands:
                 raise
@@ -150,6 +145,23 @@ def abort(
     print_json(answer) if as_json else print_campaign(answer)
     if stopped is not None and not stopped.stands:
         raise typer.Exit(1)
+
+
+def _recorded(database: str | None, campaign: int, reason: str, was_stopped: bool) -> CampaignResponse:
+    """Have an abort recorded; where the campaign has ended by the stop already, its own process has recorded it."""
+    from labctl.errors import Conflict
+    from labctl.service_connection import ServiceRefused
+    from labctl.services.commands.open import current_status, execute
+    from labctl.services.commands.registry import ABORT_CAMPAIGN
+    from labctl.services.commands.requests import ToCampaign
+    from labctl.services.schemas.campaigns import ReasonRequest
+
+    try:
+        return execute(database, ABORT_CAMPAIGN, ToCampaign(campaign, ReasonRequest(reason=reason)))
+    except (Conflict, ServiceRefused) as error:
+        if not was_stopped or error.slug != Conflict.slug:
+            raise
+        return current_status(database, campaign)
 
 
 def _at_its_end(database: str | None, answer: CampaignResponse) -> CampaignResponse:
