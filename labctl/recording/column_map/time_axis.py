@@ -38,6 +38,8 @@ def time_axis(column_map: ColumnMap, column: RawColumn | None, rows: int, proble
                 )
             return None
         return TimeAxis(np.arange(rows) / column_map.sample_rate_hz, None)
+    if column.is_boolean:
+        return None
     mapped = column_map.columns["t_s"]
     name = mapped.unit or column.unit
     unit = find_unit("s", name) if name else None
