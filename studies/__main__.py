@@ -22,6 +22,7 @@ STUDIES = (
     "process_pairs",
     "faults",
     "attacks",
+    "damaged_imports",
     "endurance",
     "log_size",
     "c_points",

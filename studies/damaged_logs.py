@@ -58,7 +58,7 @@ def _ulog(_: Path) -> bytes:
 
 
 def _ros1(folder: Path) -> bytes:
-    from rosbags.rosbag1 import Writer  # noqa: PLC0415  0.3 s that only bags need
+    from rosbags.rosbag1 import Writer
 
     path = folder / "log.bag"
     _fill(Writer(path), ros1=True)
@@ -67,7 +67,7 @@ def _ros1(folder: Path) -> bytes:
 
 def _ros2(storage: str) -> Callable[[Path], bytes]:
     def written(folder: Path) -> bytes:
-        from rosbags.rosbag2 import StoragePlugin, Writer  # noqa: PLC0415  as above
+        from rosbags.rosbag2 import StoragePlugin, Writer
 
         path = folder / storage
         _fill(Writer(path, version=9, storage_plugin=StoragePlugin[storage]), ros1=False)
@@ -77,7 +77,7 @@ def _ros2(storage: str) -> Callable[[Path], bytes]:
 
 
 def _fill(writer: object, *, ros1: bool) -> None:
-    from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415  as above
+    from rosbags.typesys import Stores, get_typestore
 
     store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
     types, imu = store.types, "sensor_msgs/msg/Imu"

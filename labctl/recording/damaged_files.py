@@ -40,10 +40,9 @@ def parsed_by_library(path: Path, kind: str, advice: str) -> Iterator[None]:
     except Exception as error:
         refuse_computer_errors(error)
         if is_of_memory(error):
-            text = (
+            raise BadRecording(
                 f"{path}: needs more memory than an import may take; divide the recording; if it is damaged, {advice}"
-            )
-            raise BadRecording(text) from error
+            ) from error
         raise BadRecording(f"{path}: not a complete {kind} ({reason_of(error)}); {advice}") from error
 
 

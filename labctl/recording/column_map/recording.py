@@ -62,7 +62,7 @@ def recording_of(table: RawTable, column_map: ColumnMap) -> MappedLog:
         if column.is_boolean or not _holds_text(target):
             allowed = valid is not None and target.startswith("gyro_")
             refuse_wrong_cells(column, target, problems, empty_allowed=allowed)
-    times = time_axis(column_map, found.get("t_s"), table.rows, problems)
+    times = _times(column_map, found.get("t_s"), table.rows, problems)
     if column_map.kind == "points" and times is None and "t_s" not in column_map.columns:
         problems.lines = [line for line in problems.lines if not line.startswith("no column of time")]
         times = TimeAxis(np.arange(table.rows, dtype=np.float64), None)
@@ -71,6 +71,12 @@ def recording_of(table: RawTable, column_map: ColumnMap) -> MappedLog:
     problems.raise_if_any()
     assert times is not None  # else a problem was raised
     return _assembled(table, column_map, usable, columns, times, problems)
+
+
+def _times(column_map: ColumnMap, column: RawColumn | None, rows: int, problems: Problems) -> TimeAxis | None:
+    if column is not None and column.is_boolean:
+        return None  # that is a problem already
+    return time_axis(column_map, column, rows, problems)
 
 
 def _is_date(column_map: ColumnMap, column: RawColumn) -> bool:

@@ -34,7 +34,9 @@ def temporary_copy(folder: Path) -> Iterator[Path]:
     made, handle = _locked_folder(folder)
     try:
         path = made / COPY
-        os.close(os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, FILE))
+        file = os.open(path, os.O_CREAT | os.O_EXCL | os.O_WRONLY, FILE)
+        os.fchmod(file, FILE)  # whatever the umask takes away
+        os.close(file)
         yield path
     finally:
         shutil.rmtree(made, ignore_errors=True)
@@ -64,6 +66,7 @@ def _locked_folder(folder: Path) -> tuple[Path, int]:
     while True:
         made = Path(tempfile.mkdtemp(dir=folder, prefix=PREFIX))
         try:
+            made.chmod(stat.S_IRWXU)  # whatever the umask takes away
             handle = os.open(made, os.O_RDONLY | os.O_DIRECTORY)
         except FileNotFoundError:  # a backup that begins at this moment took it for one that was left
             continue

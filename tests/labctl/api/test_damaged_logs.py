@@ -63,7 +63,5 @@ def test_a_boolean_column_that_a_map_names_is_one_problem(client: TestClient, tm
     column_map = "\n".join(["[columns]", *(f"{name} = {value}" for name, value in named.items())])
     refused = client.post(LOGS, files=sent, data={"column_map": column_map})
     assert refused.status_code == 400
-    assert refused.json()["problems"] == [
-        f"column 'gyro_x [rad/s]' (for {target}) holds true and false; expected readings; name another column in the "
-        "map, or leave this one out"
-    ]
+    said = f"column 'gyro_x [rad/s]' (for {target}) holds true and false; expected readings; "
+    assert refused.json()["problems"] == [said + "name another column in the map, or leave this one out"]

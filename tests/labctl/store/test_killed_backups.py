@@ -48,12 +48,8 @@ def folder(tmp_path: Path) -> Path:
 @contextmanager
 def backup_in_the_middle(database: str, target: Path) -> Iterator[tuple[subprocess.Popen[str], Path]]:
     """Give the process of a backup that has made its copy, and the path of the copy."""
-    process = subprocess.Popen(
-        [sys.executable, "-c", STANDS_STILL, database, target],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    words = [sys.executable, "-c", STANDS_STILL, database, str(target)]
+    process = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
         yield process, Path(first_line(process).strip())
     finally:
