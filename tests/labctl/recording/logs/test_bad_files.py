@@ -108,7 +108,7 @@ FILES: dict[str, tuple[Callable[[Path], Path], str]] = {
     "time twice": (lambda p: text(p / "a.csv", with_line(9, LINES[8])), r"\(time\), row 9: 0.07 does not follow 0.07"),
     "a damaged time": (
         lambda p: text(p / "a.csv", with_cell(400, 0, "4e12")),
-        r"\(time\), row 400: 4e\\+12 after 3.98; a recording lasts at most 100000000 s",
+        r"\(time\), row 400: 4e\+12 after 3.98; a recording lasts at most 100000000 s",
     ),
     "a counter that begins again": (
         lambda p: text(
