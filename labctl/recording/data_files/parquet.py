@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from labctl.errors import BadRecording
 from labctl.recording.columns import BY_NAME, holds_flags
-from labctl.recording.damaged_files import parsed_by_library
+from labctl.recording.data_files.damaged_files import parsed_by_library
 from labctl.recording.data_files.limits import VALUE_BYTES, Space, checked_names, refuse_too_large, refuse_too_many
 from labctl.recording.data_files.values import ColumnValues, holds_words
 

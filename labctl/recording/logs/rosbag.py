@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from labctl.errors import BadInput, BadRecording
-from labctl.recording.damaged_files import parsed_by_library
+from labctl.recording.data_files.damaged_files import parsed_by_library
 from labctl.recording.importer import TableImporter, TableOptions
 from labctl.recording.logs.recognition import MOST_LOG_BYTES, head_of, refuse_large
 from labctl.recording.raw_table import RawColumn, RawTable

@@ -15,7 +15,7 @@ from labctl.errors import BadInput, BadRecording, LabctlError
 from labctl.recording import Recording, write_recording
 from labctl.recording.checks import checked, checked_environment
 from labctl.recording.column_map import ColumnMap, FileKeys
-from labctl.recording.damaged_files import refuse_computer_errors
+from labctl.recording.data_files.damaged_files import refuse_computer_errors
 from labctl.recording.importer import Importer, TableImporter
 from labctl.recording.logs.layout import layout_of
 from labctl.recording.logs.recognition import MOST_TEXT_BYTES, head_of, refuse_large, refuse_other

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from labctl.errors import BadInput, BadRecording
-from labctl.recording.damaged_files import parsed_by_library
+from labctl.recording.data_files.damaged_files import parsed_by_library
 
 PATH = Path("log.ulg")
 
