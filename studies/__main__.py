@@ -23,6 +23,7 @@ STUDIES = (
     "stops",
     "faults",
     "attacks",
+    "damaged_imports",
     "endurance",
     "log_size",
     "c_points",

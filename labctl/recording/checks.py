@@ -21,6 +21,8 @@ from labctl.recording.recording import Column
 POSSIBLE = {"table_rate_dps": (-1e5, 1e5), "temperature_c": (-273.15, 1000.0), "chamber_c": (-273.15, 1000.0)}
 #: Largest size of a value: the square of a larger one, as a spread needs it, may overflow.
 LARGEST = 1e100
+#: A recording of more than three years has a damaged time stamp; its gap would be resampled as if it were real, s.
+LONGEST_RECORDING_S = 1e8
 #: The refusal of a recording of free motion.
 NO_REFERENCE = (
     "column 'table_rate_dps' is missing, so the rate of the unit is not known, and free motion alone cannot "
@@ -132,6 +134,14 @@ def _time(path: Path, t_s: NDArray[np.float64], *, strict: bool) -> None:
         raise BadRecording(
             f"{path}: column 't_s', row {row + 1}: {t_s[row]:.9g} s does not follow {t_s[row - 1]:.9g} s "
             "of the row before; sort the rows in the order of measurement"
+        )
+    span_s = float(t_s[-1] - t_s[0]) if len(t_s) else 0.0
+    if span_s > LONGEST_RECORDING_S:
+        row = int(np.argmax(steps)) + 1
+        raise BadRecording(
+            f"{path}: column 't_s', row {row + 1}: {t_s[row]:.9g} s after {t_s[row - 1]:.9g} s in the row before; a "
+            f"recording lasts at most {LONGEST_RECORDING_S:.9g} s; leave out rows with a damaged time, or divide the "
+            "recording"
         )
 
 

@@ -91,6 +91,11 @@ BY_NAME = {column.name: column for column in COLUMNS}
 POSITIONED: frozenset[Motion] = frozenset({"rates", "turns", "profile"})
 
 
+def holds_flags(name: str) -> bool:
+    """Whether a column of a recording holds true and false, as 1 and 0."""
+    return name == "valid"
+
+
 def needed(info: RecordingInfo) -> list[str]:
     """Return the names of the columns that a recording of this kind, motion and these axes must have."""
     if info.kind == "coefficients":

@@ -20,7 +20,8 @@ class RawColumn:
 
     `values` are its numbers, (n,), nan where a cell is empty or no number; `words` its texts where it holds texts.
     `unit` is what the format itself says, empty where it says nothing. `wrong` are the first cells of a column of
-    numbers that are no numbers, as (row, text), of `n_wrong`; rows count from 1.
+    numbers that are no numbers, as (row, text), of `n_wrong`; rows count from 1. `is_boolean`: the format says that
+    the values are true (1) and false (0), which are no readings.
     """
 
     name: str
@@ -29,11 +30,17 @@ class RawColumn:
     unit: str = ""
     wrong: tuple[tuple[int, str], ...] = ()
     n_wrong: int = 0
+    is_boolean: bool = False
 
     @property
     def is_text(self) -> bool:
         """Whether it holds words."""
         return self.words is not None
+
+    @property
+    def is_number(self) -> bool:
+        """Whether its values can be readings: neither words nor true and false."""
+        return not self.is_text and not self.is_boolean
 
     @property
     def is_empty(self) -> bool:
@@ -78,4 +85,8 @@ class RawTable:
 
 
 def _cell(column: RawColumn, row: int) -> str:
-    return str(column.words[row]) if column.words is not None else f"{column.values[row]:.9g}"
+    if column.words is not None:
+        return str(column.words[row])
+    if column.is_boolean and np.isfinite(column.values[row]):
+        return "true" if column.values[row] else "false"
+    return f"{column.values[row]:.9g}"

@@ -14,6 +14,7 @@ from labctl.recording.column_map.model import QUANTITY_COLUMNS, ColumnMap, DataS
 from labctl.recording.column_map.movement import Movement, movement
 from labctl.recording.column_map.names import COUNTERS, PARTS, folded, name_says
 from labctl.recording.column_map.units import find_unit, is_lsb, unit_of_target
+from labctl.recording.columns import holds_flags
 from labctl.recording.raw_table import RawColumn, RawTable
 
 Array = NDArray[np.float64]
@@ -91,6 +92,8 @@ def _by_names(table: RawTable, guesses: list[str]) -> dict[str, MappedColumn]:
 def _with_unit(name: str, target: str, unit: str, column: RawColumn, guesses: list[str]) -> MappedColumn | None:
     """Return the mapped column; None for one that cannot be used without a known unit."""
     quantity = unit_of_target(target)
+    if column.is_boolean:
+        return MappedColumn.of(name) if holds_flags(target) else None
     if target == "t_s" and column.is_text:
         return MappedColumn.of(name, "date-time") if _dates(column) else None
     if column.is_text:

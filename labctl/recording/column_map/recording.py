@@ -19,7 +19,7 @@ from labctl.recording.column_map.problems import Problems
 from labctl.recording.column_map.proposal import serial_of
 from labctl.recording.column_map.sources import refuse_wrong_cells, sources, unused
 from labctl.recording.column_map.time_axis import TimeAxis, time_axis
-from labctl.recording.columns import BY_NAME
+from labctl.recording.columns import BY_NAME, holds_flags
 from labctl.recording.info import Motion, OutputUnit, RecordingInfo
 from labctl.recording.raw_table import RawColumn, RawTable
 from labctl.recording.recording import Recording
@@ -59,18 +59,24 @@ def recording_of(table: RawTable, column_map: ColumnMap) -> MappedLog:
     for target, column in found.items():
         if target == "t_s" and column.is_text and _is_date(column_map, column):
             continue
-        if not _holds_text(target):
+        if column.is_boolean or not _holds_text(target):
             allowed = valid is not None and target.startswith("gyro_")
             refuse_wrong_cells(column, target, problems, empty_allowed=allowed)
-    times = time_axis(column_map, found.get("t_s"), table.rows, problems)
+    times = _times(column_map, found.get("t_s"), table.rows, problems)
     if column_map.kind == "points" and times is None and "t_s" not in column_map.columns:
         problems.lines = [line for line in problems.lines if not line.startswith("no column of time")]
         times = TimeAxis(np.arange(table.rows, dtype=np.float64), None)
-    usable = {target: column for target, column in found.items() if not column.is_text or _holds_text(target)}
+    usable = {target: column for target, column in found.items() if _is_usable(target, column)}
     columns = _columns(column_map, usable, problems)
     problems.raise_if_any()
     assert times is not None  # else a problem was raised
     return _assembled(table, column_map, usable, columns, times, problems)
+
+
+def _times(column_map: ColumnMap, column: RawColumn | None, rows: int, problems: Problems) -> TimeAxis | None:
+    if column is not None and column.is_boolean:
+        return None  # that is a problem already
+    return time_axis(column_map, column, rows, problems)
 
 
 def _is_date(column_map: ColumnMap, column: RawColumn) -> bool:
@@ -81,6 +87,12 @@ def _is_date(column_map: ColumnMap, column: RawColumn) -> bool:
         "iso 8601",
         "datetime",
     }
+
+
+def _is_usable(target: str, column: RawColumn) -> bool:
+    if column.is_boolean:
+        return holds_flags(target)
+    return not column.is_text or _holds_text(target)
 
 
 def _holds_text(target: str) -> bool:

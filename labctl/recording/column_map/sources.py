@@ -9,6 +9,7 @@ import numpy as np
 
 from labctl.recording.column_map.model import ColumnMap
 from labctl.recording.column_map.problems import Problems, rows_text
+from labctl.recording.columns import holds_flags
 from labctl.recording.raw_table import RawColumn, RawTable
 
 
@@ -52,6 +53,12 @@ def unused(table: RawTable, column_map: ColumnMap) -> list[str]:
 
 def refuse_wrong_cells(column: RawColumn, target: str, problems: Problems, *, empty_allowed: bool) -> None:
     """Add a problem for cells that are no numbers, and one for empty cells where none may be."""
+    if column.is_boolean and not holds_flags(target):
+        problems.add(
+            f"column {column.name!r} (for {target}) holds true and false; expected readings; name another column in "
+            "the map, or leave this one out"
+        )
+        return
     if column.words is not None:
         problems.add(
             f"column {column.name!r} (for {target}) holds text, such as {str(column.words[0])[:40]!r}; expected "

@@ -8,6 +8,7 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.recording.checks import LONGEST_RECORDING_S
 from labctl.recording.column_map.model import ColumnMap
 from labctl.recording.column_map.problems import Problems, rows_text
 from labctl.recording.column_map.units import find_unit, names_of
@@ -110,6 +111,12 @@ def _refuse_backwards(column: RawColumn, raw: Array, t_s: Array, problems: Probl
         problems.add(
             f"column {column.name!r} (time), {rows_text(wrong)}: {raw[row]:.12g} does not follow "
             f"{raw[row - 1]:.12g}; {advice}"
+        )
+    elif len(steps) and t_s[-1] - t_s[0] > LONGEST_RECORDING_S:
+        row = int(np.argmax(steps)) + 1
+        problems.add(
+            f"column {column.name!r} (time), row {row + 1}: {raw[row]:.12g} after {raw[row - 1]:.12g}; a recording "
+            f"lasts at most {LONGEST_RECORDING_S:.9g} s; leave out rows with a damaged time, or check the column's unit"
         )
     usual = float(np.median(steps)) if len(steps) else 1.0
     if np.isfinite(usual) and usual > 0 and not SHORTEST_STEP_S <= usual <= LONGEST_STEP_S:

@@ -5,6 +5,7 @@ Both are read in pieces, and a file that holds more than `limits` allow is refus
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from labctl.errors import BadRecording
-from labctl.recording.data_files.parquet import read_parquet
+from labctl.recording.data_files.parquet import read_parquet, refuse_booleans
 from labctl.recording.data_files.text import read_csv
 from labctl.recording.recording import Columns
 
@@ -24,7 +25,9 @@ def read_table(path: Path) -> dict[str, NDArray[np.generic]]:
     """Read a .parquet or .csv file into named columns; raises BadRecording naming file, column and row."""
     if path.stat().st_size == 0:
         raise BadRecording(f"{path}: the file is empty; expected a header and at least one row")
-    return read_parquet(path) if path.suffix == ".parquet" else read_csv(path)
+    if path.suffix == ".parquet":
+        return read_parquet(path, partial(refuse_booleans, path))
+    return read_csv(path)
 
 
 def write_table(columns: Columns, path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,8 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from labctl.errors import BadRecording
-from labctl.recording.columns import BY_NAME
+from labctl.recording.columns import BY_NAME, holds_flags
+from labctl.recording.data_files.damaged_files import parsed_by_library
 from labctl.recording.data_files.limits import VALUE_BYTES, Space, checked_names, refuse_too_large, refuse_too_many
 from labctl.recording.data_files.values import ColumnValues, holds_words
 
@@ -23,21 +25,30 @@ MOST_FOOTER_BYTES = 16 << 20
 MAGIC = b"PAR1"
 
 
-def read_parquet(path: Path) -> dict[str, NDArray[np.generic]]:
+def read_parquet(path: Path, accept: Callable[[pa.Schema], None] | None = None) -> dict[str, NDArray[np.generic]]:
     """Read a Parquet file into named columns; raises BadRecording naming file, column and row.
 
     Rows x columns and the size unpacked are compared with the limits by the footer alone, before a value is read.
+    `accept` is shown the types of the columns before that, and raises where they are not wanted.
     """
-    try:
-        return _read(path)
-    except MemoryError as error:
-        raise BadRecording(f"{path}: needs more memory than this computer has free; divide the recording") from error
-    except (pa.ArrowException, OSError, EOFError, ValueError, OverflowError) as error:
-        first = next(iter(str(error).splitlines()), "") or type(error).__name__
-        raise BadRecording(f"{path}: not a complete Parquet file; write or copy it again: {first[:300]}") from error
+    with parsed_by_library(path, "Parquet file", "write or copy it again"):
+        return _read(path, accept)
 
 
-def _read(path: Path) -> dict[str, NDArray[np.generic]]:
+def refuse_booleans(path: Path, schema: pa.Schema) -> None:
+    """Raise BadRecording for a column of a recording whose readings are true and false instead of numbers."""
+    for field in schema:
+        known = BY_NAME.get(field.name)
+        if known is not None and not (known.kind == "text" or holds_flags(known.name)) and is_boolean(field.type):
+            raise _of_another_type(path, field)
+
+
+def is_boolean(kind: pa.DataType) -> bool:
+    """Whether values of a type are true and false, also where a dictionary stands for them."""
+    return bool(pa.types.is_boolean(kind.value_type if pa.types.is_dictionary(kind) else kind))
+
+
+def _read(path: Path, accept: Callable[[pa.Schema], None] | None) -> dict[str, NDArray[np.generic]]:
     _refuse_large_footer(path)
     with pq.ParquetFile(path, buffer_size=BUFFER_BYTES, pre_buffer=False) as opened:
         metadata, schema = opened.metadata, opened.schema_arrow
@@ -45,6 +56,8 @@ def _read(path: Path) -> dict[str, NDArray[np.generic]]:
     checked_names(path, schema.names)
     for field in schema:
         _refuse_type(path, field)
+    if accept is not None:
+        accept(schema)
     refuse_too_many(path, rows, len(schema.names))
     refuse_too_large(path, _unpacked_bytes(metadata))
     if rows <= 0:
@@ -84,10 +97,15 @@ def _refuse_type(path: Path, field: pa.Field) -> None:
     number = pa.types.is_integer(kind) or pa.types.is_floating(kind) or pa.types.is_decimal(kind)
     if number or holds_words(kind) or pa.types.is_boolean(kind) or pa.types.is_null(kind):
         return
+    raise _of_another_type(path, field)
+
+
+def _of_another_type(path: Path, field: pa.Field) -> BadRecording:
+    kind = field.type.value_type if pa.types.is_dictionary(field.type) else field.type
     known = BY_NAME.get(field.name)
     wanted = "text" if known and known.kind == "text" else f"numbers{f', {known.unit}' if known and known.unit else ''}"
     advice = "write such a column so" if known else "leave the column out, or write it so"
-    raise BadRecording(
+    return BadRecording(
         f"{path}: column {field.name[:80]!r} holds {str(kind)[:80]}; expected {wanted}; {advice}"
         + ("; an instant is the seconds since started_at" if pa.types.is_temporal(kind) else "")
     )

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from labctl.errors import BadInput, BadRecording
+from labctl.recording.data_files.damaged_files import parsed_by_library
 from labctl.recording.importer import TableImporter, TableOptions
 from labctl.recording.logs.recognition import MOST_LOG_BYTES, head_of, refuse_large
 from labctl.recording.raw_table import RawColumn, RawTable
@@ -73,17 +74,12 @@ def _opened(path: Path) -> Iterator[Any]:
     from rosbags.highlevel import AnyReader  # noqa: PLC0415  0.3 s that only bags need
     from rosbags.typesys import Stores, get_typestore  # noqa: PLC0415  as above
 
-    try:
-        with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as bag:
-            yield bag
-    except (BadInput, MemoryError):
-        raise
-    except Exception as error:
-        raise BadRecording(
-            f"{path}: not a complete ROS bag ({type(error).__name__}: {' '.join(str(error).split())[:200]}); "
-            "run `rosbag "
-            "reindex` or `ros2 bag reindex` on it, or record again"
-        ) from error
+    advice = "run `rosbag reindex` or `ros2 bag reindex` on it, or record again"
+    with (
+        parsed_by_library(path, "ROS bag", advice),
+        AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as bag,
+    ):
+        yield bag
 
 
 def _topic(path: Path, bag: Any, asked: str | None, kind: str, option: str) -> str | None:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from labctl.errors import BadInput, BadRecording
+from labctl.recording.data_files.damaged_files import parsed_by_library
 from labctl.recording.importer import TableImporter, TableOptions
 from labctl.recording.logs.recognition import MOST_LOG_BYTES, head_of, refuse_large
 from labctl.recording.raw_table import RawColumn, RawTable
@@ -54,6 +55,11 @@ def read(path: Path, options: ULogOptions) -> RawTable:
     """Return time, output, temperature and specific force of one gyro; raises BadRecording, BadInput."""
     head_of(path)
     refuse_large(path, MOST_LOG_BYTES)
+    with parsed_by_library(path, "ULog file", "take the log off the card again"):
+        return _read(path, options)  # damaged names and types of fields show here, not in the parser
+
+
+def _read(path: Path, options: ULogOptions) -> RawTable:
     log = _parsed(path)
     data = {(each.name, each.multi_id): each.data for each in log.data_list}
     there = sorted(key for key in data if key[0] in TOPICS)
@@ -82,16 +88,9 @@ def read(path: Path, options: ULogOptions) -> RawTable:
 def _parsed(path: Path) -> Any:
     from pyulog.core import ULog  # noqa: PLC0415  0.1 s that only logs need
 
-    try:
-        with redirect_stdout(StringIO()):  # it prints what it finds damaged
-            return ULog(str(path), [*TOPICS, *RECEIVERS, ACCEL])
-    except (MemoryError, OSError):
-        raise
-    except Exception as error:  # the parser raises whatever broken bytes lead it to
-        raise BadRecording(
-            f"{path}: not a complete ULog file ({type(error).__name__}: {str(error)[:200]}); take the log off the "
-            "card again"
-        ) from error
+    # it prints what it finds damaged, and leaves a file that it opened itself open when it fails
+    with path.open("rb") as file, redirect_stdout(StringIO()):
+        return ULog(file, [*TOPICS, *RECEIVERS, ACCEL])
 
 
 def _gyro(path: Path, topic: str, data: Mapping[str, Any]) -> dict[str, Array]:

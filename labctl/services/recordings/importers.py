@@ -15,6 +15,7 @@ from labctl.errors import BadInput, BadRecording, LabctlError
 from labctl.recording import Recording, write_recording
 from labctl.recording.checks import checked, checked_environment
 from labctl.recording.column_map import ColumnMap, FileKeys
+from labctl.recording.data_files.damaged_files import refuse_computer_errors
 from labctl.recording.importer import Importer, TableImporter
 from labctl.recording.logs.layout import layout_of
 from labctl.recording.logs.recognition import MOST_TEXT_BYTES, head_of, refuse_large, refuse_other
@@ -122,15 +123,11 @@ def read_with(
     if isinstance(importer, Importer) and beside:
         raise _nothing_beside(name)
     made: MappedFile | None = None
-    try:
+    with _failures_named(path, name):
         if isinstance(importer, TableImporter):
             made = mapped_file(name, importer, path, given, column_map, [_table(each, column_map) for each in beside])
         else:
             found = instance_of(Recording)(importer.read(path, given))
-    except (LabctlError, MemoryError):
-        raise
-    except Exception as error:
-        raise BadRecording(f"{path}: {failure(plugin, 'read it', error)}") from error
     if made is not None:
         if accept is not None:
             accept(made)
@@ -145,7 +142,20 @@ def log_with_map(path: Path, name: str | None, options: Mapping[str, str], colum
     importer, given = _importer_and_options(chosen, options)
     if not isinstance(importer, TableImporter):
         raise BadInput(f"{path}: importer {chosen} determines the columns itself; import it with `labctl import`")
-    return mapped_file(chosen, importer, path, given, column_map)
+    with _failures_named(path, chosen):
+        return mapped_file(chosen, importer, path, given, column_map)
+
+
+@contextmanager
+def _failures_named(path: Path, name: str) -> Iterator[None]:
+    """Name file and importer in an error that an importer does not explain itself; the computer's own errors pass."""
+    try:
+        yield
+    except (LabctlError, MemoryError):
+        raise
+    except Exception as error:
+        refuse_computer_errors(error)
+        raise BadRecording(f"{path}: {failure(IMPORTERS.plugin(name), 'read it', error)}") from error
 
 
 def _table(path: Path, column_map: ColumnMap | None) -> RawTable:
@@ -156,7 +166,8 @@ def _table(path: Path, column_map: ColumnMap | None) -> RawTable:
     importer, given = _importer_and_options(name, {})
     if not isinstance(importer, TableImporter):
         raise _nothing_beside(name)
-    return importer.table(path, given_layout(given, column_map))
+    with _failures_named(path, name):
+        return importer.table(path, given_layout(given, column_map))
 
 
 def _nothing_beside(name: str) -> BadInput:

@@ -45,7 +45,7 @@ def preview_log(
         title=found.title,
         rows=table.rows,
         columns=[
-            LogColumn(name=name, unit=column.unit, is_text=column.is_text, target=target_of.get(name, ""))
+            LogColumn(name=name, unit=column.unit, is_text=not column.is_number, target=target_of.get(name, ""))
             for name, column in table.columns.items()
         ],
         first_rows=table.shown_rows(),
@@ -76,7 +76,7 @@ def _traces(table: RawTable, found: MappedFile) -> list[LogTrace]:
     if found.log is not None and "t_s" in found.log.recording.columns:
         t_s = np.asarray(found.log.recording.columns["t_s"], dtype=np.float64)
         x = t_s if len(t_s) == n else x
-    numbers = [column for column in table.columns.values() if not column.is_text][:MOST_TRACES]
+    numbers = [column for column in table.columns.values() if column.is_number][:MOST_TRACES]
     starts = np.unique(np.linspace(0, n, BINS + 1).astype(np.int64)[:-1])
     middle = x[np.minimum(starts + np.diff(np.append(starts, n)) // 2, n - 1)]
     return [

@@ -5,14 +5,13 @@ from __future__ import annotations
 import hashlib
 import os
 import sqlite3
-import tempfile
 from contextlib import closing
 from dataclasses import dataclass
 from pathlib import Path
 
 from labctl.errors import BadInput, StoreError
 from labctl.store.connection.location import is_url
-from labctl.store.connection.private_files import FILE
+from labctl.store.integrity.temporary_copy import temporary_copy
 
 CHUNK = 1 << 20
 
@@ -30,7 +29,7 @@ def copy_database(location: str, target: Path) -> Copy:
     """Copy a database into a new file, at one instant of its history, through SQLite's own backup.
 
     Raises BadInput when the file exists or the database is not SQLite's, StoreError when the copy is not whole; then
-    nothing is left of it.
+    nothing is left of it. What a killed backup left in the same folder is removed.
     """
     if is_url(location):
         raise BadInput(
@@ -42,23 +41,17 @@ def copy_database(location: str, target: Path) -> Copy:
     _refuse_existing(target)
     if not target.absolute().parent.is_dir():
         raise BadInput(f"{target}: the folder does not exist; create it first")
-    handle, name = tempfile.mkstemp(dir=target.absolute().parent, prefix=f".{target.name}-")
-    os.fchmod(handle, FILE)
-    os.close(handle)
-    made = Path(name)
     try:
-        _copy(location, made)
-        digest = _synced_digest(made)
-        _refuse_existing(target)
-        made.rename(target)
+        with temporary_copy(target.absolute().parent) as made:
+            _copy(location, made)
+            digest = _synced_digest(made)
+            _refuse_existing(target)
+            made.rename(target)
         _sync_folder(target.absolute().parent)
     except sqlite3.Error as error:
         raise StoreError(
             f"{target}: the copy of {location} is incomplete ({error}) and was removed; try again"
         ) from error
-    finally:
-        for left in (made, Path(f"{name}-wal"), Path(f"{name}-shm"), Path(f"{name}-journal")):
-            left.unlink(missing_ok=True)
     return Copy(target, target.stat().st_size, digest)
 
 

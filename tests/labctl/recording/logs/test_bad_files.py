@@ -106,6 +106,10 @@ FILES: dict[str, tuple[Callable[[Path], Path], str]] = {
         r"\(time\), row 9: 0.001 does not follow",
     ),
     "time twice": (lambda p: text(p / "a.csv", with_line(9, LINES[8])), r"\(time\), row 9: 0.07 does not follow 0.07"),
+    "a damaged time": (
+        lambda p: text(p / "a.csv", with_cell(400, 0, "4e12")),
+        r"\(time\), row 400: 4e\+12 after 3.98; a recording lasts at most 100000000 s",
+    ),
     "a counter that begins again": (
         lambda p: text(
             p / "a.csv",
