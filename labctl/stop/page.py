@@ -297,7 +297,7 @@ class _Handler(BaseHTTPRequestHandler):
         if self.command != "HEAD":
             self.wfile.write(content)
 
-    def log_message(self, *_: Any) -> None:
+    def log_message(self, format: str, *args: Any) -> None:  # noqa: A002  the name in the base class
         """Log nothing: standard error is the log of the process, which has a form of its own."""
 
 

@@ -10,7 +10,6 @@ import sys
 import tempfile
 import threading
 from collections.abc import Iterator
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -22,23 +21,7 @@ from labctl.stop.instruments_stop import InstrumentsLeft
 from labctl.stop.latch import StopRequest
 from labctl.stop.places import BenchPlace, DriverNote, ProcessId
 from labctl.stop.wire import StopServer
-
-
-@dataclass
-class FakeStopping:
-    """A stop that goes on as its events say."""
-
-    text: str = "the table is at rest"
-    campaign: int | None = 7
-    stands: bool = True
-    heard: threading.Event = field(default_factory=threading.Event)
-    over: threading.Event = field(default_factory=threading.Event)
-
-    def is_heard(self, within_s: float) -> bool:
-        return self.heard.wait(within_s)
-
-    def is_over(self, within_s: float) -> bool:
-        return self.over.wait(within_s)
+from tests.helpers.fake_stopping import FakeStopping
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ import pytest
 
 from labctl.stop.latch import StopRequest
 from labctl.stop.page import PageAccess, StopPage, write_keys
-from tests.labctl.stop.test_client import FakeStopping
+from tests.helpers.fake_stopping import FakeStopping
 
 HOSTS = frozenset({"127.0.0.1", "localhost"})
 
