@@ -303,6 +303,8 @@ class RemoteBench:
                 self._listeners.notify()
 
     def _note(self, *, silent: bool) -> None:
+        if silent and self._beat.stops:  # it has ended in order, and this process ends too
+            return
         if silent and not self._silent:
             log.error("bench_process.silent", silent_s=round(self.heard_s, 1))
         elif self._silent and not silent:

@@ -10,6 +10,7 @@ asked for is lost. Its first byte is a mark of its own, for a disk on which no l
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 from collections.abc import Iterable, Sequence
@@ -81,16 +82,19 @@ class StopLatch:
 
     def prepare(self) -> None:
         """Make the folder and the file, so that a full disk later leaves room for the mark. Raises OSError."""
-        self._folder.mkdir(parents=True, exist_ok=True, mode=FOLDER)
-        try:
-            handle = os.open(self._path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, FILE)
-        except FileExistsError:
+        if self._path.exists():
             return
+        self._folder.mkdir(parents=True, exist_ok=True, mode=FOLDER)
+        made = self._folder / f".{NAME}-{uuid4().hex}"
+        handle = os.open(made, os.O_WRONLY | os.O_CREAT | os.O_EXCL, FILE)
         try:
             os.write(handle, UNMARKED)
             os.fsync(handle)
+            with contextlib.suppress(FileExistsError):  # another process was quicker: its file stays
+                self._path.hardlink_to(made)  # it appears whole, so that no line comes before its first
         finally:
             os.close(handle)
+            made.unlink()
 
     def request(self, stop: StopRequest) -> None:
         """Remember a stop; one that is known already stays as it is. Raises OSError where nothing could be written."""

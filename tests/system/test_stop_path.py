@@ -9,7 +9,7 @@ import contextlib
 import json
 import os
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -46,16 +46,13 @@ def turning(service: ServiceProcess, simulator: Simulator) -> int:
     """Start a campaign; returns its number once the table turns."""
     started = service.http.post("/api/campaigns", json=START)
     assert started.status_code == 201, started.text
-    wait_until(simulator, lambda line: line["table_turns"])
+    wait_until(simulator, lambda lines: lines[-1]["table_turns"])
     return int(started.json()["id"])
 
 
-def wait_until(simulator: Simulator, holds: Any) -> None:
-    """Wait until the newest line that the table has heard is as expected; a chamber is asked once a while."""
-    while True:  # the test has a time-out
-        lines = [line for line in simulator.heard if line["device"] in {"table", "chamber"}]
-        if lines and holds(lines[-1]):
-            return
+def wait_until(simulator: Simulator, holds: Callable[[list[dict[str, Any]]], bool]) -> None:
+    """Wait until what the instruments have heard is as expected."""
+    while not (simulator.heard and holds(simulator.heard)):  # the test has a time-out
         before_next_request()
 
 
@@ -88,7 +85,7 @@ def test_a_stop_asked_of_a_frozen_bench_process_is_carried_out_and_honoured_by_i
     campaign = turning(service, simulator)
     os.kill(service.bench_pid, signal.SIGSTOP)
     asked = service.http.post(f"/api/campaigns/{campaign}/abort", json={"reason": "a hand in the bench", "by": "Ada"})
-    simulator.wait_for(ABORT)
+    wait_until(simulator, lambda lines: any(ABORT in line["heard"] for line in lines))
     assert "NOT STOPPED" not in asked.text, asked.text
     found = ended(service.url, campaign)
     assert (found["state"], "a hand in the bench (Ada)" in found["reason"]) == ("aborted", True)
@@ -104,7 +101,7 @@ def test_a_stop_asked_of_a_frozen_bench_process_is_carried_out_and_honoured_by_i
         before_next_request()
     assert starts_of(simulator, quiet) == []  # what is scheduled waits for a person
     assert service.http.post("/api/benches/single-axis-sim/clear", json={"by": "Ada"}).status_code == 200
-    wait_until(simulator, lambda line: line["table_turns"])
+    wait_until(simulator, lambda lines: lines[-1]["table_turns"])
 
 
 def test_with_supervisor_and_bench_process_dead_the_command_goes_to_the_instruments(
@@ -117,7 +114,7 @@ def test_with_supervisor_and_bench_process_dead_the_command_goes_to_the_instrume
     stopped = service.run("stop", "--json")
     (bench,) = json.loads(stopped.stdout)["benches"]
     assert (bench["stands"], "stopped directly: table at rest" in bench["text"]) == (True, True)
-    simulator.wait_for(ABORT)
+    wait_until(simulator, lambda lines: any(ABORT in line["heard"] for line in lines))
     quiet = len(simulator.heard)
     with running(service.database, "--bench", str(simulator.bench)) as heir:
         assert ended(heir.url, campaign)["state"] == "aborted"
@@ -131,8 +128,8 @@ def test_an_abort_with_no_process_left_stops_the_table_first(service: ServicePro
     os.kill(service.bench_pid, signal.SIGKILL)
     service.process.wait()
     assert json.loads(service.run("campaign", "abort", str(campaign), "--json").stdout)["state"] == "aborted"
-    simulator.wait_for(ABORT)
-    wait_until(simulator, lambda line: not line["table_turns"])
+    wait_until(simulator, lambda lines: any(ABORT in line["heard"] for line in lines))
+    wait_until(simulator, lambda lines: not lines[-1]["table_turns"])
 
 
 def test_a_bench_process_without_its_service_answers_at_the_address_and_gives_it_back(
@@ -159,7 +156,7 @@ def test_a_bench_process_without_its_service_answers_at_the_address_and_gives_it
                 break
             before_next_request()
         assert (stopped.status_code, stopped.json()["stands"]) == (200, True)
-        simulator.wait_for(ABORT)
+        wait_until(simulator, lambda lines: any(ABORT in line["heard"] for line in lines))
 
 
 def test_sigterm_with_a_frozen_bench_process_leaves_the_table_at_rest_and_says_so(
@@ -168,7 +165,7 @@ def test_sigterm_with_a_frozen_bench_process_leaves_the_table_at_rest_and_says_s
     campaign = turning(service, simulator)
     os.kill(service.bench_pid, signal.SIGSTOP)
     service.process.send_signal(signal.SIGTERM)
-    simulator.wait_for(ABORT)
+    wait_until(simulator, lambda lines: any(ABORT in line["heard"] for line in lines))
     _, said = service.process.communicate(timeout=WAIT_S)
     assert (service.process.returncode, "table at rest" in said) == (0, True)
     quiet = len(simulator.heard)
@@ -183,6 +180,6 @@ def test_a_frozen_web_process_keeps_no_stop_from_the_table(service: ServiceProce
     campaign = turning(service, simulator)
     os.kill(service.web_pid, signal.SIGSTOP)
     asked = httpx.post(f"{service.url}/api/campaigns/{campaign}/abort", json={"reason": "smoke"}, timeout=WAIT_S)
-    simulator.wait_for(ABORT)
+    wait_until(simulator, lambda lines: any(ABORT in line["heard"] for line in lines))
     assert asked.json()["stands"] is True
     assert ended(service.url, campaign)["state"] == "aborted"
