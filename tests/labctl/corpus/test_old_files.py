@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import json
 from pathlib import Path
 from typing import Any
 
@@ -38,20 +39,16 @@ def bench_of(entry: Entry, name: str) -> Path:
 
 def planned(lab: Lab, entry: Entry, recipe: str) -> dict[str, Any]:
     """Return what a recipe is planned to now, or why it is refused."""
-    was = entry.answers["plans"][recipe]
-    bench = bench_of(entry, was["bench_file"])
+    bench = bench_of(entry, entry.answers["plans"][recipe]["bench_file"])
     said = lab.run("campaign", "plan", str(entry.folder / recipe), "--bench", str(bench), "--json", status=None)
-    return said
+    plan: dict[str, Any] = json.loads(said.stdout) if said.exit_code == 0 else {"refused": said.stderr}
+    return plan
 
 
 @pytest.mark.parametrize(("entry", "recipe"), PLANS, ids=lambda each: getattr(each, "name", each))
 def test_its_recipes_and_benches_give_the_same_plans(entry: Entry, recipe: str, tmp_path: Path) -> None:
-    import json
-
     was = {key: value for key, value in entry.answers["plans"][recipe].items() if key != "bench_file"}
-    said = planned(Lab(tmp_path), entry, recipe)
-    now = json.loads(said.stdout) if said.exit_code == 0 else {"refused": said.stderr}
-    assert wrongly_named(entry, f"plans.{recipe}", was, now) == []
+    assert wrongly_named(entry, f"plans.{recipe}", was, planned(Lab(tmp_path), entry, recipe)) == []
 
 
 @of_each_entry
