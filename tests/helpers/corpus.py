@@ -62,9 +62,7 @@ def fields_of(answer: object, name: str) -> dict[str, object]:
     """Return the leaves of an answer by their path, such as `criticisms.1.verdict`. A list is one leaf."""
     if not isinstance(answer, Mapping):
         return {name: "none" if answer is None else answer}  # TOML has no null
-    return {
-        field: value for key, part in answer.items() for field, value in fields_of(part, f"{name}.{key}").items()
-    }
+    return {field: value for key, part in answer.items() for field, value in fields_of(part, f"{name}.{key}").items()}
 
 
 def is_same(one: object, other: object) -> bool:
@@ -81,7 +79,7 @@ def wrongly_named(entry: Entry, name: str, was: object, now: object) -> list[str
     """
     before, after = fields_of(was, name), fields_of(now, name)
     named = {field: row for field, row in named_changes(entry).items() if (field + ".").startswith(name + ".")}
-    wrong = [f"{entry.name}: {field}: changes.toml names a field that is not there" for field in set(named) - set(before)]
+    wrong = [f"{entry.name}: {field}: in changes.toml, but not in the answer" for field in set(named) - set(before)]
     for field, old in before.items():
         new, row = after.get(field, "none"), named.get(field)
         says = (old, old) if row is None else (row["from"], row["to"])
