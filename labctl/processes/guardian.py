@@ -12,10 +12,9 @@ from pathlib import Path
 
 from instruments.bench_config import BenchFile
 from labctl.log import get_logger
-from labctl.stop.client import end_process
 from labctl.stop.instruments_stop import InstrumentsLeft, stop_instruments
 from labctl.stop.latch import StopRequest
-from labctl.stop.places import BenchPlace, ProcessId
+from labctl.stop.places import BenchPlace
 from labctl.stop.wire import StopServer
 
 log = get_logger()
@@ -68,9 +67,9 @@ class GuardianStop:
 class Guardian:
     """Ends the bench process and stops its bench: asked by `labctl stop`, a page, or the supervisor itself."""
 
-    def __init__(self, bench: BenchFile, place: BenchPlace, bench_process: Callable[[], int]) -> None:
-        """Guard a bench; `bench_process` returns the process that drives it now, 0 for none."""
-        self._bench, self._place, self._bench_process = bench, place, bench_process
+    def __init__(self, bench: BenchFile, place: BenchPlace, end_process: Callable[[], str]) -> None:
+        """Guard a bench; `end_process` ends the process that drives it now, and returns what kept it from ending."""
+        self._bench, self._place, self._end_process = bench, place, end_process
         self._guard = threading.Lock()
         self._folder = Path(tempfile.mkdtemp(prefix="labctl-guardian-"))
         self.socket = self._folder / "stop"
@@ -107,11 +106,9 @@ class Guardian:
             if stop is not None:
                 with contextlib.suppress(OSError):
                     self._place.latch.request(stop)
-            if pid := self._bench_process():
-                log.error("guardian.ends_bench_process", bench=self._bench.name, child_pid=pid)
-                if trouble := end_process(ProcessId.of(pid)):
-                    end(False, trouble, safe=False)
-                    return
+            if trouble := self._end_process():
+                end(False, trouble, safe=False)
+                return
             if self._bench.is_simulated:
                 left = InstrumentsLeft(stands=True, safe=True, text="its simulated instruments ended with it")
             else:

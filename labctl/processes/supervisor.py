@@ -154,7 +154,15 @@ class Supervisor:
             return
         bench = with_drivers(load_bench(self._request.bench_name))  # loads what the guardian needs
         self._place = place_of(self._request.location, bench.name)
-        self._guardian = Guardian(bench, self._place, lambda: 0 if self._bench is None else self._bench.pid)
+        self._guardian = Guardian(bench, self._place, self._end_for_guardian)
+
+    def _end_for_guardian(self) -> str:
+        """End the bench process at once, for the guardian; returns what kept it from ending, empty when it is gone."""
+        bench = self._bench
+        if bench is None or bench.wait(0.0):
+            return ""
+        self._kill_bench(bench)
+        return "" if bench.wait(ENDS_WITHIN_S) else f"the bench process {bench.pid} does not end"
 
     def _end_guarding(self) -> None:
         if self._guardian is not None:

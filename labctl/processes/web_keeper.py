@@ -45,7 +45,7 @@ class WebKeeper:
         self._at, self._waker, self._settings = at, waker, settings
         self._address = HeldAddress(respond, lambda: "labctl starts its web process again.", relays=True)
         self._restarts = Restarts()
-        self._over = threading.Event()
+        self._over, self._closed = threading.Event(), threading.Event()
         self._failure: LabctlError | None = None
         self._heard = Elapsed()
         self._end_asked = False
@@ -85,11 +85,12 @@ class WebKeeper:
     def close(self) -> None:
         """End the process, and give the address back."""
         self.end_soon()
-        if self._thread.is_alive():
-            self._thread.join()
         self._process.signal(signal.SIGTERM)
         self._process.wait(ENDS_WITHIN_S)
         self._process.kill()
+        self._closed.set()
+        if self._thread.is_alive():
+            self._thread.join()
         self._address.give_back()
 
     def _keep(self) -> None:
@@ -104,6 +105,7 @@ class WebKeeper:
         except LabctlError as error:
             self._failure = error
             self._waker.end()
+        self._closed.wait()  # the kernel kills a web process together with the thread that has started it
 
     def _hear(self) -> None:
         while self._process.line.poll(0):

@@ -248,6 +248,7 @@ ACTS: dict[str, tuple[str, Callable[[TestClient], Any]]] = {
     "/api/campaigns/{campaign}/abort": (
         "campaign abort", lambda c: c.post("/api/campaigns/1/abort", json={"reason": "tea"}),
     ),
+    "/api/stop": ("bench stop", lambda c: c.post("/api/stop", json={"reason": "tea"})),
     "/api/campaigns/{campaign}/resume": ("campaign resume", lambda c: c.post("/api/campaigns/1/resume", json={})),
     "/api/campaigns": ("campaign start", lambda c: c.post("/api/campaigns", json={"recipe": "short"})),
     "/api/schedule/{start}": ("schedule cancel", cancel),
@@ -272,10 +273,10 @@ class AlwaysThere(BenchRunner):
     def confirm(self, campaign: int, request: ConfirmRequest) -> CampaignResponse:
         return campaign_status(self._store, campaign)
 
-    def start(self, request: CampaignRequest) -> CampaignResponse:
+    def start(self, request: CampaignRequest, *, attended: bool = True) -> CampaignResponse:
         while self._job is not None:  # the one that was resumed before
             self._job.thread.join()
-        return super().start(request)
+        return super().start(request, attended=attended)
 
 
 def test_every_act_over_http_leaves_its_row(location: str) -> None:

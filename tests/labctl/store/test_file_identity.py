@@ -104,8 +104,8 @@ def test_a_campaign_ends_in_the_safe_state_when_its_database_is_lost(
     left: list[Any] = []
     make_safe = safe_state.make_safe
 
-    def safe(*asked: Any) -> Any:
-        left.append(make_safe(*asked))
+    def safe(*asked: Any, **more: Any) -> Any:
+        left.append(make_safe(*asked, **more))
         return left[-1]
 
     monkeypatch.setattr("procedures.execution.shutdown.make_safe", safe)
