@@ -116,6 +116,8 @@ class StopPage:
                     request.startswith(b"POST /api/campaigns/") and b"/abort" in request.partition(b"\r\n")[0]
                 )
                 relayed = self._relays and not is_stop
+                if relayed and b"\r\n\r\n" not in request:
+                    return  # a head that does not end is not passed on
                 if not relayed:
                     relayed = not self._answer(caller, address, request)
             finally:
