@@ -19,7 +19,7 @@ from labctl.errors import BadInput, LabctlError
 from labctl.log import get_logger
 from labctl.processes.bench_calls import BenchCalls
 from labctl.processes.calls import CallServer
-from labctl.processes.children import begin_child_log, line_to_parent, tell
+from labctl.processes.children import begin_child_log, leave, line_to_parent, tell
 from labctl.processes.driver_note import DriverNoteWriter
 from labctl.processes.held_address import HeldAddress
 from labctl.processes.liveness import EngineWatch
@@ -171,4 +171,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    leave(main())

@@ -24,12 +24,12 @@ from labctl.config import os_user
 from labctl.errors import BenchSilent, BenchUnconfirmed, Conflict, LabctlError
 from labctl.log import get_logger
 from labctl.processes import systemd
-from labctl.processes.bench_line import BenchLine, bench_process_of
+from labctl.processes.bench_line import EXCUSED_S, BenchLine, bench_process_of
 from labctl.processes.calls import Caller
 from labctl.processes.children import Child
 from labctl.processes.guardian import Guardian, GuardianStop
 from labctl.processes.listening import Listening, listening
-from labctl.processes.liveness import Elapsed, Restarts
+from labctl.processes.liveness import Elapsed, Restarts, Silence
 from labctl.processes.settings import CALLS, BenchSettings, ServeRequest, WebSettings, ahead_of
 from labctl.processes.waker import Waker
 from labctl.processes.web_keeper import WebKeeper
@@ -252,8 +252,9 @@ class Supervisor:
             shutil.rmtree(self._folder, ignore_errors=True)
             raise
 
-    def _end_bench(self, bench: BenchLine, ending: Elapsed, web: WebKeeper) -> BenchLeft:
+    def _end_bench(self, bench: BenchLine, web: WebKeeper) -> BenchLeft:
         """Let the bench process leave its bench safe, or do it in its place; returns how the bench was left."""
+        ending = Silence(bench.pid, EXCUSED_S)
         bench.tell("end")
         while not bench.wait(LOOK_S):
             systemd.alive()
@@ -275,7 +276,7 @@ class Supervisor:
             text += "; the state of the bench is not known; inspect the bench"
         return BenchLeft(text, unconfirmed=not securing.safe)
 
-    def _may_take_longer(self, bench: BenchLine, ending: Elapsed) -> bool:
+    def _may_take_longer(self, bench: BenchLine, ending: Silence) -> bool:
         """Return whether a bench process that was asked to end may go on with that."""
         if bench.heard_s > SILENT_S:
             return False
@@ -335,11 +336,10 @@ class Supervisor:
 
     def _end(self, web: WebKeeper) -> BenchLeft:
         """End both processes, the bench safe first; returns how the bench was left."""
-        ending = Elapsed()
         log.info("process.ending", stopped=self._waker.ending)
         try:
             assert self._bench is not None
-            return self._end_bench(self._bench, ending, web)
+            return self._end_bench(self._bench, web)
         finally:
             web.close()
             self._end_guarding()

@@ -6,7 +6,6 @@ import contextlib
 import os
 import signal
 import socket
-import sys
 import threading
 from multiprocessing.connection import Connection
 
@@ -18,7 +17,7 @@ from labctl.api.app import create_app
 from labctl.api.connection_limits import limits_for, raise_open_files
 from labctl.api.http_protocol import bounded_http
 from labctl.log import get_logger
-from labctl.processes.children import begin_child_log, end_with_parent, line_to_parent, tell
+from labctl.processes.children import begin_child_log, end_with_parent, leave, line_to_parent, tell
 from labctl.processes.remote_bench import RemoteBench, RemoteWriter
 from labctl.processes.settings import KEYS, LOOPBACK_NAMES, ServeRequest, WebSettings, is_loopback
 from labctl.services.admin.api_keys import require_an_api_key
@@ -133,4 +132,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    leave(main())
