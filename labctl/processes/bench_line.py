@@ -115,7 +115,7 @@ class BenchLine:
         self._heard.restart()
 
     def tell(self, what: str) -> None:
-        """Say `begin` or `end`."""
+        """Say `begin` or `end`, or `beat`: that the guardian lives."""
         with contextlib.suppress(OSError):
             self._line.send(what)
 

@@ -44,7 +44,7 @@ from procedures.execution.signals import ENDING, restore
 
 log = get_logger()
 
-LOOK_S = 0.25
+LOOK_S, BEAT_S = 0.25, 0.5
 #: A bench process that gave no sign of life for so long is ended, its bench stopped, and another one started, s.
 SILENT_S = 3.0
 #: A bench process that starts may take this long to answer for the first time, s.
@@ -308,13 +308,16 @@ class Supervisor:
             raise
 
     def _watch(self) -> None:
-        notified, since = Elapsed(), Elapsed()
+        notified, since, beaten = Elapsed(), Elapsed(), Elapsed()
         while not self._waker.ending:
             since.restart()
             self._waker.wait(LOOK_S)
             if since.s > LOOK_S + LATE_S and self._bench is not None:
                 self._bench.excuse()
             self._look_after_bench()
+            if self._bench is not None and beaten.s > BEAT_S:
+                beaten.restart()
+                self._bench.tell("beat")
             if notified.s > systemd.period_s():
                 notified.restart()
                 systemd.alive()
