@@ -21,6 +21,7 @@ STUDIES = (
     "process_kill",
     "process_pairs",
     "stops",
+    "stop_sequences",
     "faults",
     "attacks",
     "damaged_imports",

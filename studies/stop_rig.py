@@ -82,8 +82,8 @@ class Table:
         return bool(self.heard and self.heard[-1].table_turns)
 
     def told_s(self, after: int) -> float | None:
-        """Return when the table was told to stop, after so many lines; None where it was not."""
-        return next((line.at_s for line in self.heard[after:] if line.is_stop), None)
+        """Return when the table was told to stop, or stood, after so many lines; None where it did neither."""
+        return next((line.at_s for line in self.heard[after:] if line.is_stop or not line.table_turns), None)
 
     def close(self) -> None:
         """Read no more."""

@@ -209,7 +209,7 @@ def _fit_example(service: Service) -> None:
 def _turned_again(table: Table, before: int, stood: bool) -> bool:
     """Return whether the table turned after it had come to rest from the stop."""
     lines = table.heard[before:]
-    told = next((k for k, line in enumerate(lines) if line.is_stop), None)
+    told = next((k for k, line in enumerate(lines) if line.is_stop or not line.table_turns), None)
     standing = stood
     for line in lines[told or 0 :] if told is not None or stood else []:
         if standing and line.table_turns:

@@ -104,10 +104,11 @@ class BenchStops:
             self._recorded.update(stop.id for stop in stops)
             self.carried_out(stops, text)
 
-    def refuse_moving(self, by: str | None) -> None:
+    def refuse_moving(self, by: str | None, known: frozenset[str]) -> None:
         """Let the bench move again in the name of a person; None: no person asks for it.
 
-        Raises BenchBusy while a stop is not carried out, and without a person while one holds.
+        `known`: the stops that had been asked for when the person asked. One that came later was not meant to be taken
+        back. Raises BenchBusy while a stop is not carried out, without a person while one holds, and for a later one.
         """
         state = self.state
         if state.open:
@@ -117,6 +118,11 @@ class BenchStops:
             )
         if state.held and by is None:
             raise BenchBusy(self._held_text(state))
+        if later := [stop for stop in state.held if stop.id not in known]:
+            raise BenchBusy(
+                f"bench {self._bench} was stopped ({later[-1].reason}) after this was asked for, so that it does not "
+                "move; ask again when it may"
+            )
         if state.held and by is not None:
             self.take_back(by)
 

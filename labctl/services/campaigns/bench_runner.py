@@ -127,12 +127,13 @@ class BenchRunner:
         Raises BenchBusy while another runs, without the lease on the bench, or while the bench is stopped;
         StartNotConfirmed where no person has confirmed that a real bench is clear, and whatever planning raises.
         """
+        known = self.stop_latch.state.known
         with self._guard:
             self._refuse_unless_free()
             bench = with_hidden_effects(self._bench, request.hide)
             refuse_unconfirmed(self._store, bench.name)
             clear = confirmation_text(bench, request)
-            self._let_move(request.confirmed_by or actor().name if attended else None)
+            self._let_move(request.confirmed_by or actor().name if attended else None, known)
             control = self._new_control()
             clock = stoppable(self._make_clock(), control)
             prepared = prepare(
@@ -141,10 +142,13 @@ class BenchRunner:
             self._begin(prepared, control)
         return campaign_status(self._store, prepared.id)
 
-    def _let_move(self, by: str | None) -> None:
-        """Carry out the stops that are open, then let the bench move in a person's name. Raises BenchBusy."""
+    def _let_move(self, by: str | None, known: frozenset[str]) -> None:
+        """Carry out the stops that are open, then let the bench move in a person's name. Raises BenchBusy.
+
+        `known`: the stops that had been asked for when the person asked; a later one holds.
+        """
         self.stops.carry_out()
-        self.stop_latch.refuse_moving(by)
+        self.stop_latch.refuse_moving(by, known)
 
     def _new_control(self) -> Control:
         return Control() if self._hold is None else self._hold.control()
@@ -183,6 +187,7 @@ class BenchRunner:
         Not `attended`: no person resumes it now. Raises BenchBusy while another runs, without the lease on the bench,
         or while the bench is stopped; Conflict when it is done, or when the bench waits to be inspected.
         """
+        known = self.stop_latch.state.known
         with self._guard:
             job = self._job
             if job is not None and job.row.id == campaign:
@@ -192,7 +197,7 @@ class BenchRunner:
             else:
                 self._refuse_unless_free()
                 bench = with_original_simulation(self._store.campaigns.get(campaign), self._bench)
-                self._let_move(request.by if attended else None)
+                self._let_move(request.by if attended else None, known)
                 control = self._new_control()
                 clock = stoppable(self._make_clock(), control)
                 self._begin(prepare_resume(self._store, campaign, bench, lambda _: clock, request), control)
@@ -210,12 +215,15 @@ class BenchRunner:
         with self._guard:
             self.stops.carry_out()
         self._recovery.resume_newest(
-            lambda number: self.resume(number, ResumeRequest(by="the service"), attended=False), self._secure
+            lambda number: self.resume(number, ResumeRequest(by="the service"), attended=False),
+            self._secure,
+            self.runs,
         )
 
     def _secure(self) -> None:
         with self._guard:
-            self._secure_now()
+            if self._job is None:  # a campaign that a person has started meanwhile has the instruments
+                self._secure_now()
 
     def _secure_now(self) -> str:
         """Make the bench safe, under the guard; returns what is not confirmed."""

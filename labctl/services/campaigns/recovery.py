@@ -102,11 +102,17 @@ class CampaignRecovery:
             self._close(unwritten.campaign, unwritten.why)
         self._unwritten = None
 
-    def resume_newest(self, resume: Callable[[int], object], secure: Callable[[], None]) -> None:
+    def resume_newest(
+        self,
+        resume: Callable[[int], object],
+        secure: Callable[[], None],
+        runs: Callable[[int], bool] = lambda _: False,
+    ) -> None:
         """Resume the newest unfinished campaign; every other one, and one that cannot be resumed, is closed.
 
         `resume` starts a campaign by its number; `secure` makes the bench safe where that fails, because the last
-        process may have left it as it was.
+        process may have left it as it was. A campaign that `runs` here by now, because a person was quicker, was not
+        left by another process.
         """
         resumed = None
         for row in self._store.campaigns.unfinished():  # newest first
@@ -118,6 +124,9 @@ class CampaignRecovery:
                     f"`labctl campaign resume {row.id}`"
                 )
                 self._close(row.id, text)
+                continue
+            if runs(row.id):
+                resumed = row.id
                 continue
             why_not = retries_exhausted(self._store.resume_points.of_campaign(row.id))
             try:
