@@ -48,6 +48,12 @@ class StoppedBefore:
         self._lock.release()
 
 
+def finish(runner: BenchRunner) -> None:
+    job = runner._job
+    if job is not None and job.thread is not None:
+        job.thread.join(WAIT_S)
+
+
 def start(runner: BenchRunner) -> object:
     return runner.start(CampaignRequest(recipe="short", confirmed_by="Bob"))
 
@@ -60,13 +66,16 @@ def resume(runner: BenchRunner) -> object:
 def test_what_was_asked_before_a_stop_does_not_take_it_back(
     runner: BenchRunner, store: Store, move: Callable[[BenchRunner], object]
 ) -> None:
+    start(runner)
+    runner.stops.request(StopRequest.new("Eve", "key", "earlier", 1))
+    finish(runner)
     lock = runner._guard
     runner._guard = StoppedBefore(runner)  # type: ignore[assignment]
     with pytest.raises(BenchBusy, match=r"was stopped \(a hand in the bench \(Ada\)\) after this was asked for"):
         move(runner)
     runner._guard = lock
-    assert [stop.reason for stop in runner.stop_latch.state.held] == ["a hand in the bench (Ada)"]
-    assert store.campaigns.all() == []
+    assert [stop.reason for stop in runner.stop_latch.state.held] == ["earlier", "a hand in the bench (Ada)"]
+    assert [row.state for row in store.campaigns.all()] == ["aborted"]
     start(runner)  # asked after it, by a person
     assert runner.stop_latch.state.held == ()
 
@@ -87,9 +96,7 @@ def test_a_campaign_that_a_person_has_started_is_not_taken_for_one_that_was_left
 
     runner.listen(look)
     start(runner)
-    job = runner._job
-    if job is not None and job.thread is not None:
-        job.thread.join(WAIT_S)
+    finish(runner)
     assert len(looked) == 2
     assert looked[0] == looked[1]
     assert (store.campaigns.get(1).state, store.campaigns.get(1).reason) == ("done", "all steps done")
