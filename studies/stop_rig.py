@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import subprocess
 import sys
 import threading
@@ -18,8 +19,9 @@ import tomli_w
 
 from instruments.bench_config import read_bench
 
-#: What the table hears as a stop.
+#: What the table hears as a stop, and what lets it move: homing and moves.
 ABORT = "!1a"
+MOVES = re.compile(r"!1[hm]\d")
 #: How often the log is read, s.
 LOOK_S = 0.005
 RECIPE = """
@@ -52,6 +54,11 @@ class Heard:
     def is_stop(self) -> bool:
         """Whether the table was told to stop."""
         return self.device == "table" and ABORT in self.text
+
+    @property
+    def shows_motion(self) -> bool:
+        """Whether the table turned, or was told to move: during homing the log does not say that it turns."""
+        return self.table_turns or (self.device == "table" and bool(MOVES.search(self.text)))
 
 
 class Table:

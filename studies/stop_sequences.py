@@ -77,7 +77,8 @@ class Story:
     def in_force_s(self, stop: Stop, heard: list[Heard]) -> float | None:
         """Return from when on a stop was carried out: it was confirmed, or the table heard it and stood."""
         told = next((k for k in range(stop.line, len(heard)) if heard[k].is_stop), None)
-        stood = None if told is None else next((each.at_s for each in heard[told:] if not each.table_turns), None)
+        after = heard[told + 1 :] if told is not None else []
+        stood = next((each.at_s for each in after if not each.table_turns), None)
         known = [at_s for at_s in (stood, stop.confirmed_s) if at_s is not None]
         return min(known, default=None)
 
@@ -88,7 +89,7 @@ class Story:
             if from_s is None:
                 continue
             released_s = min((at_s for at_s in self.released_s if at_s > stop.asked_s), default=float("inf"))
-            turned = next((each for each in heard if from_s < each.at_s < released_s and each.table_turns), None)
+            turned = next((each for each in heard if from_s < each.at_s < released_s and each.shows_motion), None)
             if turned is not None:
                 self.started_again.append(f"{turned.at_s - stop.asked_s:.2f} s after a stop: {turned.text!r}")
 
@@ -204,15 +205,17 @@ def tell(bench: Bench, story: Story, rng: np.random.Generator) -> None:
 
 def _begin_turning(bench: Bench, story: Story) -> None:
     """Have a table that turns, begun by a person."""
-    until_s = time.monotonic() + TURNS_WITHIN_S
+    until_s, refused = time.monotonic() + TURNS_WITHIN_S, ""
     if not bench.serves:
         bench.serve()
     while not bench.table.turns():
         if time.monotonic() > until_s:
-            raise RuntimeError("the table did not turn")
+            raise RuntimeError(f"the table did not turn: {refused}; {bench.log.read_text()[-3000:]}")
         story.released_s.append(time.monotonic())
-        with contextlib.suppress(LabctlError):
+        try:
             bench.start_campaign()
+        except LabctlError as error:
+            refused = str(error)
         for _ in range(100):
             if bench.table.turns():
                 break

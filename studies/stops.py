@@ -212,7 +212,7 @@ def _turned_again(table: Table, before: int, stood: bool) -> bool:
     told = next((k for k, line in enumerate(lines) if line.is_stop or not line.table_turns), None)
     standing = stood
     for line in lines[told or 0 :] if told is not None or stood else []:
-        if standing and line.table_turns:
+        if standing and line.shows_motion:
             return True
         standing = standing or not line.table_turns
     return False

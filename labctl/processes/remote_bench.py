@@ -37,10 +37,8 @@ ANSWER_S = 3.0
 TRANSACTION_S = 30.0
 #: Opening a bench: every instrument is asked.
 OPENING_S = 180.0
-#: A stop is answered within this: that it is under way, or that the bench is not stopped, s.
-HEARD_S = 4.5
-#: And whether the table stands, where it does so soon, s.
-AT_REST_S = 0.1
+#: A stop is answered within this: that the table stands, or that the bench is not stopped, s.
+STANDS_S = 4.5
 #: A bench process without an answer for so long gets no request but to stop.
 SILENT_S = 3.0
 RECONNECT_S = 0.5
@@ -107,24 +105,21 @@ class RemoteControl:
     def abort(self, _: CommandContext, asked: ToCampaign[ReasonRequest]) -> CampaignResponse:
         """End a campaign now, in the safe state: first the stop, by a way of its own; then it is written down.
 
-        Raises NotStopped where it is not known within some seconds that the bench is being stopped.
+        Raises NotStopped where it is not confirmed within some seconds that the table stands.
         """
         if self._place is None or not self._may_run(asked.campaign):
             return self._recorded(asked)
         attempt = self._attempt(asked.body.text, asked.campaign)
-        if not attempt.is_heard(HEARD_S):
+        found = attempt.result(STANDS_S)
+        if found is None or not found.stands:
             raise NotStopped(not_stopped_text(attempt.text))
-        found = attempt.result(AT_REST_S)
-        if found is not None and not found.stands:
-            raise NotStopped(not_stopped_text(found.text))
         try:
             return self._recorded(asked)
         except BenchSilent as silent:
-            known = "the table stands" if found is not None else "the bench is being stopped"
             last = self._last_live(asked.campaign)
             if last is None:
-                raise BenchSilent(f"{known} ({attempt.text}); that is not recorded yet: {silent}") from silent
-            text = f"{known}, but that is not recorded yet: {silent}"
+                raise BenchSilent(f"the table stands ({attempt.text}); that is not recorded yet: {silent}") from silent
+            text = f"the table stands, but that is not recorded yet: {silent}"
             return last.model_copy(update={"wish": "abort", "step_text": attempt.text, "unrecorded": text})
 
     def stop(self, reason: str) -> StopResponse:
@@ -132,7 +127,7 @@ class RemoteControl:
         if self._place is None or self._bench is None:
             raise Conflict(NO_BENCH)
         attempt = self._attempt(reason, None)
-        found = attempt.result(HEARD_S)
+        found = attempt.result(STANDS_S)
         if found is None or not found.stands:
             raise NotStopped(not_stopped_text(attempt.text))
         return StopResponse(bench=self._bench.name, stands=True, text=found.text, campaign=found.campaign)

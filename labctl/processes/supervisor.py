@@ -13,6 +13,7 @@ import os
 import shutil
 import signal
 import tempfile
+import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -31,12 +32,13 @@ from labctl.processes.guardian import Guardian, GuardianStop
 from labctl.processes.listening import Listening, listening
 from labctl.processes.liveness import Elapsed, Restarts, Silence
 from labctl.processes.settings import CALLS, BenchSettings, ServeRequest, WebSettings, ahead_of
+from labctl.processes.supervisor_watch import is_stopped
 from labctl.processes.waker import Waker
 from labctl.processes.web_keeper import WebKeeper
 from labctl.services.benches.bench_left import BenchLeft
 from labctl.services.campaigns.stop_requests import NotHere
 from labctl.services.planning.loading import load_bench, with_drivers
-from labctl.stop.client import AttemptedStop, StopAttempt, end_process
+from labctl.stop.client import LATCH_S, AttemptedStop, StopAttempt, end_process
 from labctl.stop.latch import StopRequest
 from labctl.stop.places import BenchPlace, ProcessId, place_of
 from labctl.stop.wire import Stopping
@@ -123,6 +125,7 @@ class Supervisor:
         self._bench: BenchLine | None = None
         self._guardian: Guardian | None = None
         self._place: BenchPlace | None = None
+        self._end_latched = False
 
     def run(self, ready: Callable[[Ready], None]) -> BenchLeft:
         """Serve until asked to end; returns how the bench was left."""
@@ -255,6 +258,8 @@ class Supervisor:
     def _end_bench(self, bench: BenchLine, web: WebKeeper) -> BenchLeft:
         """Let the bench process leave its bench safe, or do it in its place; returns how the bench was left."""
         ending = Silence(bench.pid, EXCUSED_S)
+        if not bench.at_rest:
+            self._latch_end()  # written down first: either process may be killed before it is carried out
         bench.tell("end")
         while not bench.wait(LOOK_S):
             systemd.alive()
@@ -262,12 +267,12 @@ class Supervisor:
                 web.end_soon()
             if self._may_take_longer(bench, ending):
                 continue
-            self._latch_end()
             self._kill_bench(bench)
         bench.close()
         shutil.rmtree(self._folder, ignore_errors=True)
         if bench.left is not None:
             return bench.left
+        self._latch_end()
         securing = self._secured()
         if securing is None:
             return BenchLeft("the bench process ended without a report; this service drives no bench")
@@ -278,19 +283,26 @@ class Supervisor:
 
     def _may_take_longer(self, bench: BenchLine, ending: Silence) -> bool:
         """Return whether a bench process that was asked to end may go on with that."""
-        if bench.heard_s > SILENT_S:
+        if bench.heard_s > SILENT_S or is_stopped(bench.pid):
             return False
         at_rest = bench.at_rest and (self._guardian is None or not self._guardian.simulated)
         return ending.s < (SAFE_WITHIN_S if at_rest else ENDS_WITHIN_S)
 
     def _latch_end(self) -> None:
         """Remember that what runs is to end: the next process would take the campaign up again."""
-        if self._place is None:
+        if self._place is None or self._end_latched:
             return
-        user = os_user()
-        with contextlib.suppress(OSError):
-            reason = f"the service was asked to end, and its bench process did not ({user})"
-            self._place.latch.request(StopRequest.new(user, "signal", reason, holds=False))
+        self._end_latched = True
+        user, latch = os_user(), self._place.latch
+        stop = StopRequest.new(user, "signal", f"the service was asked to end ({user})", holds=False)
+
+        def write() -> None:
+            with contextlib.suppress(OSError):
+                latch.request(stop)
+
+        writing = threading.Thread(target=write, name="latch", daemon=True)
+        writing.start()
+        writing.join(LATCH_S)  # a disk that stands still does not delay the end
 
     @staticmethod
     def _kill_bench(bench: BenchLine) -> None:

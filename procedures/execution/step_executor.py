@@ -47,7 +47,12 @@ class StepExecutor:
                     raise
 
     def carry_out(self, step: Step) -> Figures:
-        """Carry out a step without a mark in the journal; returns the figures that say how it went."""
+        """Carry out a step without a mark in the journal; returns the figures that say how it went.
+
+        A request to end is obeyed before: nothing begins to move after a stop. Raises Aborted, Interrupted.
+        """
+        if not isinstance(step, SafeState):
+            checkpoint(self._context)
         self.bench_is_safe = False
         figures = HANDLERS[step.kind](self._context, step)
         self.bench_is_safe = isinstance(step, SafeState)

@@ -183,3 +183,43 @@ def test_a_frozen_web_process_keeps_no_stop_from_the_table(service: ServiceProce
     wait_until(simulator, lambda lines: any(ABORT in line["heard"] for line in lines))
     assert asked.json()["stands"] is True
     assert ended(service.url, campaign)["state"] == "aborted"
+
+
+def test_a_signal_to_a_supervisor_that_stands_still_is_carried_out_by_the_others(
+    service: ServiceProcess, simulator: Simulator
+) -> None:
+    campaign = turning(service, simulator)
+    for pid in (service.process.pid, service.bench_pid):
+        os.kill(pid, signal.SIGSTOP)
+    service.process.send_signal(signal.SIGTERM)
+    wait_until(simulator, lambda lines: any(ABORT in line["heard"] for line in lines))
+    wait_until(simulator, lambda lines: not lines[-1]["table_turns"])
+    quiet = len(simulator.heard)
+    service.process.send_signal(signal.SIGCONT)
+    service.process.communicate(timeout=WAIT_S)
+    assert service.process.returncode == 0
+    with running(service.database, "--bench", str(simulator.bench)) as heir:
+        assert ended(heir.url, campaign)["state"] == "aborted"
+        assert starts_of(simulator, quiet) == []
+
+
+def test_instruments_that_do_not_answer_a_stop_are_named_until_they_do(
+    service: ServiceProcess, simulator: Simulator
+) -> None:
+    campaign = turning(service, simulator)
+    simulator.process.send_signal(signal.SIGSTOP)
+    try:
+        asked = service.http.post(f"/api/campaigns/{campaign}/abort", json={"reason": "a hand in the bench"})
+        assert asked.status_code == 503
+        assert "NOT STOPPED" in asked.text
+        assert "Use the stop switch" in asked.text
+        while "table" not in (bench := service.http.get("/api/benches").json()[0])["unconfirmed"]:
+            before_next_request()
+        assert bench["stop"]["phase"] in {"asked", "stopping"}
+        shown = status(service.url, campaign)
+        assert shown["step_text"].startswith("stopping: table")
+        assert service.http.get("/health").json()["status"] == "look at the bench"
+    finally:
+        simulator.process.send_signal(signal.SIGCONT)
+    assert "a hand in the bench" in ended(service.url, campaign)["reason"]
+    wait_until(simulator, lambda lines: not lines[-1]["table_turns"])

@@ -89,20 +89,25 @@ class TableMotion:
         return move.end_s
 
     def abort(self, t_s: float) -> float:
-        """Ramp down from the present rate; returns the time at which the table is at rest."""
-        move = self._moves[-1]
-        rate = move.rate(t_s)
-        if rate <= 0:
+        """Ramp down from the present rate; returns the time at which the table is at rest.
+
+        A move that is to begin later does not begin.
+        """
+        index = self._in_force(t_s)
+        move = self._moves[index]
+        rate, here = move.rate(t_s), float(move.position(np.array([t_s]))[0])
+        if rate > 0:
+            # The rest of the move is replaced by the down ramp of a move that cruises at the present rate.
+            ramp_steps = rate**2 / (2 * move.acceleration_hz_s)
+            begun = t_s - rate / move.acceleration_hz_s
+            from_steps = here - move.direction * ramp_steps
+            last = Move(begun, from_steps, move.direction, 2 * ramp_steps, rate, move.acceleration_hz_s, t_s)
+        elif self.moving(t_s):
+            last = Move(t_s, here, 1, 0.0, 1.0, 1.0)
+        else:
             return t_s
-        # The rest of the move is replaced by the down ramp of a move that cruises at the present rate.
-        ramp_steps = rate**2 / (2 * move.acceleration_hz_s)
-        here = float(move.position(np.array([t_s]))[0])
-        begun = t_s - rate / move.acceleration_hz_s
-        tail = Move(
-            begun, here - move.direction * ramp_steps, move.direction, 2 * ramp_steps, rate, move.acceleration_hz_s, t_s
-        )
-        self._moves = [*self._moves[1 - HISTORY_MOVES :], tail]
-        return tail.end_s
+        self._moves = [*self._moves[: index + 1][1 - HISTORY_MOVES :], last]
+        return max(last.end_s, t_s)
 
     def home(self, t_s: float) -> float:
         """Turn back to the home switch by the shorter way at a tenth of a turn per second; returns when it is there."""
@@ -114,8 +119,13 @@ class TableMotion:
         return back.end_s
 
     def moving(self, t_s: float) -> bool:
-        """Return whether the table turns at a time, s."""
-        return self._moves[-1].steps > 0 and t_s < self._moves[-1].end_s
+        """Return whether the table turns at a time, s, or is about to."""
+        return any(move.steps > 0 and t_s < move.end_s for move in self._moves[self._in_force(t_s) :])
+
+    def _in_force(self, t_s: float) -> int:
+        """Return which move gives the position at a time: the last one that counts by then."""
+        found = (index for index in range(len(self._moves) - 1, 0, -1) if self._moves[index].from_s <= t_s)
+        return next(found, 0)
 
     def commanded_deg(self, t_s: Array) -> Array:
         """Return the commanded angle, (n,) degrees, unwrapped since home."""

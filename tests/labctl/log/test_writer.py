@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from labctl.log.writer import LogWriter
+from labctl.log.writer import LogWriter, takes_text
 
 SOON_S = 20.0
 
@@ -112,3 +112,16 @@ def test_what_was_lost_is_told_once(pipe: tuple[int, int]) -> None:
     writer.put("next")
     writer.close(SOON_S)
     assert everything(reading) == ["next"]
+
+
+def test_the_end_does_not_wait_for_a_reader_that_stands_still(pipe: tuple[int, int]) -> None:
+    reading, writing = pipe
+    assert takes_text(writing)
+    writer = LogWriter(os.dup(writing))
+    for _ in range(100):
+        writer.put("x" * 4096)
+    writer.close(within_s=3600.0)  # the time of this test is bounded
+    assert writer._thread.is_alive()
+    assert not takes_text(writing)
+    os.close(writing)
+    assert len(everything(reading)) == 100  # the reader goes on: nothing was lost

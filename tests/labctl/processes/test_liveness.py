@@ -1,0 +1,87 @@
+"""A process that gets no processor is late, not silent; what one that stands still was asked is seen."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+
+import pytest
+
+from instruments.clock import VirtualClock
+from labctl.processes import liveness
+from labctl.processes.liveness import Silence, run_delays_s
+from labctl.processes.supervisor_watch import SupervisorWatch, is_stopped, unheard_end
+from labctl.stop.places import ProcessId
+from procedures.execution.signals import ENDING
+from tests.helpers.waiting import eventually
+
+
+@pytest.fixture
+def sleeper() -> Iterator[subprocess.Popen[bytes]]:
+    with subprocess.Popen([sys.executable, "-c", "import signal; signal.pause()"]) as process:
+        yield process
+        process.kill()
+
+
+@pytest.fixture
+def delays(monkeypatch: pytest.MonkeyPatch) -> dict[int, float]:
+    """How long each thread of a process has waited for a processor, s."""
+    found = {11: 5.0, 12: 0.5}
+    monkeypatch.setattr(liveness, "run_delays_s", lambda _: dict(found))
+    return found
+
+
+def test_time_without_a_processor_does_not_count(delays: dict[int, float]) -> None:
+    clock = VirtualClock()
+    silence = Silence(11, excused_s=7.0, clock=clock)
+    clock.sleep(4.0)
+    assert silence.s == 4.0
+    delays[12] += 3.0
+    assert (silence.late_s, silence.s) == (3.0, 1.0)
+    delays[11] += 1.0  # the two waited at the same time
+    assert silence.s == 1.0
+    clock.sleep(20.0)
+    delays[12] += 20.0
+    assert silence.s == 24.0 - 7.0  # not for ever
+    silence.restart()
+    assert (silence.late_s, silence.s) == (0.0, 0.0)
+
+
+def test_a_thread_that_began_since_counts_whole(delays: dict[int, float]) -> None:
+    clock = VirtualClock()
+    silence = Silence(11, excused_s=7.0, clock=clock)
+    clock.sleep(4.0)
+    delays[13] = 2.5
+    assert silence.s == 1.5
+
+
+def test_the_delays_are_those_of_the_kernel(sleeper: subprocess.Popen[bytes]) -> None:
+    assert list(run_delays_s(sleeper.pid)) == [sleeper.pid]
+    assert run_delays_s(sleeper.pid)[sleeper.pid] >= 0.0
+    sleeper.kill()
+    sleeper.wait()
+    assert run_delays_s(sleeper.pid) == {}
+
+
+@pytest.mark.parametrize("number", ENDING)
+def test_a_request_to_end_is_seen_that_a_process_cannot_hear(
+    sleeper: subprocess.Popen[bytes], number: signal.Signals
+) -> None:
+    assert (is_stopped(sleeper.pid), unheard_end(sleeper.pid)) == (False, False)
+    known = ProcessId.of(sleeper.pid)
+    os.kill(sleeper.pid, signal.SIGSTOP)
+    eventually(lambda: is_stopped(sleeper.pid))
+    assert (known.lives, known.stands_still, unheard_end(sleeper.pid)) == (True, True, False)
+    os.kill(sleeper.pid, number)
+    ended: list[str] = []
+    watch = SupervisorWatch(sleeper.pid, lambda: ended.append("asked"))
+    watch.start()
+    eventually(lambda: bool(ended))
+    watch.close()
+    assert (ended, unheard_end(sleeper.pid)) == (["asked"], True)
+    os.kill(sleeper.pid, signal.SIGCONT)
+    sleeper.wait()
+    assert (known.lives, known.stands_still, unheard_end(sleeper.pid)) == (False, False, False)
