@@ -42,6 +42,11 @@ class Target:
         self.address = (host, int(port))
         self.http = httpx.Client(base_url=self.url, timeout=WITHIN_S)
 
+    @property
+    def supervisor_pid(self) -> int:
+        """The process that starts the others."""
+        return self._process.pid
+
     def fit_example(self) -> None:
         """Import a recording and fit it: what the criticisms are of."""
         folder = example("osu-fog")

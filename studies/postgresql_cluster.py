@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import pwd
 import shutil
+import signal
 import subprocess
 import tempfile
 from collections.abc import Iterator
@@ -70,6 +71,23 @@ class Cluster:
         self.stop(how="immediate")
         self.start()
 
+    def freeze(self) -> None:
+        """Stop every process of the server where it is: connections stay open, and nothing is answered any more."""
+        self._signal(signal.SIGSTOP)
+
+    def thaw(self) -> None:
+        """Let a frozen server go on."""
+        self._signal(signal.SIGCONT)
+
+    def _signal(self, number: signal.Signals) -> None:
+        """Send a signal to the server's first process and then, as that one starts the others, to its children."""
+        first = int((self._data / "postmaster.pid").read_text().split()[0])
+        os.kill(first, number)
+        for each in Path("/proc").glob("[0-9]*/stat"):
+            with suppress(OSError):
+                if int(each.read_text().rpartition(")")[2].split()[1]) == first:
+                    os.kill(int(each.parent.name), number)
+
     def url(self, database: str = "postgres") -> str:
         """Return the URL of one of its databases."""
         return f"postgresql+psycopg://{USER}@/{database}?host={self._sockets}"
@@ -91,6 +109,8 @@ def running_cluster(bin_folder: Path) -> Iterator[Cluster]:
         cluster.start()
         yield cluster
     finally:
+        with suppress(OSError):
+            cluster.thaw()  # what a failed test has left frozen cannot end
         with suppress(subprocess.SubprocessError):
             cluster.stop(how="immediate")
         shutil.rmtree(folder, ignore_errors=True)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import asyncio
 from dataclasses import dataclass
 from urllib.parse import unquote
 
+from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import Headers
 from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -97,14 +97,10 @@ class AccessMiddleware:
     async def _caller(self, scope: Scope) -> Caller:
         headers = Headers(scope=scope)
         if (authorization := headers.get("authorization")) is not None:
-            if self._keys is None:
-                return identify(self._service.store, authorization)
-            if scope["method"] == "POST" and STOPS.fullmatch(scope["path"]):
-                known = self._keys.caller_of(authorization)
-                if known is not None:
-                    return known
+            if self._keys is not None and scope["method"] == "POST" and STOPS.fullmatch(scope["path"]):
+                return await self._keys.caller_of(authorization)
             # in a thread: a database that does not answer must not keep the loop from passing on a stop
-            return await asyncio.to_thread(identify, self._service.store, authorization)
+            return await run_in_threadpool(identify, self._service.store, authorization)
         if self._access.keys:
             raise NotIdentified(
                 "this service requires an API key: send `Authorization: Bearer KEY`; `labctl key create` makes one"

@@ -20,6 +20,8 @@ from procedures.contracts.errors import PlanRefused, ProcedureError, StalePrompt
 LONGEST_KEY = 80
 #: How the framework says that the JSON reader gave up for another reason than a wrong character.
 UNREADABLE = "There was an error parsing the body"
+#: How it says that a field of a form that is no file is too long; the limit follows.
+LARGE_PART = "Part exceeded maximum size of"
 TYPE_PREFIX = "urn:labctl:problem:"
 
 
@@ -89,6 +91,12 @@ def _of_http(request: Request, error: HTTPException) -> JSONResponse:
     too_many = error.status_code == 400 and text.startswith("Too many")  # parts of a form: the parser's own bound
     if error.status_code == TooLarge.status or too_many:
         return as_problem(TooLarge(text), request.url.path)
+    if error.status_code == 400 and text.startswith(LARGE_PART):
+        limit = text.removeprefix(LARGE_PART).strip(" .")
+        return as_problem(
+            TooLarge(f"a field of the form (such as column_map) is larger than the limit of {limit}; shorten it"),
+            request.url.path,
+        )
     if error.status_code == 400 and text == UNREADABLE:
         nested = (
             "the request's body cannot be read as JSON: it is nested too deeply, or a number has too many digits; "

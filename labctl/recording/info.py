@@ -79,7 +79,7 @@ class RecordingInfo(BaseModel):
     rate_reference: RateReference | None = None
     tilt_deg: float | None = None
     tilt_azimuth_deg: float | None = None
-    sample_rate_hz: float | None = Field(default=None, gt=0)
+    sample_rate_hz: float | None = Field(default=None, gt=0, allow_inf_nan=False)
     max_rate_dps: float | None = Field(default=None, gt=0)
     active_calibration: str = ""
     notes: str = ""

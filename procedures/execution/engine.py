@@ -99,7 +99,7 @@ class Engine:
         except Aborted as error:
             state, reason = CampaignState.ABORTED, f"aborted: {error}"
         except (InstrumentError, ProcedureError) as error:
-            reason = str(error)
+            state, reason = self._failed(error)
         except (KeyboardInterrupt, SystemExit):
             state, reason = CampaignState.ABORTED, "interrupted (Ctrl-C or a signal)"
             raise
@@ -133,6 +133,17 @@ class Engine:
         self._context.added_runs = restart.added_runs
         self._recorder.change_state(CampaignState.RUNNING, f"resumed at step {start_at + 1}")
         resume_campaign(self._context, self.plan, start_at, restart, self._executor.carry_out)
+
+    def _failed(self, error: InstrumentError | ProcedureError) -> tuple[CampaignState, str]:
+        """Return how a step ends that fails. One that fails after a request to end has been stopped by another thread.
+
+        The engine may find the table at rest before it sees the request: it waited for its database meanwhile.
+        """
+        request = self.control.request
+        if not request.abort:
+            return CampaignState.FAILED, str(error)
+        state = CampaignState.INTERRUPTED if request.resumable else CampaignState.ABORTED
+        return state, f"{state}: {request.reason} (the step then ended with: {error})"
 
     def _describe_done(self) -> str:
         skipped, dropped = len(self._executor.skipped), self._context.bench.dropped

@@ -7,7 +7,7 @@ import lzma
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
@@ -52,10 +52,15 @@ def migrated(path: Path) -> Path:
         return path
 
 
+@cache
+def all_changes() -> tuple[Mapping[str, Any], ...]:
+    """Return the rows of changes.toml."""
+    return tuple(tomllib.loads((FOLDER / "changes.toml").read_text(encoding="utf-8"))["change"])
+
+
 def named_changes(entry: Entry) -> dict[str, Mapping[str, Any]]:
     """Return the rows of changes.toml that concern an entry, by field."""
-    rows = tomllib.loads((FOLDER / "changes.toml").read_text(encoding="utf-8")).get("change", [])
-    return {row["field"]: row for row in rows if entry.name in row["entries"]}
+    return {row["field"]: row for row in all_changes() if entry.name in row["entries"]}
 
 
 def fields_of(answer: object, name: str) -> dict[str, object]:

@@ -43,6 +43,7 @@ from labctl.services.schemas.criticism import (
 )
 from labctl.services.schemas.reports.ladder import LadderResponse
 from labctl.services.schemas.uncertainty import SurfaceResponse, UncertaintyResponse
+from labctl.store import is_url
 
 router = APIRouter(prefix="/api/units/{serial}", tags=["calibrations"])
 OtherUnit = Annotated[bool, Query(description="Accept a recording of another unit than the one in the address.")]
@@ -83,7 +84,8 @@ async def calibration(
     What a format does not carry of it, with its largest size, is in the header `X-Labctl-Lost`, one for each. JSON is a
     point read of tens of microseconds: it runs in the event loop, without a switch to a thread; others compute.
     """
-    if format == "json" and not option:
+    # a server that does not answer would keep the loop from passing on a stop
+    if format == "json" and not option and not is_url(service.store.location):
         file = calibration_file(service.store, serial, version, format)
     else:
         file = await run_in_threadpool(calibration_file, service.store, serial, version, format, option or [])

@@ -6,6 +6,7 @@ from collections.abc import AsyncIterator
 from typing import Annotated
 
 from fastapi import APIRouter, Header, Response
+from fastapi.concurrency import run_in_threadpool
 
 from labctl.api.computation import execute
 from labctl.api.dependencies import ControlPoolDep, ServiceDep, command_route
@@ -132,5 +133,5 @@ async def events(
             else:
                 yield f"id: {update.id}\nevent: {update.kind}\ndata: {update.model_dump_json()}\n\n".encode()
 
-    service.status(campaign)
+    await run_in_threadpool(service.status, campaign)  # a frozen database must not keep the loop from a stop
     return EventStream(stream(), headers={"Cache-Control": "no-cache"})

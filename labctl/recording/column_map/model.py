@@ -130,7 +130,7 @@ class ColumnMap(_Strict):
     kind: Literal["samples", "points"] = "samples"
     motion: Motion | None = None  #: None: what the columns and the readings show
     started_at: AwareDatetime | None = None
-    sample_rate_hz: float | None = Field(default=None, gt=0)
+    sample_rate_hz: float | None = Field(default=None, gt=0, allow_inf_nan=False)
     file: FileKeys = FileKeys()
     columns: dict[str, MappedColumn] = Field(default_factory=dict)  #: none: as proposed from the file
     units: dict[Quantity, UnitKeys] = Field(default_factory=dict)

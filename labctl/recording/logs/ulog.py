@@ -30,6 +30,8 @@ GYRO, COMBINED, INTEGRATED, ACCEL = "sensor_gyro", "sensor_combined", "vehicle_i
 TOPICS = (GYRO, INTEGRATED, COMBINED)
 #: Topics with the time of day; a receiver without a fix sends 0. Nothing was logged before 2001, us.
 RECEIVERS, EARLIEST_US = ("vehicle_gps_position", "sensor_gps"), 1e15
+#: The length of a message is a number of 16 bits, and no value is smaller than a byte; types in types go this deep.
+MOST_VALUES, MOST_NESTED = 0xFFFF, 16
 #: Readings of an accelerometer this far apart in time belong to no reading of the gyro, s.
 MOST_APART_S = 0.5
 
@@ -88,9 +90,33 @@ def _read(path: Path, options: ULogOptions) -> RawTable:
 def _parsed(path: Path) -> Any:
     from pyulog.core import ULog  # noqa: PLC0415  0.1 s that only logs need
 
+    class BoundedLog(ULog):  # type: ignore[misc]  # pyulog has no types
+        """A log whose types are examined before pyulog writes out each of their values."""
+
+        class _MessageAddLogged(ULog._MessageAddLogged):  # type: ignore[misc]  # noqa: SLF001  pyulog's name
+            def _parse_format(self, formats: Mapping[str, Any]) -> None:
+                _values_of(path, self.message_name, formats)
+                super()._parse_format(formats)
+
     # it prints what it finds damaged, and leaves a file that it opened itself open when it fails
     with path.open("rb") as file, redirect_stdout(StringIO()):
-        return ULog(file, [*TOPICS, *RECEIVERS, ACCEL])
+        return BoundedLog(file, [*TOPICS, *RECEIVERS, ACCEL])
+
+
+def _values_of(path: Path, kind: str, formats: Mapping[str, Any], within: tuple[str, ...] = ()) -> int:
+    """Return how many values a message of a type holds. Raises BadRecording for more than a message has bytes."""
+    if kind in within or len(within) > MOST_NESTED:
+        raise BadRecording(f"{path}: the type {kind} of the log contains itself; take the log off the card again")
+    values = 0
+    for field_kind, count, _ in formats[kind].fields:
+        of_one = _values_of(path, field_kind, formats, (*within, kind)) if field_kind in formats else 1
+        values += max(count, 1) * of_one
+        if values > MOST_VALUES:
+            raise BadRecording(
+                f"{path}: a message of type {kind} would hold more than {MOST_VALUES} values, the limit of a ULog "
+                "message; take the log off the card again"
+            )
+    return max(values, 1)
 
 
 def _gyro(path: Path, topic: str, data: Mapping[str, Any]) -> dict[str, Array]:

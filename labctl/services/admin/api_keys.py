@@ -49,11 +49,16 @@ def identify(store: Store, authorization: str) -> Caller:
     digest = digest_of(key.strip())
     row = store.keys.by_digest(digest) if scheme.lower() == SCHEME else None
     if row is None or row.revoked_at is not None or not hmac.compare_digest(row.digest, digest):
-        raise NotIdentified(
-            "the API key is unknown or revoked; send `Authorization: Bearer KEY`; "
-            "`labctl key create NAME --role ROLE` makes one"
-        )
+        raise unknown_key()
     return Caller(row.name, Role(row.role), "key")
+
+
+def unknown_key() -> NotIdentified:
+    """Return the error for a key that is not in force."""
+    return NotIdentified(
+        "the API key is unknown or revoked; send `Authorization: Bearer KEY`; "
+        "`labctl key create NAME --role ROLE` makes one"
+    )
 
 
 def require_role(caller: Caller, needed: Role) -> None:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 
 from labctl.errors import StoreError
 from labctl.log import get_logger
-from labctl.services.admin.api_keys import SCHEME, digest_of
+from labctl.services.admin.api_keys import SCHEME, digest_of, unknown_key
 from labctl.services.schemas.admin import Caller, Role
 from labctl.store import Store
 
@@ -15,9 +17,12 @@ log = get_logger()
 
 #: How often the keys are read again: for so long a stop is taken from a key that was just revoked, s.
 READ_S = 2.0
+#: So long a request with an unknown key waits for the keys to be read again, as its key may be new, s.
+NEW_KEY_S = 1.0
 
 #: Digest -> (name, role) of the keys in force.
 Digests = dict[str, tuple[str, str]]
+_Waiting = tuple[asyncio.AbstractEventLoop, asyncio.Event]
 
 
 class KeyMemory:
@@ -27,7 +32,8 @@ class KeyMemory:
         """`on_change` is called with the keys whenever they are others than before."""
         self._store, self._on_change = store, on_change
         self._digests: Digests = {}
-        self._over = threading.Event()
+        self._over, self._wanted = threading.Event(), threading.Event()
+        self._waiting: set[_Waiting] = set()
         self._thread = threading.Thread(target=self._keep, name="keys", daemon=True)
 
     def start(self) -> None:
@@ -43,18 +49,48 @@ class KeyMemory:
             self._on_change(found)
 
     def _keep(self) -> None:
-        while not self._over.wait(READ_S):
+        while not self._over.is_set():
+            self._wanted.wait(READ_S)
+            self._wanted.clear()
+            waiting = tuple(self._waiting)
             try:
                 self.read()
             except (StoreError, OSError) as error:  # what was read last stays in force
                 log.debug("keys.not_read", error=str(error))
+            for loop, read in waiting:
+                with suppress(RuntimeError):  # the loop has ended
+                    loop.call_soon_threadsafe(read.set)
 
-    def caller_of(self, authorization: str) -> Caller | None:
-        """Return whose key an Authorization header carries; None for one that is not known here."""
+    async def caller_of(self, authorization: str) -> Caller:
+        """Return whose key an Authorization header carries, within `NEW_KEY_S` also where the database is frozen.
+
+        Raises NotIdentified for a key that is not in force.
+        """
+        known = self._known(authorization)
+        if known is None:
+            await self._read_again()
+            known = self._known(authorization)
+        if known is None:
+            raise unknown_key()
+        return known
+
+    def _known(self, authorization: str) -> Caller | None:
         scheme, _, key = authorization.partition(" ")
         found = self._digests.get(digest_of(key.strip())) if scheme.lower() == SCHEME else None
         return None if found is None else Caller(found[0], Role(found[1]), "key")
 
+    async def _read_again(self) -> None:
+        """Wait until the thread has read the keys once more, however many requests wait for that, or `NEW_KEY_S`."""
+        waiting = asyncio.get_running_loop(), asyncio.Event()
+        self._waiting.add(waiting)
+        self._wanted.set()
+        try:
+            with suppress(TimeoutError):
+                await asyncio.wait_for(waiting[1].wait(), NEW_KEY_S)
+        finally:
+            self._waiting.discard(waiting)
+
     def close(self) -> None:
         """End the thread."""
         self._over.set()
+        self._wanted.set()

@@ -12,15 +12,25 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import sqlalchemy as sa
+from pyarrow import parquet
 
+from labctl.recording.recording import Recording
 from labctl.services.admin.api_keys import identify
 from labctl.store import migrate, open_store
-from tests.helpers.corpus import ENTRIES, SERIAL, Entry, migrated, wrongly_named
+from tests.helpers.corpus import ENTRIES, SAME, SERIAL, Entry, migrated, wrongly_named
 from tests.helpers.lab import Lab
 
 STEPS = [(entry, step) for entry in ENTRIES for step in sorted(migrate.KNOWN) if step > entry.name]
+#: How both recordings were fitted (scripts/corpus-entry).
+FITS = {
+    "1": ("--model", "ojeda2000"),
+    "2": ("--effects", "bias,bias_temperature:2,scale_factor,scale_factor_temperature:2"),
+}
+#: A coefficient of a fit with another estimate of the noise may differ by so much of its uncertainty.
+FITTED_WITHIN = 0.02
 of_each_entry = pytest.mark.parametrize("entry", ENTRIES, ids=lambda entry: entry.name)
 
 
@@ -59,6 +69,20 @@ def schema_of(path: Path) -> str:
         return str(raw.execute("SELECT version_num FROM alembic_version").fetchone()[0])
 
 
+def tables_of(path: Path) -> list[tuple[str, ...]]:
+    """Return every table and index of a database, in one form of white space."""
+    with closing(sqlite3.connect(path)) as raw:
+        found = raw.execute("SELECT type, name, sql FROM sqlite_master").fetchall()
+    return sorted((kind, name, " ".join((sql or "").split())) for kind, name, sql in found)
+
+
+@of_each_entry
+def test_it_is_migrated_to_the_tables_of_a_new_database(
+    labs: Callable[[Entry], Lab], entry: Entry, tmp_path: Path
+) -> None:
+    assert tables_of(labs(entry).database) == tables_of(migrated(tmp_path / "new.sqlite"))
+
+
 @of_each_entry
 def test_it_is_migrated_whole_and_checked(labs: Callable[[Entry], Lab], entry: Entry) -> None:
     lab = labs(entry)
@@ -69,6 +93,8 @@ def test_it_is_migrated_whole_and_checked(labs: Callable[[Entry], Lab], entry: E
         assert wrongly_named(entry, "check", entry.answers["check"], found) == []
     if "audit" in entry.answers:
         assert wrongly_named(entry, "audit", entry.answers["audit"], lab.json("audit", "verify")) == []
+    listed = [{key: row[key] for key in entry.answers["campaigns"][0]} for row in lab.json("campaign", "list")]
+    assert listed == entry.answers["campaigns"]
 
 
 @pytest.mark.parametrize(("entry", "step"), STEPS, ids=lambda each: getattr(each, "name", each))
@@ -120,14 +146,21 @@ def test_the_unfinished_campaign_is_resumed_to_its_end(
     for file in labs(entry).folder.glob("lab.sqlite*"):
         shutil.copy(file, tmp_path)
     lab = Lab(tmp_path)
-    assert {row["id"]: row["state"] for row in lab.json("campaign", "list")}[1] == "done"
+    measured = points_of(lab, 3)  # those of campaign 1 and of the import come before it
+    assert 0 < len(measured) < entry.answers["plans"]["recipe.toml"]["datasets"]
     ended = lab.json("campaign", "resume", "2", "--bench", str(entry.folder / "bench.toml"))
     assert ended["state"] == "done"
-    planned = entry.answers["plans"]["recipe.toml"]["datasets"]
-    with open_store(str(lab.database), write=False) as store:
-        points = store.recordings.points(ended["recordings"][SERIAL])
-    assert len(points) == planned
+    points = points_of(lab, ended["recordings"][SERIAL])
+    assert len(points) == entry.answers["plans"]["recipe.toml"]["datasets"]
+    kept = points.gyro_dps("z")[: len(measured)]
+    np.testing.assert_array_equal(kept, measured.gyro_dps("z"))  # what was measured before is not measured again
     assert lab.json("check")["ok"]
+
+
+def points_of(lab: Lab, recording: int) -> Recording:
+    """Return the means of a recording's complete data sets."""
+    with open_store(str(lab.database), write=False) as store:
+        return store.recordings.points(recording)
 
 
 def judged(lab: Lab, number: str) -> dict[str, Any]:
@@ -156,6 +189,29 @@ def test_its_calibrations_are_exported_as_they_were(
     was = json.loads((entry.folder / f"calibration-{number}.json").read_text(encoding="utf-8"))
     now = json.loads((tmp_path / "now.json").read_text(encoding="utf-8"))
     assert wrongly_named(entry, f"calibration-{number}", was, now) == []
+
+
+@of_each_entry
+def test_its_recording_is_exported_as_it_was(labs: Callable[[Entry], Lab], entry: Entry, tmp_path: Path) -> None:
+    labs(entry).run("export", "recording", "1", "--out", str(tmp_path / "now"))
+    for name in ("samples", "environment"):
+        was, now = (
+            parquet.read_table(folder / f"{name}.parquet") for folder in (entry.folder / "recording", tmp_path / "now")
+        )
+        assert now.equals(was)
+
+
+@pytest.mark.parametrize(("number", "model"), FITS.items())
+@of_each_entry
+def test_its_recordings_are_fitted_as_they_were(
+    labs: Callable[[Entry], Lab], entry: Entry, number: str, model: tuple[str, ...], tmp_path: Path
+) -> None:
+    for file in labs(entry).folder.glob("lab.sqlite*"):
+        shutil.copy(file, tmp_path)
+    made = Lab(tmp_path).json("fit", SERIAL, "--recording", number, *model)
+    now = made["axes"]["z"]["coefficients"]
+    for name, was in entry.answers["fits"][number]["axes"]["z"]["coefficients"].items():
+        assert now[name]["value"] == pytest.approx(was["value"], rel=SAME, abs=FITTED_WITHIN * was["u"]), name
 
 
 @pytest.mark.parametrize(

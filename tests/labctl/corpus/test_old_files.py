@@ -7,10 +7,11 @@ import json
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from labctl.store import open_store
-from tests.helpers.corpus import ENTRIES, FOLDER, SERIAL, Entry, named_changes, wrongly_named
+from tests.helpers.corpus import ENTRIES, FOLDER, SAME, SERIAL, Entry, all_changes, migrated, wrongly_named
 from tests.helpers.lab import Lab
 
 of_each_entry = pytest.mark.parametrize("entry", ENTRIES, ids=lambda entry: entry.name)
@@ -59,11 +60,27 @@ def test_its_recording_is_imported_again(entry: Entry, tmp_path: Path) -> None:
         points = store.recordings.points(1)
     assert points.info.serial == SERIAL
     assert len(points) == entry.answers["plans"]["recipe.toml"]["datasets"]
+    (tmp_path / "past").mkdir()
+    with open_store(str(migrated(entry.unpack(tmp_path / "past"))), write=False) as store:
+        measured = store.recordings.points(1)
+    np.testing.assert_allclose(points.gyro_dps("z"), measured.gyro_dps("z"), rtol=SAME)
 
 
-def test_every_named_change_is_of_an_entry_and_says_why() -> None:
+def test_every_named_change_is_of_entries_and_of_an_answer_that_is_compared() -> None:
     assert ENTRIES, f"no entry in {FOLDER}"
-    for entry in ENTRIES:
-        for row in named_changes(entry).values():
-            assert {"entries", "field", "from", "to", "why"} == set(row)
-            assert row["why"]
+    rows, by_name = all_changes(), {entry.name: entry for entry in ENTRIES}
+    for row in rows:
+        assert {"entries", "field", "from", "to", "why"} == set(row)
+        assert row["why"]
+        assert row["entries"]
+        for name in row["entries"]:
+            assert row["field"].startswith(compared(by_name[name])), f"{name}: no test looks at {row['field']}"
+    named = [(name, row["field"]) for row in rows for name in row["entries"]]
+    assert sorted(set(named)) == sorted(named), "a field of an entry is named twice"
+
+
+def compared(entry: Entry) -> tuple[str, ...]:
+    """Return how the fields begin that the tests of this folder compare with the answers of an entry."""
+    both = [f"{kind}{number}." for kind in ("criticisms.", "calibration-") for number in ("1", "2")]
+    others = [f"{name}." for name in ("check", "audit", "verified") if name in entry.answers]
+    return (*both, *others, *(f"plans.{recipe}." for recipe in entry.answers["plans"]))

@@ -78,6 +78,22 @@ def test_abort_in_every_kind_of_step(rig: Any, kind: str) -> None:
     assert outcome.reason == "aborted: the lamp smokes"
 
 
+@pytest.mark.parametrize(("ask", "state"), [("abort", "aborted"), ("interrupt", "interrupted")])
+def test_a_step_that_fails_because_another_thread_stopped_its_table_is_ended_by_the_stop(
+    rig: Any, ask: str, state: str
+) -> None:
+    def stopped_from_outside() -> None:
+        getattr(rig.control, ask)("the lamp smokes")
+        rig.table.fail("spin", RequestRejected("table", "stands still"))
+
+    rig.when_step("acquire", stopped_from_outside)
+    outcome = rig.run()
+    rig.assert_safe()
+    assert outcome.state == state
+    assert outcome.reason.startswith(f"{state}: the lamp smokes (the step then ended with: ")
+    assert "stands still" in outcome.reason
+
+
 def test_abort_inside_a_data_set_keeps_what_was_read_as_partial(rig: Any) -> None:
     def hook(what: str, detail: Any) -> None:
         if what == "readings" and len(rig.journal.blocks) == 4:
