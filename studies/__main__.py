@@ -21,6 +21,7 @@ STUDIES = (
     "process_kill",
     "process_pairs",
     "stops",
+    "page_stops",
     "faults",
     "attacks",
     "damaged_imports",
