@@ -1,9 +1,10 @@
 """Safe stop on a page whose service is killed at a random moment: what the table hears, and what the page says.
 
-Each round runs `labctl serve` on simulated instruments of another process and opens a page of it in a browser. Supervisor
-and web process are killed at a random moment around the press of "Safe stop". In every fifth round the page is loaded
-again instead, and the bench process's own page at the address stops the table. In every third round another service is
-started afterwards. `LABCTL_STUDY_PAGE_STOPS` is how many rounds; `LABCTL_STUDY_PICTURES` a folder for pictures.
+Each round runs `labctl serve` on simulated instruments of another process and opens a page of it in a browser.
+Supervisor and web process are killed at a random moment around the press of "Safe stop", in half of the rounds within
+0.3 s of it. In every fifth round the page is loaded again instead, and the bench process's own page at the address
+stops the table. In every third round another service is started afterwards. `LABCTL_STUDY_PAGE_STOPS` is how many
+rounds; `LABCTL_STUDY_PICTURES` a folder for pictures.
 """
 
 from __future__ import annotations
@@ -296,7 +297,7 @@ def drawn_rounds(rounds: int) -> list[Drawn]:
     rng = np.random.default_rng(2929)
     found = []
     for k in range(rounds):
-        killed_s = float(rng.uniform(-3.0, 2.0))
+        killed_s = float(rng.uniform(-3.0, 2.0) if k % 2 else rng.uniform(-0.3, 0.3))
         page = PAGES[int(rng.integers(len(PAGES)))]
         size = ("wide", "narrow")[int(rng.integers(2))]
         found.append(Drawn(k, killed_s, page, size, bool(rng.integers(2)), k % 5 == 4, k % 3 == 0))

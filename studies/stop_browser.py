@@ -40,7 +40,8 @@ OBSERVE = """
       const box = title.getBoundingClientRect();
       state = {
         shown: true, covers: hit.length / places.length, title: title.textContent, text: over.textContent,
-        contrast: (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05), size_px: parseFloat(getComputedStyle(title).fontSize),
+        contrast: (Math.max(a, b) + 0.05) / (Math.min(a, b) + 0.05),
+        size_px: parseFloat(getComputedStyle(title).fontSize),
         whole: box.left >= 0 && box.right <= innerWidth && box.top >= 0 && box.bottom <= innerHeight,
       };
     }

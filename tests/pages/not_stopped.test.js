@@ -3,9 +3,9 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { LATE_MS, confirms, notStopped } from "../../labctl/web/static/js/core/stop/state.js";
+import { LATE_MS, confirms, notStopped, remembered, troubleOf } from "../../labctl/web/static/js/core/stop/state.js";
 
-const NOTHING = { asked_ms: null, trouble: "", reported: "" };
+const NOTHING = { asked_ms: null, shown: false, trouble: "", reported: "" };
 
 test("nothing is shown while no stop is asked for, and in the first moments of one", () => {
   assert.equal(notStopped(NOTHING), null);
@@ -22,9 +22,28 @@ test("a stop that fails or is late is said to have failed, in words for a person
   assert.equal(notStopped({ ...NOTHING, asked_ms: 10, trouble: "no answer" })?.text, "no answer");
 });
 
+test("what was said once of a stop is said until it is confirmed", () => {
+  assert.ok(notStopped({ ...NOTHING, asked_ms: 10, shown: true }));
+  assert.equal(notStopped({ ...NOTHING, shown: true }), null);
+});
+
 test("a campaign that has ended confirms a stop, and the page in place of the service does", () => {
   assert.ok(confirms({ ended: true }));
   assert.ok(confirms({ stands: true }));
   assert.ok(!confirms({ ended: false }));
   assert.ok(!confirms({ stands: false }));
+});
+
+test("why a stop failed is said once, without what the title says already", () => {
+  assert.match(troubleOf({ detail: "Failed to fetch" }), /^labctl does not answer\. .* again/);
+  assert.match(troubleOf({ status: 401, detail: "needs a key" }), /^labctl refuses the stop: needs a key$/);
+  const late = "NOT STOPPED: table to rest: no answer. Use the stop switch of the bench.";
+  assert.match(troubleOf({ status: 503, detail: late }), /^labctl answers: table to rest: no answer\. The stop/);
+});
+
+test("a stop is asked for again by the next page, but not a day later", () => {
+  const stored = JSON.stringify({ campaign: 3, body: { reason: "smoke" }, at_ms: 1000 });
+  assert.equal(remembered(stored, 2000)?.campaign, 3);
+  assert.equal(remembered(stored, 86_400_000), null);
+  assert.equal(remembered(null, 0), null);
 });
