@@ -22,6 +22,7 @@ STUDIES = (
     "process_pairs",
     "stops",
     "page_stops",
+    "page_stop_cases",
     "faults",
     "attacks",
     "damaged_imports",

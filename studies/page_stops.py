@@ -2,7 +2,7 @@
 
 Each round runs `labctl serve` on simulated instruments of another process and opens a page of it in a browser.
 Supervisor and web process are killed at a random moment around the press of "Safe stop", in half of the rounds within
-0.3 s of it. In every fifth round the page is loaded again instead, and the bench process's own page at the address
+0.2 s of it. In every fifth round the page is loaded again instead, and the bench process's own page at the address
 stops the table. In every third round another service is started afterwards. `LABCTL_STUDY_PAGE_STOPS` is how many
 rounds; `LABCTL_STUDY_PICTURES` a folder for pictures.
 """
@@ -42,7 +42,7 @@ NOTICED_S = 2.0
 GONE_S = 8.0
 PAGES = ("/bench", "/campaigns/{campaign}", "/units")
 #: How long after a stop the table is watched, s.
-WATCHED_S = 6.0
+WATCHED_S = 4.0
 
 
 @dataclass(frozen=True)
@@ -146,7 +146,12 @@ class Watch:
 def begin(service: Service, table: Table) -> int:
     """Start a campaign; returns its number once the table turns."""
     start = {"recipe": RECIPE, "confirmed_by": "the study", "checks": list(BENCH_CHECKS)}
-    campaign = int(httpx.post(f"{service.url}/api/campaigns", json=start, timeout=60.0).json()["id"])
+    while True:
+        with contextlib.suppress(httpx.HTTPError, LookupError):
+            httpx.post(f"{service.url}/api/campaigns", json=start, timeout=60.0)
+            campaign = int(httpx.get(f"{service.url}/api/campaigns", timeout=60.0).json()[0]["id"])
+            break
+        time.sleep(0.5)  # the machine is so busy that the web process was started again
     while not table.turns():
         time.sleep(0.05)
     return campaign
@@ -297,7 +302,7 @@ def drawn_rounds(rounds: int) -> list[Drawn]:
     rng = np.random.default_rng(2929)
     found = []
     for k in range(rounds):
-        killed_s = float(rng.uniform(-3.0, 2.0) if k % 2 else rng.uniform(-0.3, 0.3))
+        killed_s = float(rng.uniform(-3.0, 2.0) if k % 2 else rng.uniform(-0.1, 0.2))
         page = PAGES[int(rng.integers(len(PAGES)))]
         size = ("wide", "narrow")[int(rng.integers(2))]
         found.append(Drawn(k, killed_s, page, size, bool(rng.integers(2)), k % 5 == 4, k % 3 == 0))

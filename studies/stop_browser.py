@@ -80,10 +80,10 @@ def chromium() -> Iterator[Browser]:
 def opened(browser: Browser, url: str, size: str = "wide", *, dark: bool = False) -> Page:
     """Open a page in a browser of its own, which notes what is shown over it."""
     context = browser.new_context(viewport=SIZES[size], color_scheme="dark" if dark else "light")  # type: ignore[arg-type]
-    context.set_default_timeout(30_000)
+    context.set_default_timeout(60_000)
     context.add_init_script(OBSERVE)
     page = context.new_page()
-    page.goto(url)
+    page.goto(url, wait_until="commit")
     return page
 
 

@@ -3,9 +3,16 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { LATE_MS, confirms, notStopped, remembered, troubleOf } from "../../labctl/web/static/js/core/stop/state.js";
+import {
+  LATE_MS,
+  confirms,
+  notStopped,
+  remembered,
+  tableUnknown,
+  troubleOf,
+} from "../../labctl/web/static/js/core/stop/state.js";
 
-const NOTHING = { asked_ms: null, shown: false, trouble: "", reported: "" };
+const NOTHING = { asked_ms: null, shown: false, trouble: "", reported: "", left: "" };
 
 test("nothing is shown while no stop is asked for, and in the first moments of one", () => {
   assert.equal(notStopped(NOTHING), null);
@@ -32,6 +39,24 @@ test("a campaign that has ended confirms a stop, and the page in place of the se
   assert.ok(confirms({ stands: true }));
   assert.ok(!confirms({ ended: false }));
   assert.ok(!confirms({ stands: false }));
+});
+
+test("an ended campaign whose table is not known to stand is not stopped, and a silent chamber is something else", () => {
+  assert.ok(notStopped({ ...NOTHING, left: "table to rest: no answer" }));
+  for (const unconfirmed of [
+    "table to rest: no answer",
+    "chamber to its safe set point: no; table to rest: no",
+    "COM3",
+  ])
+    assert.ok(tableUnknown({ unconfirmed }), unconfirmed);
+  for (const bench of [
+    {},
+    { unconfirmed: "" },
+    { unconfirmed: "chamber to its safe set point: no answer" },
+    { unconfirmed: "stream of FOG-1 closed: no answer" },
+    { unconfirmed: "table to rest: no answer", confirmed_at: "2026-01-05T08:00:00Z" },
+  ])
+    assert.ok(!tableUnknown(bench), JSON.stringify(bench));
 });
 
 test("why a stop failed is said once, without what the title says already", () => {

@@ -6,7 +6,7 @@ import { h } from "../core/elements.js";
 import { button, toast } from "../core/components.js";
 import { dialog } from "../core/dialog.js";
 import { navigate } from "../core/router.js";
-import { stopCampaign, unconfirmedStop } from "../core/stop/overlay.js";
+import { stopCampaign, tableStands, unconfirmedStop } from "../core/stop/overlay.js";
 import { canResume } from "../campaigns/states.js";
 
 /** @import { Bench, Campaign, Check, Prompt } from "../../../types/api.js" */
@@ -42,6 +42,7 @@ async function stop(campaign, body) {
     toast("good", "Stopped. The table stands. The service does not answer; start it again.", { stays: true });
     return;
   }
+  await tableStands(ended.bench);
   const unsafe = (await get("/api/benches")).find((bench) => bench.unconfirmed);
   if (ended.state !== "aborted") toast("bad", `The campaign is ${ended.state}: ${ended.reason}`);
   else if (unsafe) toast("bad", `Stopped, but the safe state was not confirmed: ${unsafe.unconfirmed}`);

@@ -3,7 +3,7 @@
 import { h, setChildren } from "../elements.js";
 import { accessKey, get, post } from "../http/api.js";
 import { Problem, messageOf } from "../http/errors.js";
-import { confirms, notStopped, remembered, troubleOf } from "./state.js";
+import { confirms, notStopped, remembered, tableUnknown, troubleOf } from "./state.js";
 
 /** @import { Campaign } from "../../../../types/api.js" */
 /** @typedef {{ by?: string, reason: string }} Body */
@@ -16,8 +16,12 @@ const AGAIN_MS = 1000;
 const DRAW_MS = 250;
 const STORED = "labctl.stop";
 
-/** @type {{ asked: number | null, shown: boolean, trouble: string, refused: boolean, reported: string }} */
-const known = { asked: null, shown: false, trouble: "", refused: false, reported: "" };
+const LOOK_MS = 2000;
+
+/** @type {{ asked: number | null, shown: boolean, trouble: string, refused: boolean, reported: string, left: string }} */
+const known = { asked: null, shown: false, trouble: "", refused: false, reported: "", left: "" };
+/** Called when a person says that the table stands. */
+let onSeen = () => {};
 /** @type {HTMLDialogElement | null} */
 let box = null;
 
@@ -44,13 +48,17 @@ function draw() {
   const text = `${found.title}${found.text}`;
   if (box.dataset.text !== text) {
     box.dataset.text = text;
-    setChildren(box, h("strong", {}, found.title), h("p", {}, found.text), known.refused ? keyButton() : null);
+    const act = known.left ? seenButton() : known.refused ? keyButton() : null;
+    setChildren(box, h("strong", {}, found.title), h("p", {}, found.text), act);
   }
   if (box.open) return;
   for (const other of document.querySelectorAll("dialog")) other.close(); // it would be hidden below, with its question
   document.body.append(box);
   box.showModal();
 }
+
+const seenButton = () =>
+  h("button", { type: "button", class: "button large", onclick: () => onSeen() }, "I have looked: the table stands");
 
 const keyButton = () =>
   h(
@@ -140,6 +148,26 @@ export async function stopCampaign(campaign, body) {
   Object.assign(known, { asked: null, shown: false, trouble: "", refused: false });
   draw();
   return { campaign: "id" in confirmed ? /** @type {Campaign} */ (confirmed) : null, late };
+}
+
+/**
+ * After a campaign that has ended: says that the table is not known to stand, until labctl has confirmed that it does,
+ * or a person says so. Resolves at once where nothing is open.
+ * @param {string} name of the bench
+ */
+export async function tableStands(name) {
+  let seen = false;
+  const looked = new Promise((resolve) => (onSeen = () => resolve((seen = true))));
+  while (!seen) {
+    const benches = await get("/api/benches/status", {}).catch(() => null); // a service that is silent confirms nothing
+    const bench = benches?.find((each) => each.name === name);
+    if (benches !== null && !tableUnknown(bench ?? {})) break;
+    known.left = bench?.unconfirmed || known.left || "labctl does not answer";
+    draw();
+    await Promise.race([looked, pause(LOOK_MS)]);
+  }
+  known.left = "";
+  draw();
 }
 
 /** The stop that was asked for in this tab before the page was loaded and is not confirmed; null for none. */

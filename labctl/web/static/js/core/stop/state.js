@@ -14,6 +14,7 @@ const AGAIN = "The stop is requested again every second.";
  * @property {boolean} shown whether it was said of this stop already that the bench is not stopped
  * @property {string} trouble why the last request for a stop failed, or ""
  * @property {string} reported what the service reports of a stop that is late, or ""
+ * @property {string} left what the safe state could not confirm of the table after the campaign had ended, or ""
  */
 
 /**
@@ -21,7 +22,8 @@ const AGAIN = "The stop is requested again every second.";
  * @param {Known} known
  * @returns {{ title: string, text: string } | null}
  */
-export function notStopped({ asked_ms, shown, trouble, reported }) {
+export function notStopped({ asked_ms, shown, trouble, reported, left }) {
+  if (left) return { title: TITLE, text: `The campaign has ended. It is not known whether the table stands: ${left}` };
   const asked = asked_ms !== null && (shown || trouble !== "" || asked_ms > LATE_MS);
   if (!asked && !reported) return null;
   return { title: TITLE, text: reported || trouble || `It is not confirmed that the table stands. ${AGAIN}` };
@@ -33,6 +35,16 @@ export function notStopped({ asked_ms, shown, trouble, reported }) {
  * @param {{ ended?: boolean, stands?: boolean }} answer
  */
 export const confirms = (answer) => answer.stands === true || answer.ended === true;
+
+/** Parts of the safe state that say nothing of the table, as the service names them. */
+const OTHER_PARTS = /^(chamber to its safe set point|stream of [^:]+ closed): /;
+
+/**
+ * Whether what a safe state could not confirm leaves open whether the table stands.
+ * @param {{ unconfirmed?: string, confirmed_at?: string | null }} bench
+ */
+export const tableUnknown = ({ unconfirmed = "", confirmed_at = null }) =>
+  unconfirmed !== "" && confirmed_at === null && !unconfirmed.split("; ").every((part) => OTHER_PARTS.test(part));
 
 /**
  * Why a request for a stop failed, for a person at a table.
