@@ -139,7 +139,12 @@ def _begin_one(address: tuple[str, int], opened: ExitStack) -> None:
 
 def criticisms(target: Target) -> AbstractContextManager[None]:
     """50 clients ask for criticisms that are not cached."""
-    return _from_another_process(_ask_for_criticisms, target.url)
+    return criticisms_of(target.url)
+
+
+def criticisms_of(url: str) -> AbstractContextManager[None]:
+    """50 clients, in a process of their own, ask a service for criticisms that are not cached."""
+    return _from_another_process(_ask_for_criticisms, url)
 
 
 def _ask_for_criticisms(url: str) -> None:

@@ -3,7 +3,9 @@
 Each round runs `labctl serve` on simulated instruments at pseudo-terminals and TCP ports of another process, starts a
 campaign, lets one or two processes of the service suffer at random moments, and then asks for a stop: by the page's
 request, by `labctl stop`, or by a signal to the supervisor. The log of the table says when it was stopped and whether
-it turned again. `LABCTL_STUDY_STOPS` is how many rounds, `LABCTL_STUDY_BUSY` how many busy processes run beside.
+it turned again. `LABCTL_STUDY_STOPS` is how many rounds, `LABCTL_STUDY_AT_ONCE` how many run beside each other,
+`LABCTL_STUDY_BUSY` how many busy processes run beside them; with `LABCTL_STUDY_CRITICISMS=1` 50 clients ask each
+service for criticisms meanwhile.
 """
 
 from __future__ import annotations
@@ -16,44 +18,33 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import httpx
 import numpy as np
-import tomli_w
 
-from instruments.bench_config import read_bench
 from labctl.services.schemas.campaigns import BENCH_CHECKS
+from studies.attack_kinds import criticisms_of
+from studies.stop_rig import RECIPE, Table, family, simulators
 
 ROUNDS = int(os.environ.get("LABCTL_STUDY_STOPS", "200"))
+AT_ONCE = int(os.environ.get("LABCTL_STUDY_AT_ONCE", "1"))
 BUSY = int(os.environ.get("LABCTL_STUDY_BUSY", "0"))
+CRITICISMS = os.environ.get("LABCTL_STUDY_CRITICISMS", "0") == "1"
+SEED = int(os.environ.get("LABCTL_STUDY_SEED", "29"))
 #: The table is stopped within this, or the one who asked reads NOT STOPPED within `SAID_S`, s.
 TOLD_S, SAID_S = (2.0, 5.0) if BUSY == 0 else (5.0, 5.0)
 #: How long the table is watched after the stop, while what died is started again, s.
-WATCHED_S = 6.0
+WATCHED_S = 8.0
+#: A service that was asked to end has this long, and a bench process without a supervisor a minute more, s.
+ENDS_WITHIN_S = 80.0
 PROCESSES = ("supervisor", "web", "bench")
 FAULTS = (signal.SIGKILL, signal.SIGSTOP, signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 WAYS = ("page", "command", "signal")
-ABORT = "!1a"
-RECIPE = """
-format = "labctl-recipe/1"
-name = "stops"
-temperatures_c = [25]
-rates_dps = [-40, 40]
-positions = ["z"]
-[soak]
-hold_s = 1
-max_drift_c = 5.0
-drift_window_s = 2
-timeout_s = 600
-[acquire]
-duration_s = 300
-settle_s = 1
-"""
+NOT_STOPPED = "NOT STOPPED"
+EXAMPLE = Path(__file__).parents[1] / "labctl" / "examples" / "osu-fog"
 
 
 @dataclass(frozen=True)
@@ -73,7 +64,7 @@ class Round:
     way: str
     told_s: float | None  #: from the request until the table heard the stop; None: it never did
     stood: bool  #: whether the table stood already when the stop was asked for
-    said_s: float | None  #: until NOT STOPPED was read, where it was
+    said_s: float | None  #: until the one who asked read that the bench is not stopped, where that was said
     turned_again: bool
     left_behind: tuple[int, ...]  #: processes that still live at the end, after a last stop of everything
 
@@ -93,52 +84,19 @@ class Round:
         return f"{faults}; stop by {self.way}: table stopped {told}{said}{again}{left}"
 
 
-class Table:
-    """The simulated table's own log."""
-
-    def __init__(self, log: Path) -> None:
-        self.log = log
-
-    def lines(self) -> list[dict[str, Any]]:
-        """Return what the instruments have heard."""
-        found = []
-        for text in self.log.read_text().splitlines():
-            with contextlib.suppress(ValueError):
-                found.append(json.loads(text))
-        return found
-
-    def turns(self) -> bool:
-        """Return whether the table turned when an instrument heard something last."""
-        lines = self.lines()
-        return bool(lines and lines[-1]["table_turns"])
-
-
-@contextmanager
-def simulators(folder: Path) -> Iterator[tuple[Path, Table]]:
-    """Run the simulated instruments in a process of their own; gives the bench file and the table's log."""
-    near, far, log = folder / "near.toml", folder / "far.toml", folder / "heard"
-    near.write_text(tomli_w.dumps(read_bench("single-axis-sim").model_dump(exclude_none=True)))
-    command = [sys.executable, "-m", "labctl", "simulator", str(near), "--out", str(far), "--log", str(log), "--json"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-        try:
-            assert process.stdout is not None
-            process.stdout.readline()
-            yield far, Table(log)
-        finally:
-            process.terminate()
-
-
 class Service:
     """`labctl serve` on a bench."""
 
     def __init__(self, folder: Path, bench: Path) -> None:
         self.database = folder / "lab.sqlite"
         self.environment = {**os.environ, "XDG_STATE_HOME": str(folder / "state")}
+        self.log = folder / "service.log"
         words = ["serve", "--bench", str(bench), "--port", "0", "--json", "--database", str(self.database)]
-        self.process = subprocess.Popen(
-            [sys.executable, "-m", "labctl", *words], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
-            env=self.environment,
-        )  # fmt: skip
+        with self.log.open("wb") as log:
+            self.process = subprocess.Popen(
+                [sys.executable, "-m", "labctl", *words], stdout=subprocess.PIPE, stderr=log, text=True,
+                env=self.environment,
+            )  # fmt: skip
         assert self.process.stdout is not None
         ready = json.loads(self.process.stdout.readline())
         self.url = ready["url"]
@@ -152,107 +110,127 @@ class Service:
         )  # fmt: skip
 
     def family(self) -> tuple[int, ...]:
-        """Return the processes that have this database on their command line, or were started by this service."""
-        found = set()
-        for entry in Path("/proc").iterdir():
-            with contextlib.suppress(OSError, ValueError):
-                pid, words = int(entry.name), (entry / "environ").read_bytes()
-                state = (entry / "stat").read_text(encoding="latin-1").rpartition(")")[2].split()[0]
-                if str(self.environment["XDG_STATE_HOME"]).encode() in words and state != "Z":
-                    found.add(pid)
-        return tuple(sorted(found))
+        """Return the processes that were started by this service, or on its database."""
+        return family(self.environment["XDG_STATE_HOME"])
+
+    def say_not_stopped(self) -> bool:
+        """Return whether the service has written to its terminal that the bench is not stopped."""
+        return NOT_STOPPED in self.log.read_text(encoding="utf-8", errors="replace")
 
 
 def ask(service: Service, way: str, campaign: int) -> float | None:
-    """Ask for a stop; returns after how many seconds NOT STOPPED was read, None where it was not."""
+    """Ask for a stop; returns after how many seconds it was read that the bench is not stopped, None where it was not.
+
+    A page that gets no answer shows NOT STOPPED over everything at once; whoever signals a process that is gone reads
+    that there is no such process.
+    """
     begun_s = time.monotonic()
-    if way == "signal":
-        with contextlib.suppress(ProcessLookupError):
-            os.kill(service.pids["supervisor"], signal.SIGTERM)
-        return None
-    if way == "page":
-        try:
-            answer = httpx.post(f"{service.url}/api/campaigns/{campaign}/abort", json={"reason": "study"}, timeout=5.0)
-        except httpx.HTTPError:  # the page shows NOT STOPPED over everything, at once
-            return time.monotonic() - begun_s
-        return time.monotonic() - begun_s if "NOT STOPPED" in answer.text else None
+    said = {"page": _ask_page, "command": _ask_command, "signal": _ask_by_signal}[way](service, campaign)
+    return time.monotonic() - begun_s if said else None
+
+
+def _ask_by_signal(service: Service, _campaign: int) -> bool:
+    try:
+        os.kill(service.pids["supervisor"], signal.SIGTERM)
+    except ProcessLookupError:
+        return True
+    until_s = time.monotonic() + SAID_S
+    while time.monotonic() < until_s:
+        if service.say_not_stopped():
+            return True
+        time.sleep(0.1)
+    return False
+
+
+def _ask_page(service: Service, campaign: int) -> bool:
+    try:
+        answer = httpx.post(f"{service.url}/api/campaigns/{campaign}/abort", json={"reason": "study"}, timeout=4.5)
+    except httpx.HTTPError:
+        return True
+    return NOT_STOPPED in answer.text
+
+
+def _ask_command(service: Service, _campaign: int) -> bool:
     command = service.command("stop")
     assert command.stderr is not None
-    for line in command.stderr:
-        if "NOT STOPPED" in line:
-            return time.monotonic() - begun_s
+    with command.stderr:
+        for line in command.stderr:
+            if NOT_STOPPED in line:
+                return True
     command.wait()
-    return None
+    return False
 
 
 def one(faults: tuple[Fault, ...], way: str) -> Round:
     """Run one round."""
     with tempfile.TemporaryDirectory() as name, simulators(Path(name)) as (bench, table):
         service = Service(Path(name), bench)
-        start = {"recipe": RECIPE, "confirmed_by": "the study", "checks": list(BENCH_CHECKS)}
-        campaign = httpx.post(f"{service.url}/api/campaigns", json=start, timeout=60.0).json()["id"]
+        try:
+            return _suffered(service, table, faults, way)
+        finally:
+            for pid in service.family():
+                with contextlib.suppress(ProcessLookupError):
+                    os.kill(pid, signal.SIGKILL)
+
+
+def _suffered(service: Service, table: Table, faults: tuple[Fault, ...], way: str) -> Round:
+    if CRITICISMS:
+        _fit_example(service)
+    start = {"recipe": RECIPE, "confirmed_by": "the study", "checks": list(BENCH_CHECKS)}
+    with criticisms_of(service.url) if CRITICISMS else contextlib.nullcontext():
+        campaign = httpx.post(f"{service.url}/api/campaigns", json=start, timeout=120.0).json()["id"]
         while not table.turns():
             time.sleep(0.05)
         for fault in faults:
             time.sleep(fault.after_s)
             with contextlib.suppress(ProcessLookupError):
                 os.kill(service.pids[fault.process], fault.number)
-        before, stood, begun_s = len(table.lines()), not table.turns(), time.monotonic()
-        watch = subprocess.Popen([sys.executable, "-c", _WATCH, str(table.log), str(before)], stdout=subprocess.PIPE)
+        before, stood, begun_s = len(table.heard), not table.turns(), time.monotonic()
         said_s = ask(service, way, campaign)
-        until_s = begun_s + WATCHED_S + 5.0
-        while time.monotonic() < until_s:
+        while time.monotonic() < begun_s + WATCHED_S:
             time.sleep(0.1)
-        watch.terminate()
-        heard = watch.communicate()[0].split()
-        told_s = float(heard[0]) - begun_s if heard else None
-        lines = table.lines()[before:]
-        stop_at = next(
-            (k for k, line in enumerate(lines) if ABORT in line["heard"] and line["device"] == "table"), None
-        )
-        standing = False
-        turned_again = False
-        for line in lines[(stop_at or 0) :] if stop_at is not None or stood else []:
-            standing = standing or not line["table_turns"]
-            turned_again = turned_again or (standing and line["table_turns"])
-        service.command("stop").wait()
-        for pid in {*service.pids.values(), *service.family()}:
-            with contextlib.suppress(ProcessLookupError):
-                os.kill(pid, signal.SIGCONT)
+    told_s = table.told_s(before)
+    turned_again = _turned_again(table, before, stood)
+    service.command("stop").wait()
+    for pid in {*service.pids.values(), *service.family()}:
         with contextlib.suppress(ProcessLookupError):
-            os.kill(service.pids["supervisor"], signal.SIGTERM)
-        left = _left(service)
-        return Round(faults, way, told_s, stood, said_s, turned_again, left)
+            os.kill(pid, signal.SIGCONT)
+    with contextlib.suppress(ProcessLookupError):
+        os.kill(service.pids["supervisor"], signal.SIGTERM)
+    left = _left(service)
+    return Round(faults, way, None if told_s is None else told_s - begun_s, stood, said_s, turned_again, left)
 
 
-#: Reads the log as it grows, and prints the monotonic time at which the stop appears there.
-_WATCH = """
-import sys, time
-log, before = open(sys.argv[1]), int(sys.argv[2])
-for _ in range(before): log.readline()
-while True:
-    line = log.readline()
-    if not line: time.sleep(0.005); continue
-    if '"table"' in line and '!1a' in line: print(time.monotonic(), flush=True); break
-"""
+def _fit_example(service: Service) -> None:
+    for words in (("import", str(EXAMPLE)), ("fit", "OSU-FOG-2024", "--model", "ojeda2000")):
+        service.command(*words).wait()
+
+
+def _turned_again(table: Table, before: int, stood: bool) -> bool:
+    """Return whether the table turned after it had come to rest from the stop."""
+    lines = table.heard[before:]
+    told = next((k for k, line in enumerate(lines) if line.is_stop), None)
+    standing = stood
+    for line in lines[told or 0 :] if told is not None or stood else []:
+        if standing and line.table_turns:
+            return True
+        standing = standing or not line.table_turns
+    return False
 
 
 def _left(service: Service) -> tuple[int, ...]:
-    """Return the processes of a service that still live a while after its end; they are ended."""
-    until_s = time.monotonic() + 75.0  # a bench process that is left alone ends a minute after its campaign
+    """Return the processes of a service that still live a while after its end."""
+    until_s = time.monotonic() + ENDS_WITHIN_S
     while (found := service.family()) and time.monotonic() < until_s:
         with contextlib.suppress(subprocess.TimeoutExpired):
             service.process.wait(0.2)
         time.sleep(0.2)
-    for pid in found:
-        with contextlib.suppress(ProcessLookupError):
-            os.kill(pid, signal.SIGKILL)
     return found
 
 
 def drawn(rounds: int) -> list[tuple[tuple[Fault, ...], str]]:
     """Draw faults of one or two processes, and the way in which the stop is asked for."""
-    rng = np.random.default_rng(29)
+    rng = np.random.default_rng(SEED)
     found = []
     for _ in range(rounds):
         which = rng.choice(len(PROCESSES), int(rng.integers(1, 3)), replace=False)
@@ -265,12 +243,16 @@ def drawn(rounds: int) -> list[tuple[tuple[Fault, ...], str]]:
 
 def run() -> dict[str, float]:
     """Run all rounds, a line for each."""
+
+    def shown(asked: tuple[tuple[Fault, ...], str]) -> Round:
+        found = one(*asked)
+        print(f"   {'as promised' if found.well else 'NOT AS PROMISED'}: {found}", flush=True)
+        return found
+
     busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(BUSY)]
     try:
-        rounds = []
-        for faults, way in drawn(ROUNDS):
-            rounds.append(one(faults, way))
-            print(f"   {'as promised' if rounds[-1].well else 'NOT AS PROMISED'}: {rounds[-1]}", flush=True)
+        with ThreadPoolExecutor(AT_ONCE) as pool:
+            rounds = list(pool.map(shown, drawn(ROUNDS)))
     finally:
         for each in busy:
             each.kill()
@@ -280,6 +262,8 @@ def run() -> dict[str, float]:
         "as_promised": float(sum(each.well for each in rounds)),
         "turned_again": float(sum(each.turned_again for each in rounds)),
         "left_behind": float(sum(bool(each.left_behind) for each in rounds)),
+        "told": float(len(told)),
         "told_median_s": float(np.median(told)) if told else 0.0,
         "told_largest_s": float(max(told, default=0.0)),
+        "said_not_stopped": float(sum(each.said_s is not None for each in rounds)),
     }

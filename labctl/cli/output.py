@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
@@ -17,6 +18,21 @@ if TYPE_CHECKING:
 #: Without a terminal, lines are not cut to its width.
 console = Console(highlight=False, width=None if sys.stdout.isatty() else 160)
 stderr = Console(stderr=True, highlight=False, soft_wrap=True)
+
+
+#: A reader of standard error that takes nothing for so long is given up, s.
+TAKES_WITHIN_S = 0.3
+STDERR = 2
+
+
+def give_up_blocked_stderr() -> None:
+    """Let standard error go nowhere when its reader stands still: the end of this process does not wait for it."""
+    from labctl.log.writer import takes_text
+
+    if not takes_text(STDERR, TAKES_WITHIN_S):
+        nothing = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nothing, STDERR)
+        os.close(nothing)
 
 
 def print_warnings(warnings: Iterable[DataWarning]) -> None:

@@ -17,8 +17,8 @@ CAPACITY = 2048
 TAKES_WITHIN_S = 5.0
 #: How often `notes` is called at least, s.
 NOTES_EVERY_S = 60.0
-#: How long the end of a process waits for what has not been written, s.
-END_WITHIN_S = 2.0
+#: How long the end of a process waits for what has not been written, s; and for a reader that takes nothing more.
+END_WITHIN_S, STUCK_S = 2.0, 0.3
 
 _Item = str | threading.Event | None  #: a line, a waiting thread, the end
 
@@ -44,6 +44,7 @@ class LogWriter:
         self._queue: SimpleQueue[_Item] = SimpleQueue()
         self._reported = 0
         self.lost = 0  #: lines that were not written
+        self._written = 0  #: pieces of lines that were
         self._thread = threading.Thread(target=self._write_all, name="log", daemon=True)
         self._thread.start()
 
@@ -61,9 +62,18 @@ class LogWriter:
         return written.wait(within_s)
 
     def close(self, within_s: float = END_WITHIN_S) -> None:
-        """Write what was handed over and end; what is not written within that time may be lost."""
+        """Write what was handed over and end; what is not written within that time may be lost.
+
+        A reader that stands still, on a computer that lets this process run, is not waited for.
+        """
         self._queue.put(None)
-        self._thread.join(within_s)
+        left_s = within_s
+        while self._thread.is_alive() and left_s > 0.0:
+            before = self._written
+            self._thread.join(min(STUCK_S, left_s))
+            left_s -= STUCK_S
+            if self._written == before and self._descriptor is not None and not takes_text(self._descriptor):
+                return
 
     def _write_all(self) -> None:
         while (item := self._next()) is not None:
@@ -107,8 +117,18 @@ class LogWriter:
         if self._descriptor is None:
             raise OSError("no output")
         try:
-            return os.write(self._descriptor, rest)
+            taken = os.write(self._descriptor, rest)
         except BlockingIOError:
             if not select.select([], [self._descriptor], [], TAKES_WITHIN_S)[1]:
                 raise
             return 0
+        self._written += 1
+        return taken
+
+
+def takes_text(descriptor: int, within_s: float = 0.0) -> bool:
+    """Return whether a descriptor takes a line without waiting: False for a full pipe whose reader stands still."""
+    try:
+        return bool(select.select([], [descriptor], [], within_s)[1])
+    except (OSError, ValueError):  # it is closed: writing fails at once
+        return True

@@ -19,12 +19,13 @@ from labctl.errors import BadInput, LabctlError
 from labctl.log import get_logger
 from labctl.processes.bench_calls import BenchCalls
 from labctl.processes.calls import CallServer
-from labctl.processes.children import begin_child_log, line_to_parent, tell
+from labctl.processes.children import begin_child_log, leave, line_to_parent, tell
 from labctl.processes.driver_note import DriverNoteWriter
 from labctl.processes.held_address import HeldAddress
 from labctl.processes.liveness import EngineWatch
 from labctl.processes.settings import CALLS, STOP, BenchSettings
 from labctl.processes.supervision import Supervision
+from labctl.processes.supervisor_watch import unheard_end
 from labctl.processes.waker import Waker
 from labctl.services.benches.bench_left import BenchLeft
 from labctl.services.benches.lease import hold_bench
@@ -123,15 +124,27 @@ class BenchProcess:
                 log.info("bench.begun")
                 self._local.start()
             self._look_for_supervisor()
+            self._hear_for_supervisor()
             if self._supervision.alone_s > ALONE_S and self._local.running is None:
                 log.warning("supervisor.gone", alone_s=round(self._supervision.alone_s))
                 return
 
     def _look_for_supervisor(self) -> None:
-        """While there is no supervisor, go on or end by the recipe's rule, and answer at the service's address."""
-        if self._supervision.alone_s > 0.0:
+        """While there is no supervisor, go on or end by the recipe's rule, and answer at the service's address.
+
+        One that stands still guards nothing either; its web process still answers.
+        """
+        if self._supervision.is_unguarded:
             self._local.note_unsupervised()
+        if self._supervision.alone_s > 0.0:
             self._address.open_page(self._supervision.settings.page_access)
+
+    def _hear_for_supervisor(self) -> None:
+        """End where the supervisor was asked to end and stands still, so that it cannot hear it."""
+        pid = self._supervision.settings.guardian_pid
+        if self._supervision.alone_s == 0.0 and pid and unheard_end(pid):
+            log.error("supervisor.stands_still", supervisor_pid=pid, asked_to_end=True)
+            self._waker.end()
 
     def _close(self) -> None:
         log.info("process.ending", running=self._local.running)
@@ -171,4 +184,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    leave(main())

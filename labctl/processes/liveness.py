@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
 
 from instruments.clock import Clock, SystemClock
 from labctl.errors import LabctlError
@@ -29,6 +31,49 @@ class Elapsed:
     def s(self) -> float:
         """The seconds."""
         return self._clock.now_s() - self._since_s
+
+
+class Silence:
+    """How long a process has said nothing; any thread may ask, or count from now on.
+
+    A process that wanted to run and got no processor is late, not silent: that time does not count, up to `excused_s`.
+    One that was stopped, or waits for something that never comes, is excused for nothing.
+    """
+
+    def __init__(self, pid: int, excused_s: float, clock: Clock | None = None) -> None:
+        self._pid, self._excused_s = pid, excused_s
+        self._elapsed = Elapsed(clock)
+        self._delays_s = run_delays_s(pid)
+
+    def restart(self) -> None:
+        """Count from now on."""
+        self._delays_s = run_delays_s(self._pid)
+        self._elapsed.restart()
+
+    @property
+    def late_s(self) -> float:
+        """For how long the process was kept from running since then, s: that of its thread that waited longest."""
+        now_s = run_delays_s(self._pid)
+        grown_s = [delay_s - self._delays_s.get(thread, 0.0) for thread, delay_s in now_s.items()]
+        return min(max(grown_s, default=0.0), self._excused_s)
+
+    @property
+    def s(self) -> float:
+        """The silence that the process has to answer for, s."""
+        return max(self._elapsed.s - self.late_s, 0.0)
+
+
+def run_delays_s(pid: int) -> dict[int, float]:
+    """Return for how long each thread of a process has waited for a processor, s; nothing where that is not known.
+
+    Linux, Documentation/scheduler/sched-stats.rst: the second field of /proc/<pid>/task/<tid>/schedstat, ns.
+    """
+    found: dict[int, float] = {}
+    with suppress(OSError, ValueError):
+        for task in Path(f"/proc/{pid}/task").iterdir():
+            with suppress(OSError, ValueError, IndexError):
+                found[int(task.name)] = 1e-9 * int((task / "schedstat").read_text(encoding="ascii").split()[1])
+    return found
 
 
 class EngineWatch:

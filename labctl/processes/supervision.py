@@ -12,7 +12,7 @@ from multiprocessing.reduction import recv_handle
 
 from labctl.errors import Conflict, StoreError
 from labctl.processes.held_address import HeldAddress
-from labctl.processes.liveness import Elapsed
+from labctl.processes.liveness import Elapsed, Silence
 from labctl.processes.settings import BenchSettings
 from labctl.processes.waker import Waker
 from labctl.services.benches.bench_left import BenchLeft
@@ -20,6 +20,8 @@ from labctl.services.benches.lease import this_machine
 from labctl.store import ServiceAddress, Store
 
 BEAT_S = 1.0
+#: A supervisor that says nothing for so long guards nothing, s; on a busy computer so much longer at most.
+SILENT_S, EXCUSED_S = 2.0, 10.0
 
 
 class Supervision:
@@ -46,12 +48,19 @@ class Supervision:
         self._guard = threading.Lock()
         self._line: Connection | None = None
         self._alone = Elapsed()
+        self._heard: Silence | None = None
         self.begin = False  #: whether a supervisor has said that the bench may be used
 
     @property
     def alone_s(self) -> float:
         """For how long there has been no supervisor, s."""
         return 0.0 if self._line is not None else self._alone.s
+
+    @property
+    def is_unguarded(self) -> bool:
+        """Whether there is no supervisor, or one that has fallen silent."""
+        heard = self._heard
+        return self._line is None or (heard is not None and heard.s > SILENT_S)
 
     def take_charge(self, wanted: BenchSettings, line: Connection) -> None:
         """Obey a supervisor from now on. Raises Conflict while there is another, or for another bench."""
@@ -68,6 +77,7 @@ class Supervision:
                     "--speed and --simulated-start, or stop that process"
                 )
             self._line = line
+            self._heard = Silence(wanted.guardian_pid, EXCUSED_S) if wanted.guardian_pid else None
         self._settings = wanted
         self._store.note_address(ServiceAddress(wanted.url, str(wanted.folder)))
         with contextlib.suppress(StoreError):  # a hint for other processes; a stop does not need it
@@ -86,6 +96,8 @@ class Supervision:
         with contextlib.suppress(EOFError, OSError):
             while True:
                 said = line.recv()
+                if self._heard is not None:
+                    self._heard.restart()
                 if said == "listener":
                     self._address.take(socket.socket(fileno=recv_handle(line)))
                 elif said == "begin":

@@ -24,12 +24,12 @@ from labctl.config import os_user
 from labctl.errors import BenchSilent, BenchUnconfirmed, Conflict, LabctlError
 from labctl.log import get_logger
 from labctl.processes import systemd
-from labctl.processes.bench_line import BenchLine, bench_process_of
+from labctl.processes.bench_line import EXCUSED_S, BenchLine, bench_process_of
 from labctl.processes.calls import Caller
 from labctl.processes.children import Child
 from labctl.processes.guardian import Guardian, GuardianStop
 from labctl.processes.listening import Listening, listening
-from labctl.processes.liveness import Elapsed, Restarts
+from labctl.processes.liveness import Elapsed, Restarts, Silence
 from labctl.processes.settings import CALLS, BenchSettings, ServeRequest, WebSettings, ahead_of
 from labctl.processes.waker import Waker
 from labctl.processes.web_keeper import WebKeeper
@@ -44,7 +44,7 @@ from procedures.execution.signals import ENDING, restore
 
 log = get_logger()
 
-LOOK_S = 0.25
+LOOK_S, BEAT_S = 0.25, 0.5
 #: A bench process that gave no sign of life for so long is ended, its bench stopped, and another one started, s.
 SILENT_S = 3.0
 #: A bench process that starts may take this long to answer for the first time, s.
@@ -252,8 +252,9 @@ class Supervisor:
             shutil.rmtree(self._folder, ignore_errors=True)
             raise
 
-    def _end_bench(self, bench: BenchLine, ending: Elapsed, web: WebKeeper) -> BenchLeft:
+    def _end_bench(self, bench: BenchLine, web: WebKeeper) -> BenchLeft:
         """Let the bench process leave its bench safe, or do it in its place; returns how the bench was left."""
+        ending = Silence(bench.pid, EXCUSED_S)
         bench.tell("end")
         while not bench.wait(LOOK_S):
             systemd.alive()
@@ -275,7 +276,7 @@ class Supervisor:
             text += "; the state of the bench is not known; inspect the bench"
         return BenchLeft(text, unconfirmed=not securing.safe)
 
-    def _may_take_longer(self, bench: BenchLine, ending: Elapsed) -> bool:
+    def _may_take_longer(self, bench: BenchLine, ending: Silence) -> bool:
         """Return whether a bench process that was asked to end may go on with that."""
         if bench.heard_s > SILENT_S:
             return False
@@ -307,13 +308,16 @@ class Supervisor:
             raise
 
     def _watch(self) -> None:
-        notified, since = Elapsed(), Elapsed()
+        notified, since, beaten = Elapsed(), Elapsed(), Elapsed()
         while not self._waker.ending:
             since.restart()
             self._waker.wait(LOOK_S)
             if since.s > LOOK_S + LATE_S and self._bench is not None:
                 self._bench.excuse()
             self._look_after_bench()
+            if self._bench is not None and beaten.s > BEAT_S:
+                beaten.restart()
+                self._bench.tell("beat")
             if notified.s > systemd.period_s():
                 notified.restart()
                 systemd.alive()
@@ -335,11 +339,10 @@ class Supervisor:
 
     def _end(self, web: WebKeeper) -> BenchLeft:
         """End both processes, the bench safe first; returns how the bench was left."""
-        ending = Elapsed()
         log.info("process.ending", stopped=self._waker.ending)
         try:
             assert self._bench is not None
-            return self._end_bench(self._bench, ending, web)
+            return self._end_bench(self._bench, web)
         finally:
             web.close()
             self._end_guarding()

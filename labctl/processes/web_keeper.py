@@ -12,7 +12,7 @@ from labctl.log import get_logger
 from labctl.processes.children import Child
 from labctl.processes.held_address import HeldAddress
 from labctl.processes.listening import Listening
-from labctl.processes.liveness import Elapsed, Restarts
+from labctl.processes.liveness import Elapsed, Restarts, Silence
 from labctl.processes.settings import WebSettings, page_access
 from labctl.processes.waker import Waker
 from labctl.stop.latch import StopRequest
@@ -26,6 +26,9 @@ LOOK_S = 0.25
 PAGE_AFTER_S = 2.0
 #: And for so long: it is ended, and another one started, s.
 SILENT_S = 6.0
+#: On a busy computer it may be silent so much longer, for as long as it gets no processor: another one would get none
+#: either, s.
+EXCUSED_S = 60.0
 #: A look that was itself so late cannot tell whether the web process was silent, s.
 LATE_S = 1.0
 #: The web process cuts its requests and ends within this, s.
@@ -48,13 +51,14 @@ class WebKeeper:
         self._restarts = Restarts()
         self._over, self._closed = threading.Event(), threading.Event()
         self._failure: LabctlError | None = None
-        self._heard = Elapsed()
         self._end_asked = False
         self._thread = threading.Thread(target=self._keep, name="web-keeper", daemon=True)
         self._process = self._new()
 
     def _new(self) -> Child:
-        return Child("labctl.processes.web_process", pass_fds=[self._at.socket.fileno()])
+        made = Child("labctl.processes.web_process", pass_fds=[self._at.socket.fileno()])
+        self._heard, self._unheard = Silence(made.pid, EXCUSED_S), Elapsed()
+        return made
 
     @property
     def pid(self) -> int:
@@ -64,7 +68,7 @@ class WebKeeper:
     def open(self) -> None:
         """Let the first process answer requests; raises what keeps it from that."""
         self._process.open(self._settings(), lambda: self._waker.ending)
-        self._heard.restart()
+        self._count_from_now()
 
     def keep(self) -> None:
         """Watch the process from now on, in a thread."""
@@ -99,7 +103,7 @@ class WebKeeper:
         try:
             while not self._over.wait(LOOK_S):
                 if since.s > LOOK_S + LATE_S:
-                    self._heard.restart()
+                    self._count_from_now()
                 since.restart()
                 self._hear()
                 self._look()
@@ -114,11 +118,15 @@ class WebKeeper:
                 self._process.line.recv()
             except (EOFError, OSError):
                 return
-            self._heard.restart()
+            self._count_from_now()
             self._address.close_page()
 
+    def _count_from_now(self) -> None:
+        self._heard.restart()
+        self._unheard.restart()
+
     def _look(self) -> None:
-        if self._heard.s > PAGE_AFTER_S or self._process.has_ended():
+        if self._unheard.s > PAGE_AFTER_S or self._process.has_ended():
             settings = self._settings()
             self._address.open_page(page_access(settings.request.asks_for_keys, settings.at, settings.folder))
         if self._heard.s > SILENT_S:
@@ -140,4 +148,4 @@ class WebKeeper:
                 log.warning("child.refused", child="web", error=str(error))
             else:
                 log.warning("child.restarted", child="web", child_pid=self.pid)
-        self._heard.restart()
+        self._count_from_now()

@@ -6,7 +6,6 @@ import contextlib
 import os
 import signal
 import socket
-import sys
 import threading
 from multiprocessing.connection import Connection
 
@@ -17,16 +16,21 @@ from labctl.api.access_policy import MIB, AccessPolicy
 from labctl.api.app import create_app
 from labctl.api.connection_limits import limits_for, raise_open_files
 from labctl.api.http_protocol import bounded_http
+from labctl.config import os_user
 from labctl.log import get_logger
-from labctl.processes.children import begin_child_log, end_with_parent, line_to_parent, tell
+from labctl.processes.children import begin_child_log, end_with_parent, leave, line_to_parent, tell
 from labctl.processes.remote_bench import RemoteBench, RemoteWriter
 from labctl.processes.settings import KEYS, LOOPBACK_NAMES, ServeRequest, WebSettings, is_loopback
+from labctl.processes.supervisor_watch import SupervisorWatch
 from labctl.services.admin.api_keys import require_an_api_key
 from labctl.services.admin.key_memory import KeyMemory
 from labctl.services.computation import InWorkers
 from labctl.services.lab_service import VERSION, LabService
 from labctl.services.planning.loading import load_bench
+from labctl.stop.client import not_stopped_text, stop_bench
+from labctl.stop.latch import StopRequest
 from labctl.stop.page import write_keys
+from labctl.stop.places import place_of
 from labctl.stop.priority import of_the_pages
 from labctl.store import Store
 from labctl.store.connection.database import Database
@@ -78,6 +82,27 @@ def _end_with(line: Connection) -> None:
     os.kill(os.getpid(), signal.SIGTERM)
 
 
+def _stop_for(settings: WebSettings) -> None:
+    """Stop the bench in the place of a supervisor that was asked to end and stands still.
+
+    Its bench process does the same where it can; this one also ends a bench process that does not react.
+    """
+    bench = settings.request.bench_name
+    if bench is None:
+        return
+    user = os_user()
+    reason = f"the service was asked to end, and its supervisor stands still ({user})"
+    stop = StopRequest.new(user, "signal", reason, holds=False)
+    place = place_of(settings.request.location, load_bench(bench).name)
+
+    def say(text: str) -> None:
+        log.critical("stop.not_stopped", text=text)
+
+    found = stop_bench(place, stop, say)
+    if not found.stands:
+        say(not_stopped_text(f"bench {found.bench}: {found.text}"))
+
+
 def _keys_of(store: Store, settings: WebSettings) -> KeyMemory:
     """Return the keys in force, which also lie beside the bench process's sockets, for a page without a database."""
     memory = KeyMemory(store, lambda digests: write_keys(settings.folder / KEYS, digests))
@@ -107,6 +132,7 @@ def serve(line: Connection, settings: WebSettings) -> None:
     tell(line, "ready")
     log.info("process.started", version=VERSION, host=settings.at, asks_for_a_key=access.keys)
     threading.Thread(target=_end_with, args=(line,), name="supervisor", daemon=True).start()
+    SupervisorWatch(os.getppid(), lambda: _stop_for(settings)).start()
     with socket.socket(fileno=settings.listener) as listener, contextlib.suppress(KeyboardInterrupt):
         signal.signal(signal.SIGTERM, signal.default_int_handler)  # the server raises it again at its end
         server.run(sockets=[listener])
@@ -133,4 +159,4 @@ def main() -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    leave(main())

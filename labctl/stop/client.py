@@ -101,6 +101,9 @@ class StopAttempt:
         ):
             if not process.lives or not path:
                 continue
+            if process.stands_still:
+                self.text = f"process {process.pid} stands still and answers no stop"
+                continue
             try:
                 return self._by_process(note.bench, path, heard_within_s)
             except (OSError, ValueError, TypeError) as error:

@@ -42,6 +42,12 @@ class ProcessId:
         """Whether the process is there; one that has ended and was not waited for is not."""
         return self.pid > 0 and self.boot == _boot() and _started(self.pid) == self.started
 
+    @property
+    def stands_still(self) -> bool:
+        """Whether the process was stopped, by a signal or a debugger: it answers nothing before it goes on."""
+        fields = _fields(self.pid)
+        return bool(fields) and fields[0] in {"T", "t"}
+
 
 @dataclass(frozen=True)
 class DriverNote:
@@ -171,11 +177,19 @@ def _write(path: Path, document: dict[str, Any]) -> None:
 
 def _started(pid: int) -> int | None:
     """Return when a process started, in clock ticks; None for one that has ended (proc(5), stat, fields 3 and 22)."""
+    fields = _fields(pid)
     try:
-        fields = Path(f"/proc/{pid}/stat").read_text(encoding="latin-1").rpartition(")")[2].split()
         return None if fields[0] in {"Z", "X"} else int(fields[19])
-    except (OSError, ValueError, IndexError):
+    except (ValueError, IndexError):
         return None
+
+
+def _fields(pid: int) -> list[str]:
+    """Return what is known of a process from its state on (proc(5), stat, field 3); nothing for one that is gone."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text(encoding="latin-1").rpartition(")")[2].split()
+    except OSError:
+        return []
 
 
 def _boot() -> str:

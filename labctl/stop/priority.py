@@ -11,7 +11,7 @@ import contextlib
 import os
 from pathlib import Path
 
-#: What stops or guards a bench, what drives it, what answers requests.
+#: What stops or guards a bench, what drives it, what answers requests where the others could not be raised.
 STOP, BENCH, PAGES = -15, -10, 5
 
 
@@ -26,11 +26,18 @@ def of_the_bench() -> None:
 
 
 def of_the_pages() -> None:
-    """Let the processes that drive a bench go first."""
-    _set(PAGES)
+    """Let the processes that drive a bench go first.
+
+    Where those could be raised, this one stays beside all others: a page is not to wait for every other program.
+    """
+    if _set(BENCH):
+        _set(0)
+    else:
+        _set(PAGES)
 
 
-def _set(niceness: int) -> None:
+def _set(niceness: int) -> bool:
+    """Set a niceness, zero where that needs a right that is missing; returns whether it could be set as it is."""
     for wanted in dict.fromkeys((niceness, max(niceness, 0))):
         try:
             os.setpriority(os.PRIO_PROCESS, 0, wanted)
@@ -38,4 +45,5 @@ def _set(niceness: int) -> None:
             continue
         with contextlib.suppress(OSError):
             Path("/proc/self/autogroup").write_text(str(wanted), encoding="ascii")
-        return
+        return wanted == niceness
+    return False

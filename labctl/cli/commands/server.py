@@ -11,7 +11,7 @@ import typer
 from labctl.cli.command_log import log_of_command
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import BenchName, Database, Json, SimulatedStart, simulated_start
-from labctl.cli.output import console, print_json, stderr
+from labctl.cli.output import console, give_up_blocked_stderr, print_json, stderr
 
 MaxUpload = Annotated[
     int, typer.Option("--max-upload-mib", metavar="N", help="Largest recording that may be sent, in MiB.")
@@ -72,7 +72,10 @@ def serve(
             console.print(text, style="yellow", markup=False, soft_wrap=True)
 
     with one_clear_line(), log_of_command("supervisor", default="info", location=request.location):
-        left = serve_forever(request, ready)
+        try:
+            left = serve_forever(request, ready)
+        finally:
+            give_up_blocked_stderr()
     stderr.print(f"labctl: stopped{'; ' if left else ''}{left}", markup=False)
 
 
