@@ -19,7 +19,8 @@ from typing import TYPE_CHECKING
 
 from studies.page_stops import PICTURES, Watch, _ended, begin, kill, noticed, successor, waited
 from studies.stop_browser import chromium, opened, picture, press_stop, shown_over
-from studies.stops import Service, Table, simulators
+from studies.stop_rig import Table, simulators
+from studies.stops import Service
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -240,7 +241,6 @@ def run() -> dict[str, float]:
                         held, total = held + holds, total + 1
                         print(f"   {name}: {'' if holds else 'NOT AS PROMISED: '}{text}", flush=True)
                 finally:
-                    watch.close()
                     for context in browser.contexts:
                         context.close()
                     _ended(service)

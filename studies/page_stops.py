@@ -29,7 +29,8 @@ import numpy as np
 
 from labctl.services.schemas.campaigns import BENCH_CHECKS
 from studies.stop_browser import Shown, chromium, opened, picture, press_stop, shown_over
-from studies.stops import ABORT, RECIPE, SAID_S, TOLD_S, Service, Table, _left, simulators
+from studies.stop_rig import RECIPE, Heard, Table, simulators
+from studies.stops import SAID_S, TOLD_S, Service
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
@@ -41,6 +42,8 @@ NOTICED_S = 2.0
 #: The message goes, and the page says that the table stands, within this, s.
 GONE_S = 8.0
 PAGES = ("/bench", "/campaigns/{campaign}", "/units")
+#: A bench process that was asked to end has this long, s.
+ENDS_WITHIN_S = 20.0
 #: How long after a stop the table is watched, s.
 WATCHED_S = 4.0
 
@@ -63,6 +66,7 @@ class Round:
     """What came of one round."""
 
     drawn: Drawn
+    loaded_s: float = 0.0  #: until the page had its button
     noticed_s: float | None = None  #: from the kill until the bench process answered at the address
     told_s: float | None = None  #: from the press until the table heard the stop
     said_s: float | None = None  #: from the press until NOT STOPPED was shown over everything
@@ -91,56 +95,31 @@ class Round:
             return "never" if found is None else f"{found:.2f} s"
 
         return (
-            f"{drawn.seed}: {what}: noticed {seconds(self.noticed_s)}, table told {seconds(self.told_s)}, NOT STOPPED "
-            f"shown {seconds(self.said_s)}, gone {seconds(self.gone_s)} after the stop"
-            f"{', LIED' if self.lied else ''}{'' if self.says_stands else ', NOT SAID THAT IT STANDS'}"
+            f"{drawn.seed}: {what}: loaded {self.loaded_s:.1f} s, noticed {seconds(self.noticed_s)}, table told "
+            f"{seconds(self.told_s)}, NOT STOPPED shown {seconds(self.said_s)}, gone {seconds(self.gone_s)} after the "
+            f"stop{', LIED' if self.lied else ''}{'' if self.says_stands else ', NOT SAID THAT IT STANDS'}"
             f"{', TURNED AGAIN' if self.turned_again else ''}"
             f"{f', left behind {self.left_behind}' if self.left_behind else ''}"
         )
 
 
 class Watch:
-    """Follows the table's log as it grows, with the time of this computer at which each line came."""
+    """What the table heard, at the time of day that a page has too, s since 1970."""
 
     def __init__(self, table: Table) -> None:
-        self.lines: list[tuple[float, dict[str, Any]]] = []
-        self._log, self._over = table.log, threading.Event()
-        self._thread = threading.Thread(target=self._follow, daemon=True)
-        self._thread.start()
-
-    def _follow(self) -> None:
-        with self._log.open() as log:
-            rest = ""
-            while not self._over.wait(0.005):
-                while line := log.readline():
-                    rest += line
-                    if rest.endswith("\n"):
-                        with contextlib.suppress(ValueError):
-                            self.lines.append((time.time(), json.loads(rest)))
-                        rest = ""
-
-    def close(self) -> None:
-        """End the thread."""
-        self._over.set()
-        self._thread.join()
+        self._table, self._ahead_s = table, time.time() - time.monotonic()
 
     def stopped_s(self, after_s: float) -> float | None:
-        """Return when the table heard the stop first, s since 1970."""
-        return next(
-            (at for at, line in self.lines if at >= after_s and line["device"] == "table" and ABORT in line["heard"]),
-            None,
-        )
+        """Return when the table heard the stop first."""
+        return next((at for line in self._table.heard if (at := self._at(line)) >= after_s and line.is_stop), None)
 
     def turned_again(self, after_s: float) -> bool:
         """Return whether the table turned after it had stood."""
-        standing = False
-        for at, line in self.lines:
-            if at < after_s:
-                continue
-            if standing and line["table_turns"]:
-                return True
-            standing = standing or not line["table_turns"]
-        return False
+        turning = [line.table_turns for line in self._table.heard if self._at(line) >= after_s]
+        return False in turning and True in turning[turning.index(False) :]
+
+    def _at(self, line: Heard) -> float:
+        return line.at_s + self._ahead_s
 
 
 def begin(service: Service, table: Table) -> int:
@@ -209,7 +188,7 @@ def one(browser: Browser, drawn: Drawn) -> Round:
             campaign = begin(service, table)
             path = "/bench" if drawn.page == "/units" else drawn.page.format(campaign=campaign)
             page = opened(browser, service.url + path, drawn.size, dark=drawn.dark)
-            page.get_by_role("button", name="Safe stop").wait_for()
+            found.loaded_s = _loaded(page, drawn)
             pressed_s = _pressed_own(page, service, found) if drawn.reloads else _pressed(page, service, found)
             stopped = waited(lambda: watch.stopped_s(pressed_s), 20.0)
             stopped_s = watch.stopped_s(pressed_s) if stopped else None
@@ -223,9 +202,19 @@ def one(browser: Browser, drawn: Drawn) -> Round:
             found.turned_again = stopped_s is not None and watch.turned_again(stopped_s)
             page.context.close()
         finally:
-            watch.close()
             found.left_behind = _ended(service)
     return found
+
+
+def _loaded(page: Page, drawn: Drawn) -> float:
+    """Wait until the page has its button; returns how long that took, s."""
+    begun_s = time.time()
+    try:
+        page.get_by_role("button", name="Safe stop").wait_for()
+    except Exception as error:
+        picture(page, PICTURES, f"round-{drawn.seed}-not-loaded")
+        raise TimeoutError("the page was not loaded in a minute") from error
+    return time.time() - begun_s
 
 
 def _pressed(page: Page, service: Service, found: Round) -> float:
@@ -294,7 +283,8 @@ def _ended(service: Service) -> tuple[int, ...]:
     for pid in service.family():  # a bench process left alone ends only after a minute
         with contextlib.suppress(ProcessLookupError):
             os.kill(pid, signal.SIGTERM)
-    return _left(service)
+    waited(lambda: not service.family(), ENDS_WITHIN_S)
+    return service.family()
 
 
 def drawn_rounds(rounds: int) -> list[Drawn]:
@@ -314,7 +304,11 @@ def run() -> dict[str, float]:
     rounds = []
     with chromium() as browser:
         for drawn in drawn_rounds(FIRST + ROUNDS)[FIRST:]:
-            rounds.append(one(browser, drawn))
+            try:
+                rounds.append(one(browser, drawn))
+            except TimeoutError as error:
+                print(f"   NO ROUND: {drawn.seed}: {error}", flush=True)
+                continue
             print(f"   {'as promised' if rounds[-1].well else 'NOT AS PROMISED'}: {rounds[-1]}", flush=True)
     return figures(rounds)
 
@@ -336,5 +330,5 @@ def figures(rounds: list[Round]) -> dict[str, float]:
         "not_stopped_shown": float(sum(each.said_s is not None for each in rounds)),
         "turned_again": float(sum(each.turned_again for each in rounds)),
         "lied": float(sum(each.lied for each in rounds)),
-        **spread("noticed_s"), **spread("told_s"), **spread("said_s"), **spread("gone_s"),
+        **spread("loaded_s"), **spread("noticed_s"), **spread("told_s"), **spread("said_s"), **spread("gone_s"),
     }  # fmt: skip
