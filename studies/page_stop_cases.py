@@ -1,4 +1,4 @@
-"""Safe stop on a page in the cases that a random kill seldom meets: nobody answers, frozen processes, several tabs.
+"""Safe stop on a page in the cases that a random kill seldom meets: no process answers, frozen processes, several tabs.
 
 Each case runs `labctl serve` on simulated instruments of another process, with a page of it in a browser, and says what
 the table heard and what the page showed. `LABCTL_STUDY_CASES` names the cases to run; `LABCTL_STUDY_PICTURES` a folder
@@ -62,7 +62,7 @@ def says_stands(page: Page) -> bool:
     return "Stopped." in page.inner_text(".toasts") and not is_said(page)
 
 
-def nobody_answers(case: Case) -> list[tuple[str, bool]]:
+def no_process_answers(case: Case) -> list[tuple[str, bool]]:
     """All three processes are killed; later another service starts."""
     pages = [case.page(size=size, dark=dark) for size, dark in (("wide", False), ("narrow", True))]
     kill(case.service, "supervisor", "web", "bench")
@@ -70,18 +70,18 @@ def nobody_answers(case: Case) -> list[tuple[str, bool]]:
     said = [waited(lambda page=page: is_said(page), 5.0) for page in pages]
     time.sleep(6.0)
     for page, name in zip(pages, ("wide", "narrow"), strict=True):
-        picture(page, PICTURES, f"nobody-{name}")
+        picture(page, PICTURES, f"silent-{name}")
     stays = [is_said(page) for page in pages]
     with successor(case.service, case.bench):
         told_s = case.told(pressed_s, 40.0)
         over = [waited(lambda page=page: says_stands(page), 20.0) for page in pages]
-        picture(pages[0], PICTURES, "nobody-then-successor")
+        picture(pages[0], PICTURES, "silent-then-successor")
         stopped_s = case.watch.stopped_s(pressed_s) or 0.0
         gone = [[each.at_s for each in shown_over(page) if not each.shown and each.at_s > pressed_s] for page in pages]
         time.sleep(3.0)
         again = case.watch.turned_again(stopped_s)
     return [
-        ("NOT STOPPED within 5 s on both pages", all(said)), ("stays while nobody answers", all(stays)),
+        ("NOT STOPPED within 5 s on both pages", all(said)), ("stays while no process answers", all(stays)),
         (f"the successor stops the table (after {told_s} s)", told_s is not None),
         ("goes on both pages", all(over)),
         ("only after the stop", all(at >= stopped_s - 0.05 for each in gone for at in each)),
@@ -211,7 +211,7 @@ def table_silent_without_service(case: Case) -> list[tuple[str, bool]]:
 CASES: dict[str, Callable[[Case], list[tuple[str, bool]]]] = {
     each.__name__: each
     for each in (
-        nobody_answers, web_frozen, web_frozen_for_a_moment, seven_tabs, two_tabs, own_page_then_successor,
+        no_process_answers, web_frozen, web_frozen_for_a_moment, seven_tabs, two_tabs, own_page_then_successor,
         table_silent, table_silent_without_service,
     )
 }  # fmt: skip

@@ -5,6 +5,7 @@ What counts is what a person at the table reads, and that the stop is asked for 
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 from collections.abc import Callable, Iterator
@@ -18,6 +19,7 @@ from labctl.services.campaigns import preparation
 from labctl.services.commands.registry import CREATE_KEY
 from labctl.services.schemas.admin import KeyRequest, Role
 from tests.helpers.browser import NARROW, PATIENCE_MS, WIDE, Faults, Service
+from tests.helpers.forked_commands import run_labctl
 from tests.helpers.paced_hand import PacedClock, PacedPerson
 from tests.helpers.paths import RECIPES
 from tests.helpers.processes import ServiceProcess, running
@@ -214,12 +216,11 @@ def test_the_bench_process_s_own_page_stops_by_an_operator_s_key_without_javascr
 ) -> None:
     from playwright.sync_api import expect
 
-    keys = {}
-    with running(tmp_path / "lab.sqlite") as service:
-        for role in ("viewer", "operator"):
-            made = service.run("key", "create", role, "--role", role, "--json")
-            keys[role] = httpx.Response(200, text=made.stdout).json()["key"]
-    with running(tmp_path / "lab.sqlite", "--require-keys") as service:
+    database, keys = tmp_path / "lab.sqlite", {}
+    for role in ("viewer", "operator"):
+        made = run_labctl(["key", "create", role, "--role", role, "--json", "--database", str(database)])
+        keys[role] = json.loads(made.stdout)["key"]
+    with running(database, "--require-keys") as service:
         begun(service, keys["operator"])
         kill(service)
         page = context_of(f"{service.url}/campaigns/1", java_script_enabled=False)
