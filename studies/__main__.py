@@ -22,6 +22,8 @@ STUDIES = (
     "process_pairs",
     "stops",
     "stop_sequences",
+    "page_stops",
+    "page_stop_cases",
     "faults",
     "attacks",
     "damaged_imports",

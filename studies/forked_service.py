@@ -27,6 +27,7 @@ from labctl.processes.held_address import HeldAddress
 from labctl.processes.listening import Listening
 from labctl.processes.settings import ServeRequest, WebSettings, page_access
 from labctl.stop.latch import StopRequest
+from labctl.stop.page import BenchNow
 from labctl.stop.priority import first_of_all
 from labctl.stop.wire import Stopping
 
@@ -98,7 +99,7 @@ class PageKeeper:
         respond: Callable[[StopRequest], Stopping],
     ) -> None:
         self._at, self._settings = at, settings
-        self._address = HeldAddress(respond, lambda: "This service has no web process.")
+        self._address = HeldAddress(respond, lambda: BenchNow("This service has no web process."))
 
     def open(self) -> None:
         """Nothing."""

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 from labctl.log import get_logger
 from labctl.stop.latch import StopRequest
-from labctl.stop.page import PageAccess, StopPage
+from labctl.stop.page import BenchNow, PageAccess, StopPage
 from labctl.stop.wire import Stopping
 
 log = get_logger()
@@ -18,7 +18,7 @@ class HeldAddress:
     """One listening socket at most; any thread may use it."""
 
     def __init__(
-        self, respond: Callable[[StopRequest], Stopping], describe: Callable[[], str], *, relays: bool = False
+        self, respond: Callable[[StopRequest], Stopping], describe: Callable[[], BenchNow], *, relays: bool = False
     ) -> None:
         """Answer stops with `respond`, and requests for the page with what `describe` says.
 

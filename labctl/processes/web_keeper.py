@@ -16,6 +16,7 @@ from labctl.processes.liveness import Elapsed, Restarts, Silence
 from labctl.processes.settings import WebSettings, page_access
 from labctl.processes.waker import Waker
 from labctl.stop.latch import StopRequest
+from labctl.stop.page import BenchNow
 from labctl.stop.wire import Stopping
 
 log = get_logger()
@@ -46,7 +47,7 @@ class WebKeeper:
     ) -> None:
         """Start a process, which loads its modules; `respond` begins a stop that is asked for meanwhile."""
         self._at, self._waker, self._settings = at, waker, settings
-        self._address = HeldAddress(respond, lambda: "labctl starts its web process again.", relays=True)
+        self._address = HeldAddress(respond, lambda: BenchNow("labctl starts its web process again."), relays=True)
         self._restarts = Restarts()
         self._over, self._closed = threading.Event(), threading.Event()
         self._failure: LabctlError | None = None

@@ -18,6 +18,7 @@ from labctl.services.schemas.benches import BenchDescription, StopResponse
 from labctl.services.schemas.campaigns import CampaignResponse
 from labctl.stop.client import not_stopped_text
 from labctl.stop.latch import StopRequest
+from labctl.stop.page import BenchNow
 from labctl.stop.wire import Stopping
 from labctl.store import Store
 
@@ -111,14 +112,15 @@ class LocalBench:
         if self.runner is not None:
             self.runner.note_unsupervised()
 
-    def describe_running(self) -> str:
+    def describe_running(self) -> BenchNow:
         """Say in one sentence what runs, from memory."""
         if self.runner is None:
-            return "This service drives no bench."
-        campaign = self.runner.running
+            return BenchNow("This service drives no bench.")
+        bench, campaign, late = self.runner.bench.name, self.runner.running, self.runner.not_stopped
         if campaign is None:
-            return f"No campaign runs on bench {self.runner.bench.name}."
-        return f"Campaign {campaign} runs on bench {self.runner.bench.name}, without its service."
+            return BenchNow(f"No campaign runs on bench {bench}.", not_stopped=late)
+        text = f"Campaign {campaign} runs on bench {bench}, without its service."
+        return BenchNow(text, runs=True, not_stopped=late)
 
     @property
     def polls(self) -> tuple[int, int] | None:

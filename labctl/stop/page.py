@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import hashlib
 import hmac
-import html
 import json
 import re
 import select
@@ -21,9 +20,11 @@ from http.server import BaseHTTPRequestHandler
 from io import BufferedReader, BytesIO
 from pathlib import Path
 from typing import Any
+from urllib.parse import parse_qsl
 
 from instruments.clock import SystemClock
 from labctl.stop.latch import StopRequest
+from labctl.stop.page_html import not_stopped, running, stopped
 from labctl.stop.wire import LAST, Stopping, Word, phases
 
 #: A request that is not read, or an answer that is not taken, within this is dropped, s.
@@ -38,7 +39,17 @@ WEB_BACK_S = 1.0
 BODY_BYTES = 16 * 1024
 STOP_PATH = re.compile(r"/api/(?:stop|campaigns/(\d+)/abort)")
 OPERATORS = frozenset({"operator", "approver"})
+NOT_STOPPED = "NOT STOPPED"
 NO_WEB = "the web process of labctl does not answer; only a stop is possible at this address now"
+
+
+@dataclass(frozen=True)
+class BenchNow:
+    """What the page shows of the bench."""
+
+    text: str  #: one sentence
+    runs: bool = False  #: whether a campaign runs
+    not_stopped: str = ""  #: what is known of a stop that is late; empty: none is
 
 
 @dataclass(frozen=True)
@@ -65,7 +76,7 @@ class StopPage:
         listener: socket.socket,
         access: PageAccess,
         respond: Callable[[StopRequest], Stopping],
-        describe: Callable[[], str],
+        describe: Callable[[], BenchNow],
         *,
         relays: bool = False,
     ) -> None:
@@ -76,6 +87,7 @@ class StopPage:
         """
         self._listener, self._access, self._respond, self._describe = listener, access, respond, describe
         self._relays, self._closed = relays, threading.Event()
+        self._last: Stopping | None = None  # the stop that was asked for here last
         self._waker, self._woken = socket.socketpair()
         self._callers = threading.Semaphore(MOST_CALLERS)
         self._waiting = threading.Semaphore(MOST_WAITING)
@@ -130,8 +142,12 @@ class StopPage:
         page = self
 
         class Handler(_Handler):
-            access, respond, describe = page._access, staticmethod(page._respond), staticmethod(page._describe)
+            access, respond, describe = page._access, staticmethod(page._begin), staticmethod(page._describe)
             content = request
+
+            @property
+            def last(self) -> Stopping | None:
+                return page._last
 
             def web_is_back(self) -> bool:
                 return page._relays and page._closed.wait(WEB_BACK_S)
@@ -142,6 +158,10 @@ class StopPage:
             return False
         caller.recv(len(request))  # what is left unread would reset the connection before the answer is read
         return True
+
+    def _begin(self, stop: StopRequest) -> Stopping:
+        self._last = stopping = self._respond(stop)
+        return stopping
 
     def _pass_on(self, caller: socket.socket) -> None:
         """Pass a connection on to the web process, once that answers again."""
@@ -195,8 +215,13 @@ class _Handler(BaseHTTPRequestHandler):
     protocol_version = "HTTP/1.0"  # a connection carries one request: the next one may be the web process's
     access: PageAccess
     respond: Callable[[StopRequest], Stopping]
-    describe: Callable[[], str]
+    describe: Callable[[], BenchNow]
     content: bytes  #: the request, which is still in the socket
+
+    @property
+    def last(self) -> Stopping | None:
+        """The stop that was asked for here last."""
+        return None
 
     def setup(self) -> None:
         """Read the request from memory."""
@@ -210,9 +235,20 @@ class _Handler(BaseHTTPRequestHandler):
     def do_GET(self) -> None:
         """Show the page; anything else than a page is answered with 503."""
         if self.path.startswith(("/api", "/health", "/metrics", "/static")):
-            self._problem(503, "no-web-process", f"{NO_WEB}. {self.describe()}")
+            self._problem(503, "no-web-process", f"{NO_WEB}. {self.describe().text}")
         elif self._is_ours():
-            self._send(503, "text/html; charset=utf-8", _page(self.describe()).encode())
+            self._show(503, self._state())
+
+    def _state(self) -> str:
+        """Return the page: what the last stop here came to, else what runs."""
+        asks_for_key, now, last = self.access.keys is not None, self.describe(), self.last
+        if now.not_stopped:
+            return not_stopped(now.not_stopped, asks_for_key)
+        if last is not None and not (last.is_over(0.0) and last.stands):
+            return not_stopped(last.text, asks_for_key)
+        if last is not None and not now.runs:
+            return stopped(f"{last.text}. {now.text}", asks_for_key)
+        return running(now.text, asks_for_key)
 
     def do_HEAD(self) -> None:
         """Answer as `do_GET`, without the content."""
@@ -223,12 +259,12 @@ class _Handler(BaseHTTPRequestHandler):
         body = self.rfile.read(min(int(self.headers.get("Content-Length") or 0), BODY_BYTES))
         found = STOP_PATH.fullmatch(self.path.partition("?")[0])
         if found is None:
-            self._problem(503, "no-web-process", f"{NO_WEB}. {self.describe()}")
-            return
-        caller = self._caller()
-        if caller is None:
+            self._problem(503, "no-web-process", f"{NO_WEB}. {self.describe().text}")
             return
         given = _fields(body, self.headers.get("Content-Type", ""))
+        caller = self._caller(str(given.get("key", "")))
+        if caller is None:
+            return
         by = str(given.get("by") or caller)
         campaign = int(found[1]) if found[1] else None
         reason = f"{given.get('reason') or 'stopped on the page'} ({by})"
@@ -236,18 +272,22 @@ class _Handler(BaseHTTPRequestHandler):
         last = _followed(self.respond(stop))
         if last.phase == "stands" and self.web_is_back():
             raise _WebIsBack
-        self._tell(last, as_page="text/html" in self.headers.get("Accept", ""))
+        self._tell(last)
 
-    def _tell(self, last: Word, *, as_page: bool) -> None:
+    @property
+    def _wants_page(self) -> bool:
+        return "text/html" in self.headers.get("Accept", "")
+
+    def _tell(self, last: Word) -> None:
         stands = last.phase == "stands"
-        text = last.text if stands else f"NOT STOPPED: {last.text}. Use the stop switch of the bench."
-        if as_page:
-            self._send(200 if stands else 503, "text/html; charset=utf-8", _page(text).encode())
+        if self._wants_page:
+            page = stopped if stands else not_stopped
+            self._show(200 if stands else 503, page(last.text, self.access.keys is not None))
         elif stands:
-            answer = {"stands": True, "text": text, "campaign": last.campaign}
+            answer = {"stands": True, "text": last.text, "campaign": last.campaign}
             self._send(200, "application/json", json.dumps(answer).encode())
         else:
-            self._problem(503, "not-stopped", text)
+            self._problem(503, "not-stopped", f"{NOT_STOPPED}: {last.text}. Use the stop switch of the bench.")
 
     def _is_ours(self) -> bool:
         """Return whether a request without a key was sent to this service by a name of it, by no other site."""
@@ -265,11 +305,11 @@ class _Handler(BaseHTTPRequestHandler):
         self._problem(403, "not-allowed", "the request came from another site, or by another name of this computer")
         return False
 
-    def _caller(self) -> str | None:
+    def _caller(self, form_key: str) -> str | None:
         """Return who asks; None where the request was refused, which is then answered."""
         if self.access.keys is None:
             return (self.headers.get("Labctl-User") or "local")[:100] if self._is_ours() else None
-        scheme, _, key = (self.headers.get("Authorization") or "").partition(" ")
+        scheme, _, key = (self.headers.get("Authorization") or f"Bearer {form_key}").partition(" ")
         digest = hashlib.sha256(key.strip().encode("utf-8", "surrogatepass")).hexdigest()
         try:
             known = json.loads(self.access.keys.read_bytes())
@@ -278,14 +318,19 @@ class _Handler(BaseHTTPRequestHandler):
         for each, (name, role) in known.items():
             if scheme.lower() == "bearer" and hmac.compare_digest(each, digest) and role in OPERATORS:
                 return str(name)
-        self._problem(
-            401, "not-identified", "a stop at this address needs an operator's key: Authorization: Bearer KEY"
-        )
+        if self._wants_page:
+            self._show(401, not_stopped("This is not an operator's key. Only an operator's key stops the bench.", True))
+        else:
+            text = "a stop at this address needs an operator's key: Authorization: Bearer KEY"
+            self._problem(401, "not-identified", text)
         return None
 
     def _problem(self, status: int, slug: str, detail: str) -> None:
         problem = {"type": f"urn:labctl:problem:{slug}", "title": slug, "status": status, "detail": detail}
         self._send(status, "application/problem+json", json.dumps(problem).encode())
+
+    def _show(self, status: int, page: str) -> None:
+        self._send(status, "text/html; charset=utf-8", page.encode())
 
     def _send(self, status: int, kind: str, content: bytes) -> None:
         self.send_response(status)
@@ -322,20 +367,11 @@ def _followed(stopping: Stopping) -> Word:
 
 
 def _fields(body: bytes, kind: str) -> dict[str, Any]:
-    if "json" not in kind:
-        return {}
+    """Return what was given as JSON, or in the form of the page; nothing where it cannot be read."""
     try:
-        given = json.loads(body or b"{}")
+        if "urlencoded" in kind:
+            return dict(parse_qsl(body.decode(), max_num_fields=10))
+        given = json.loads(body or b"{}") if "json" in kind else {}
     except ValueError:
         return {}
     return given if isinstance(given, dict) else {}
-
-
-def _page(text: str) -> str:
-    return f"""<!doctype html><html lang="en"><head><meta charset="utf-8"><title>labctl: stop</title>
-<meta name="viewport" content="width=device-width, initial-scale=1"><meta http-equiv="refresh" content="5;url=/">
-<style>body{{font:1.1rem/1.5 sans-serif;margin:2rem auto;max-width:40rem;padding:0 1rem}}
-button{{font:inherit;font-weight:bold;padding:1rem 2rem;background:#b00020;color:#fff;border:0;border-radius:.4rem}}
-</style></head><body><h1>labctl does not answer</h1><p>{html.escape(text)}</p>
-<form method="post" action="/api/stop"><button>Stop the bench</button></form>
-<p>This page is shown while the service is gone or starts again. It asks again every 5 s.</p></body></html>"""

@@ -22,7 +22,7 @@ from labctl.services.campaigns.listeners import ChangeListeners
 from labctl.services.campaigns.preparation import Prepared, prepare, refuse_unconfirmed
 from labctl.services.campaigns.recovery import CampaignRecovery, secure_bench
 from labctl.services.campaigns.resume import prepare_resume, with_original_simulation
-from labctl.services.campaigns.status import answer_of, campaign_status
+from labctl.services.campaigns.status import answer_of, campaign_status, outlives_its_process
 from labctl.services.campaigns.stop_execution import StopExecution
 from labctl.services.planning.loading import with_drivers
 from labctl.services.schemas.benches import BenchCheckResponse, BenchDescription
@@ -36,7 +36,7 @@ from labctl.services.schemas.campaigns import (
 from labctl.services.simulation.hidden_effects import with_hidden_effects
 from labctl.stop.latch import StopRequest
 from labctl.store import Store
-from procedures.contracts.campaign_state import ENDED, CampaignState
+from procedures.contracts.campaign_state import ENDED, UNFINISHED, CampaignState
 from procedures.contracts.control import Control
 from procedures.contracts.errors import StalePrompt
 from procedures.contracts.operator import Answer, HumanOperator
@@ -301,6 +301,16 @@ class BenchRunner:
                 job.thread.join(self.safe_within_s)
         self.stops.requested = None
         return self.status(campaign) or campaign_status(self._store, campaign)
+
+    def stop_left(self, campaign: int, stop: StopRequest) -> CampaignResponse | None:
+        """Stop a campaign that an earlier process left on this bench, before it is resumed; None where it is none."""
+        row = self._store.campaigns.get(campaign)
+        left_here = row.bench_name == self._bench.name and row.state in UNFINISHED and outlives_its_process(row)
+        if not left_here or not self._may_drive:
+            return None
+        self.stops.request_left(stop).is_over(self.safe_within_s)
+        answer = self.status(campaign) or campaign_status(self._store, campaign)
+        return answer if answer.state in ENDED else answer.model_copy(update={"wish": "abort"})
 
     @property
     def is_at_rest(self) -> bool:

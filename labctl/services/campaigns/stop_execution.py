@@ -75,6 +75,11 @@ class StopExecution:
             self.carry_out()
             return left
 
+    def request_left(self, stop: StopRequest) -> Stopping:
+        """Begin the stop of a campaign that an earlier process left: it may be about to be resumed."""
+        self._latch.remember(stop)
+        return self.request(stop)
+
     def carry_out(self) -> None:
         """Carry out what the latch holds open, under the guard, while no campaign runs. Raises StoreError.
 

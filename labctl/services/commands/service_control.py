@@ -75,7 +75,9 @@ class ServiceControl:
         reason = asked.body.text
         runner = self._runner
         if runner is None or not runner.runs_or_was_stopped(asked.campaign):
-            return abort_abandoned(context.store, asked.campaign, reason, context.now())
+            new = StopRequest.new(actor().name, actor().via, reason, asked.campaign)
+            left = None if runner is None else runner.stop_left(asked.campaign, new)
+            return left or abort_abandoned(context.store, asked.campaign, reason, context.now())
         stop = runner.stop_of(asked.campaign) or StopRequest.new(actor().name, actor().via, reason, asked.campaign)
         answer = runner.abort(asked.campaign, stop)
         if missing := self._recorded(context, runner, stop):

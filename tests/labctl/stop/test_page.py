@@ -12,7 +12,7 @@ import httpx
 import pytest
 
 from labctl.stop.latch import StopRequest
-from labctl.stop.page import PageAccess, StopPage, write_keys
+from labctl.stop.page import BenchNow, PageAccess, StopPage, write_keys
 from tests.helpers.fake_stopping import FakeStopping
 
 HOSTS = frozenset({"127.0.0.1", "localhost"})
@@ -23,7 +23,9 @@ def page(access: PageAccess, stopping: FakeStopping, asked: list[StopRequest]) -
     with socket.socket() as listener:
         listener.bind(("127.0.0.1", 0))
         listener.listen()
-        shown = StopPage(listener, access, lambda stop: asked.append(stop) or stopping, lambda: "Campaign 3 <runs>.")
+        shown = StopPage(
+            listener, access, lambda stop: asked.append(stop) or stopping, lambda: BenchNow("Campaign 3 <runs>.")
+        )
         shown.start()
         with httpx.Client(base_url=f"http://127.0.0.1:{listener.getsockname()[1]}", timeout=20) as http:
             yield http

@@ -3,6 +3,7 @@
 import { loadPlotly } from "./core/figure.js";
 import { route, start } from "./core/router.js";
 import { buildLayout } from "./core/layout.js";
+import { stopAgain } from "./bench/actions.js";
 
 /** @import { Route } from "./core/routes.js" */
 
@@ -55,6 +56,7 @@ route(
 );
 
 buildLayout();
+stopAgain();
 await start();
 // The first page is shown; the next one may need Plotly.
 (window.requestIdleCallback ?? setTimeout)(preloadPlotly);

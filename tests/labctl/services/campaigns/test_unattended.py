@@ -25,8 +25,10 @@ from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.execution import run, run_here
 from labctl.services.campaigns.preparation import prepare
 from labctl.services.campaigns.status import campaign_status, list_campaigns
+from labctl.services.commands.context import CommandContext
 from labctl.services.commands.registry import ABORT_CAMPAIGN
 from labctl.services.commands.requests import ToCampaign
+from labctl.services.commands.service_control import ServiceControl
 from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
 from labctl.services.recordings.loading import newest_row
@@ -144,6 +146,20 @@ def test_ending_by_hand_what_no_process_runs_says_that_nobody_made_the_bench_saf
     )
     assert (answer.state, "has not been made safe" in answer.reason) == ("aborted", True)
     assert f"campaign {campaign} ended before" in store.benches.unconfirmed(BENCH.name)
+
+
+@pytest.mark.usefixtures("real")
+def test_a_campaign_that_waits_to_be_resumed_is_stopped_at_the_bench_and_not_only_closed(store: Store) -> None:
+    campaign = left_running(store)
+    runner = BenchRunner(store, BENCH, VirtualClock)
+    control = ServiceControl(runner)
+    asked = ToCampaign(campaign, ReasonRequest(reason="smoke", by="Ada"))
+    answer = control.abort(CommandContext(lambda: store, VirtualClock(), control), asked)
+    assert (answer.state, answer.reason) == ("aborted", "aborted: smoke (Ada)")
+    assert (runner.stops.is_safe, runner.stop_latch.state.open) == (True, ())
+    assert [row.detail["reason"] for row in store.audit.rows() if row.action == "campaign abort"] == ["smoke (Ada)"]
+    runner.resume_unfinished()
+    assert not runner.busy
 
 
 def test_a_simulated_bench_ended_with_its_process(store: Store) -> None:

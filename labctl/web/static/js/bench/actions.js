@@ -1,11 +1,12 @@
 // Buttons that act on a campaign or a bench. Each asks for the operator's name, and for a reason where one is recorded.
 
 import { get, post } from "../core/http/api.js";
+import { messageOf } from "../core/http/errors.js";
 import { h } from "../core/elements.js";
 import { button, toast } from "../core/components.js";
 import { dialog } from "../core/dialog.js";
 import { navigate } from "../core/router.js";
-import { stopCampaign } from "../core/stop/overlay.js";
+import { stopCampaign, tableStands, unconfirmedStop } from "../core/stop/overlay.js";
 import { canResume } from "../campaigns/states.js";
 
 /** @import { Bench, Campaign, Check, Prompt } from "../../../types/api.js" */
@@ -27,6 +28,31 @@ async function askOperator(title, fields, options) {
   const answers = await dialog(title, fields, options);
   if (answers?.by) localStorage.setItem(OPERATOR_NAME_KEY, answers.by);
   return answers;
+}
+
+/**
+ * Stop a campaign, and say how the bench was left.
+ * @param {number} campaign
+ * @param {{ by?: string, reason: string }} body
+ */
+async function stop(campaign, body) {
+  const { campaign: ended, late } = await stopCampaign(campaign, body);
+  const stays = late || undefined; // who has read NOT STOPPED reads that this is over
+  if (ended === null) {
+    toast("good", "Stopped. The table stands. The service does not answer; start it again.", { stays: true });
+    return;
+  }
+  await tableStands(ended.bench);
+  const unsafe = (await get("/api/benches")).find((bench) => bench.unconfirmed);
+  if (ended.state !== "aborted") toast("bad", `The campaign is ${ended.state}: ${ended.reason}`);
+  else if (unsafe) toast("bad", `Stopped, but the safe state was not confirmed: ${unsafe.unconfirmed}`);
+  else toast("good", "Stopped. The table stands, and the bench is in its safe state.", { stays });
+}
+
+/** Ask again for the stop that this tab had asked for, where it was not confirmed when the page was loaded again. */
+export function stopAgain() {
+  const asked = unconfirmedStop();
+  if (asked !== null) stop(asked.campaign, asked.body).catch((error) => toast("bad", messageOf(error)));
 }
 
 /**
@@ -56,15 +82,7 @@ export const stopButton = (campaign) =>
           },
         );
         if (!answers) return;
-        const answer = await stopCampaign(campaign, { by: answers.by, reason: answers.reason });
-        if (answer === null) {
-          toast("good", "Stopped. The table stands; the service does not answer.");
-          return;
-        }
-        const unsafe = (await get("/api/benches")).find((bench) => bench.unconfirmed);
-        if (answer.state !== "aborted") toast("bad", `The campaign is ${answer.state}: ${answer.reason}`);
-        else if (unsafe) toast("bad", `Stopped, but the safe state was not confirmed: ${unsafe.unconfirmed}`);
-        else toast("good", "Stopped. The bench is in its safe state.");
+        await stop(campaign, { by: answers.by, reason: answers.reason });
       },
       { kind: "danger large" },
     ),

@@ -207,11 +207,12 @@ export function errorPage(error, again) {
 }
 
 /**
- * Show a toast; an error stays until it is closed.
+ * Show a toast; an error, and what `stays`, is shown until it is closed.
  * @param {string} kind
  * @param {string} text
+ * @param {{ stays?: boolean }} [options]
  */
-export function toast(kind, text) {
+export function toast(kind, text, { stays = kind === "bad" } = {}) {
   const corner = document.querySelector(".toasts");
   if (!corner) return;
   const element = notice(
@@ -224,7 +225,7 @@ export function toast(kind, text) {
     ),
   );
   corner.append(element);
-  if (kind !== "bad") setTimeout(() => element.remove(), 6000);
+  if (!stays) setTimeout(() => element.remove(), 6000);
 }
 
 /**
