@@ -44,6 +44,8 @@ ASKED_S, STOPPED_S = 3.0, 15.0
 #: How long the table is watched at the end of a sequence, once every process goes on or was started again, s.
 WATCHED_S = 2.0
 TURNS_WITHIN_S = 60.0
+#: Sequences run beside each other, so that the computer is busy, s.
+TOLD_WITHIN_S = 5.0
 #: What a sequence is drawn from, each as often as it stands here.
 ACTS = (
     "stop by command", "stop by command", "stop by page", "stop by page", "stop by signal",
@@ -75,12 +77,16 @@ class Story:
     trouble: str = ""  #: what kept the sequence from being carried out
 
     def in_force_s(self, stop: Stop, heard: list[Heard]) -> float | None:
-        """Return from when on a stop was carried out: it was confirmed, or the table heard it and stood."""
+        """Return from when on a stop was carried out: it was confirmed, or the table heard it, in time, and stood.
+
+        Before that another process may make the bench safe for a reason of its own, which looks the same.
+        """
+        if stop.confirmed_s is not None:
+            return stop.confirmed_s
         told = next((k for k in range(stop.line, len(heard)) if heard[k].is_stop), None)
         after = heard[told + 1 :] if told is not None else []
         stood = next((each.at_s for each in after if not each.table_turns), None)
-        known = [at_s for at_s in (stood, stop.confirmed_s) if at_s is not None]
-        return min(known, default=None)
+        return None if stood is None else max(stood, stop.asked_s + TOLD_WITHIN_S)
 
     def judge(self, heard: list[Heard]) -> None:
         """Note every line in which a table turns that no person has released since a stop that was carried out."""
@@ -206,9 +212,9 @@ def tell(bench: Bench, story: Story, rng: np.random.Generator) -> None:
 def _begin_turning(bench: Bench, story: Story) -> None:
     """Have a table that turns, begun by a person."""
     until_s, refused = time.monotonic() + TURNS_WITHIN_S, ""
-    if not bench.serves:
-        bench.serve()
     while not bench.table.turns():
+        if not bench.serves:  # also one that was asked to end in the sequence before, and has ended since
+            bench.serve()
         if time.monotonic() > until_s:
             raise RuntimeError(f"the table did not turn: {refused}; {bench.log.read_text()[-3000:]}")
         story.released_s.append(time.monotonic())
