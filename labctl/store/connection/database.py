@@ -20,6 +20,7 @@ from labctl.store.connection.postgresql_server import PostgresqlServer
 from labctl.store.connection.sqlite_file import SqliteFile
 from labctl.store.connection.writer_lock import NO_SERVICE, ServiceAddress
 from labctl.store.connection.writer_turn import WriterTurn
+from labctl.store.sealing import chain
 
 ResultT = TypeVar("ResultT")
 
@@ -137,13 +138,15 @@ class Database:
         """
         if self.writer is not None:
             raise StoreError(f"{self._shown}: another process is writing to the database; wait until that process ends")
-        number, ended = 0, False
+        number, ended, grown = 0, False, None
         with self._turn.take():
             try:
                 self._backend.before_begin(self._engine, synced=synced)
                 with self._engine.begin() as connection:
                     number = self._backend.begun(connection, synced=synced)
+                    chain.begin(connection)
                     yield connection
+                    grown = chain.finish(connection)
                     commits = self._backend.before_commit(connection, synced=synced)
                     ended = True
             except exc.DatabaseError as error:
@@ -154,6 +157,8 @@ class Database:
                     raise self._trouble(error) from error
                 commits = 0
             self._backend.committed(commits)
+            if grown is not None:
+                self._backend.grown(grown)
 
     def _is_kept(self, number: int) -> bool:
         """Return whether a transaction was committed whose commit was not answered. Raises DatabaseUnreachable."""

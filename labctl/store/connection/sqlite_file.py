@@ -22,6 +22,8 @@ from labctl.store.connection.file_identity import FileIdentity
 from labctl.store.connection.private_files import close_to_others, make_private
 from labctl.store.connection.start_check import first_damage
 from labctl.store.connection.writer_lock import ServiceAddress, WriterLock
+from labctl.store.sealing.anchor_file import write_anchor
+from labctl.store.sealing.chain import ChainHead
 
 
 class SqliteFile:
@@ -79,7 +81,7 @@ class SqliteFile:
         if self._lock is None:
             return
         make_private(Path(self._location))
-        close_to_others(*(Path(f"{self._location}{end}") for end in ("", "-wal", "-shm", ".lock", ".seal")))
+        close_to_others(*(Path(f"{self._location}{end}") for end in ("", "-wal", "-shm", ".lock", ".seal", ".anchor")))
 
     def _refuse_loss(self, connection: sa.Connection | None) -> None:
         """Raise StoreError when commits are missing: nothing is written to an archive that lost some."""
@@ -115,6 +117,10 @@ class SqliteFile:
         """Count it in the seal too."""
         if commits:
             seal(self._location, commits)
+
+    def grown(self, head: ChainHead) -> None:
+        """Note it in the anchor file, which is outside the database."""
+        write_anchor(self._location, head)
 
     def is_unreachable(self, error: exc.DatabaseError) -> bool:  # noqa: ARG002
         """Return False: every error is about the file itself."""

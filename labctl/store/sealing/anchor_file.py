@@ -1,0 +1,54 @@
+"""A small file beside an SQLite database that holds the end of its chain of manifests.
+
+Somebody who writes the whole chain anew, in the database alone, does not fit it. It is written after the commit, so it
+may lag behind by what a killed process committed last, but it is always of the same chain.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from pathlib import Path
+
+from labctl.store.connection.private_files import make_private
+from labctl.store.sealing.chain import ChainHead
+
+WIDTH = 12
+HASH_LENGTH = 64
+
+
+def anchor_path(location: str) -> Path:
+    """Return the path of a database's anchor file."""
+    return Path(f"{location}.anchor")
+
+
+def write_anchor(location: str, head: ChainHead) -> None:
+    """Write the head down, over the one before: the same few bytes, so that a full disk does not matter.
+
+    An anchor that cannot be written fails no commit: it only guards less.
+    """
+    path = anchor_path(location)
+    with contextlib.suppress(OSError):
+        make_private(path)
+        handle = os.open(path, os.O_WRONLY)
+        try:
+            os.pwrite(handle, f"{head.length:0{WIDTH}d}:{head.hash}\n".encode(), 0)
+        finally:
+            os.close(handle)
+
+
+def read_anchor(location: str) -> ChainHead | None:
+    """Return the head that the file holds; None where there is no file. Raises ValueError for one that is damaged."""
+    try:
+        return parse_anchor(anchor_path(location).read_text(encoding="ascii").strip())
+    except OSError:
+        return None
+
+
+def parse_anchor(text: str) -> ChainHead:
+    """Read `LENGTH:HASH`. Raises ValueError for any other text."""
+    length, _, digest = text.partition(":")
+    if not (length.isascii() and length.isdecimal()) or len(digest) != HASH_LENGTH or int(length) < 1:
+        raise ValueError(f"{text!r} is not LENGTH:HASH")
+    int(digest, 16)
+    return ChainHead(int(length), digest)
