@@ -6,12 +6,14 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 
+from labctl.config import seal_key
 from labctl.store.connection.database import Database, Writer
-from labctl.store.connection.location import is_url
+from labctl.store.connection.location import is_url, shown
 from labctl.store.connection.transactions import run_transaction
 from labctl.store.connection.writer_lock import NO_SERVICE, Holder, ServiceAddress, holder_of
 from labctl.store.integrity.backup import Copy, copy_database
 from labctl.store.integrity.check import Checked, Finding, Progress, check
+from labctl.store.integrity.migration import Migrated, migrate_database, needs_migration
 from labctl.store.records import (
     AuditRow,
     CalibrationRecord,
@@ -44,6 +46,11 @@ from labctl.store.repositories.recordings import Recordings
 from labctl.store.repositories.resume_points import ResumePoint, ResumePoints, Resumption
 from labctl.store.repositories.scheduled_starts import NewStart, StartEventRow, StartRow, Starts
 from labctl.store.repositories.units import Certifications, Units
+from labctl.store.sealing.anchor_file import parse_anchor
+from labctl.store.sealing.chain import ChainHead
+from labctl.store.sealing.signatures import PublicKey, read_public_key
+from labctl.store.sealing.signers import Signer, create_key, refuse_open_key, signer_of
+from labctl.store.sealing.signing import begin_signing, sign_chain
 
 __all__ = [
     "Audit",
@@ -60,6 +67,7 @@ __all__ = [
     "CertificateRow",
     "Certificates",
     "CertificationRow",
+    "ChainHead",
     "Checked",
     "Copy",
     "DataSetRow",
@@ -79,11 +87,13 @@ __all__ = [
     "LeaseRow",
     "Leases",
     "MeanRow",
+    "Migrated",
     "NewCalibration",
     "NewCampaign",
     "NewStart",
     "NewUnit",
     "Progress",
+    "PublicKey",
     "RecordingRow",
     "Recordings",
     "ResumePoint",
@@ -91,6 +101,7 @@ __all__ = [
     "Resumption",
     "ServedCalibration",
     "ServiceAddress",
+    "Signer",
     "StartEventRow",
     "StartRow",
     "Starts",
@@ -103,9 +114,18 @@ __all__ = [
     "Writer",
     "check",
     "copy_database",
+    "create_key",
     "holder_of",
     "is_url",
+    "migrate_database",
+    "needs_migration",
     "open_store",
+    "parse_anchor",
+    "read_public_key",
+    "refuse_open_key",
+    "shown",
+    "sign_chain",
+    "signer_of",
 ]
 
 
@@ -128,6 +148,7 @@ class Store:
         self.keys = Keys(database)
         self.starts = Starts(database)
         self.leases = Leases(database)
+        self._signing = begin_signing(database, seal_key()) if database.writes else None
 
     @property
     def location(self) -> str:
@@ -155,10 +176,17 @@ class Store:
 
     def run(self, name: str, args: tuple[object, ...], kwargs: Mapping[str, object]) -> object:
         """Run a transaction that another process sent; raises what it raises, and KeyError for an unknown name."""
-        return run_transaction({type(each).__name__: each for each in vars(self).values()}, name, args, kwargs)
+        return run_transaction(
+            {type(each).__name__: each for each in vars(self).values() if hasattr(each, "_database")},
+            name,
+            args,
+            kwargs,
+        )
 
     def close(self) -> None:
         """Close the database."""
+        if self._signing is not None:
+            self._signing.close()
         self._database.close()
 
 
@@ -166,11 +194,12 @@ class Store:
 def open_store(
     location: str, *, write: bool, address: ServiceAddress = NO_SERVICE, writer: Writer | None = None
 ) -> Iterator[Store]:
-    """Open a database by path or URL, made and migrated on first use; `write` holds it for this process.
+    """Open a database by path or URL, made on first use; `write` holds it for this process.
 
     Without, transactions run by `writer`, the process that holds it.
 
-    Raises Conflict when another process holds it, StoreError when it is newer than the code or damaged.
+    Raises Conflict when another process holds it, StoreError when it is newer than the code or damaged, OldSchema
+    when it has to be migrated first.
     """
     store = Store(Database(location, write=write, address=address, writer=writer))
     try:

@@ -72,8 +72,24 @@ def serve(
             console.print(text, style="yellow", markup=False, soft_wrap=True)
 
     with one_clear_line(), log_of_command("supervisor", default="info", location=request.location):
+        _migrated(request.location)
         left = serve_forever(request, ready)
     stderr.print(f"labctl: stopped{'; ' if left else ''}{left}", markup=False)
+
+
+def _migrated(location: str) -> None:
+    """Bring a database of an earlier version up to date before the service starts, and say so; a seal key that cannot
+    be used is refused."""
+    from labctl.cli.commands.database import migration_text
+    from labctl.log import get_logger
+    from labctl.services.admin.maintenance import migrate_before_service
+    from labctl.services.admin.seal_keys import refuse_unusable_key
+
+    refuse_unusable_key()
+    answer = migrate_before_service(location)
+    if answer is not None:
+        stderr.print(f"labctl: {migration_text(answer)}", markup=False)
+        get_logger().warning("database.migrated", said=migration_text(answer))
 
 
 def _found(source: str, database: str | None) -> tuple[str, str]:

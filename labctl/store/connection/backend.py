@@ -52,6 +52,11 @@ class Backend(Protocol):
         """Note the count that `before_commit` returned, once the transaction is committed."""
         ...
 
+    @property
+    def anchor_fits(self) -> bool:
+        """Whether the chain of manifests goes on from what was noted outside the database."""
+        ...
+
     def grown(self, head: ChainHead) -> None:
         """Note the end of the chain of manifests, once the transaction that added to it is committed."""
         ...

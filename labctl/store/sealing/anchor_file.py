@@ -10,7 +10,10 @@ import contextlib
 import os
 from pathlib import Path
 
+import sqlalchemy as sa
+
 from labctl.store.connection.private_files import make_private
+from labctl.store.schema import tables
 from labctl.store.sealing.chain import ChainHead
 
 WIDTH = 12
@@ -43,6 +46,22 @@ def read_anchor(location: str) -> ChainHead | None:
         return parse_anchor(anchor_path(location).read_text(encoding="ascii").strip())
     except OSError:
         return None
+
+
+def anchor_fits(engine: sa.Engine, location: str) -> bool:
+    """Return whether a chain goes on from what its anchor file names; also where there is no chain, or no file."""
+    try:
+        kept = read_anchor(location)
+    except ValueError:  # it is written anew
+        return True
+    if kept is None:
+        return True
+    m = tables.manifests
+    with engine.connect() as connection:
+        if not sa.inspect(connection).has_table(m.name):
+            return True
+        found = connection.scalar(sa.select(m.c.hash).where(m.c.sequence == kept.length))
+    return found == kept.hash
 
 
 def parse_anchor(text: str) -> ChainHead:
