@@ -38,8 +38,8 @@ def _setting() -> str:
     if setting := seal_key():
         return setting
     raise BadInput(
-        f"{SEAL_KEY_VARIABLE} is not set; name the seal key by it: a file that `labctl seal-key create FILE` made, or a "
-        "PKCS#11 URI"
+        f"{SEAL_KEY_VARIABLE} is not set; name the seal key by it: a file that `labctl seal-key create FILE` made, "
+        "or a PKCS#11 URI"
     )
 
 

@@ -86,7 +86,7 @@ class ManifestCheck:
         self._check_end(wanted, hashes)
         self._check_signed()
 
-    def _rows(self) -> Iterator[tuple[sa.Row[Any], Mapping[str, Any]]]:
+    def _rows(self) -> Iterator[tuple[sa.Row[*tuple[Any, ...]], Mapping[str, Any]]]:
         m = tables.manifests.c
         query = sa.select(m.sequence, m.kind, m.record, m.act, m.hash, m.document, m.signature, m.signed_by)
         for row in self._connection.execute(query.order_by(m.sequence).execution_options(yield_per=AT_ONCE)):
@@ -96,7 +96,7 @@ class ManifestCheck:
                 document = None
             yield row, document if isinstance(document, dict) else {}
 
-    def _take(self, row: sa.Row[Any], document: Mapping[str, Any]) -> None:
+    def _take(self, row: sa.Row[*tuple[Any, ...]], document: Mapping[str, Any]) -> None:
         found = self.chain
         found.head = ChainHead(int(row.sequence), str(row.hash))
         found.trail = max(found.trail, (document.get("audit") or {}).get("length", 0))
@@ -111,7 +111,7 @@ class ManifestCheck:
             text = f"{name} had been changed by hand before it was changed in order on {made.at[:10]}"
             self._find(row.kind, f"{made.title}: {text} (manifest {made.sequence}, {made.reason})")
 
-    def _verify(self, row: sa.Row[Any]) -> None:
+    def _verify(self, row: sa.Row[*tuple[Any, ...]]) -> None:
         if row.signature is None:
             return
         self.chain.keys.add(str(row.signed_by))
@@ -184,8 +184,9 @@ class ManifestCheck:
             yield f"{name} ({rows} rows, {was} then)" if was != rows else name
 
 
-def _misfits(row: sa.Row[Any], document: Mapping[str, Any], previous: str) -> Iterator[str]:
-    if chain.hash_of(bytes(row.document)) != row.hash:
+def _misfits(row: sa.Row[*tuple[Any, ...]], document: Mapping[str, Any], previous: str) -> Iterator[str]:
+    content = row.document.encode() if isinstance(row.document, str) else bytes(row.document)  # another program's
+    if chain.hash_of(content) != row.hash:
         yield "was changed: its hash does not fit"
     elif document.get("previous") != previous:
         yield "does not follow the one before: the chain was changed"

@@ -29,12 +29,11 @@ class Part:
     order: str = ""
     only: Callable[[], sa.ColumnElement[bool]] = sa.true
 
-    def query(self, record: int | str) -> sa.Select[tuple[object, ...]]:
+    def query(self, record: int | str) -> sa.Select[*tuple[object, ...]]:
         """Return the query of its rows, as they are stored, in an order that does not depend on the database."""
         c = self.table.c
-        chosen = sa.select(*(_stored(c[name]) for name in self.columns.split()))
-        found: sa.Select[tuple[object, ...]] = chosen.where(c[self.of] == record, self.only())
-        return found.order_by(*(c[name] for name in self.order.split()))
+        chosen: sa.Select[*tuple[object, ...]] = sa.select(*(_stored(c[name]) for name in self.columns.split()))
+        return chosen.where(c[self.of] == record, self.only()).order_by(*(c[name] for name in self.order.split()))
 
 
 @dataclass(frozen=True)
@@ -45,7 +44,7 @@ class Kind:
     table: sa.Table
     key: str
     parts: tuple[Part, ...]
-    title: Callable[[sa.Row[tuple[object, ...]]], str]  #: from the columns `titled`
+    title: Callable[[sa.Row[*tuple[object, ...]]], str]  #: from the columns `titled`
     titled: str
     at_rest: Callable[[], sa.ColumnElement[bool]] = sa.true  #: whether nothing of the record is still to come
     whole: Callable[[], sa.ColumnElement[bool]] = field(default=sa.true)  #: whether it is there for others at all

@@ -44,7 +44,7 @@ def parts_of(connection: sa.Connection, kind: Kind, record: str, *, blocks: bool
     key = kind.key_of(record)
     found: dict[str, JsonObject] = {}
     for part in kind.parts:
-        rows: Iterable[sa.Row[tuple[object, ...]]] = connection.execute(
+        rows: Iterable[sa.Row[*tuple[object, ...]]] = connection.execute(
             part.query(key).execution_options(yield_per=AT_ONCE)
         )
         found[part.name] = digest_of_rows(rows).as_json()

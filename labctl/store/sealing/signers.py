@@ -7,7 +7,7 @@ import os
 import stat
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 from urllib.parse import unquote
 
 from labctl.errors import BadInput
@@ -25,8 +25,15 @@ P256_BYTES = 32
 class Signer(Protocol):
     """Something that signs with one key."""
 
-    pem: bytes  #: the public key
-    public: PublicKey
+    @property
+    def pem(self) -> bytes:
+        """The public key."""
+        ...
+
+    @property
+    def public(self) -> PublicKey:
+        """The public key as it is checked with."""
+        ...
 
     def sign(self, digest: str) -> bytes:
         """Return the signature over the hash of a manifest. Raises BadInput; may take as long as a token does."""
@@ -173,8 +180,8 @@ class TokenSigner:
         try:
             token = pkcs11.lib(uri.module).get_token(token_label=uri.token)
             self._session = token.open(user_pin=uri.pin or None)
-            self._key = self._session.get_key(object_class=pkcs11.ObjectClass.PRIVATE_KEY, label=uri.object)
-            public = self._session.get_key(object_class=pkcs11.ObjectClass.PUBLIC_KEY, label=uri.object)
+            self._key: Any = self._session.get_key(object_class=pkcs11.ObjectClass.PRIVATE_KEY, label=uri.object)
+            public: Any = self._session.get_key(object_class=pkcs11.ObjectClass.PUBLIC_KEY, label=uri.object)
             der = encode_ec_public_key(public)
         except (PKCS11Error, RuntimeError, KeyError, OSError) as error:
             said = " ".join(str(error).split()) or type(error).__name__
