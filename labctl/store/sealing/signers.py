@@ -173,13 +173,16 @@ class TokenSigner:
     def __init__(self, uri: TokenUri) -> None:
         """Log in and find the key. Raises BadInput."""
         import pkcs11  # noqa: PLC0415  only where a token is used
-        from pkcs11.exceptions import PKCS11Error  # noqa: PLC0415  as above
+        from pkcs11.exceptions import PKCS11Error, UserAlreadyLoggedIn  # noqa: PLC0415  as above
         from pkcs11.util.ec import encode_ec_public_key  # noqa: PLC0415  as above
 
         where = f"seal key pkcs11:token={uri.token};object={uri.object}"
         try:
             token = pkcs11.lib(uri.module).get_token(token_label=uri.token)
-            self._session = token.open(user_pin=uri.pin or None)
+            try:
+                self._session = token.open(user_pin=uri.pin or None)
+            except UserAlreadyLoggedIn:  # a process logs in once
+                self._session = token.open()
             self._key: Any = self._session.get_key(object_class=pkcs11.ObjectClass.PRIVATE_KEY, label=uri.object)
             public: Any = self._session.get_key(object_class=pkcs11.ObjectClass.PUBLIC_KEY, label=uri.object)
             der = encode_ec_public_key(public)
