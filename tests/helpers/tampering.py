@@ -104,15 +104,15 @@ def _last_audit_row(connection: sa.Connection) -> None:
 
 #: The edit, and what the check has to say of it: kind or part of the check, and words.
 EDITS: dict[str, tuple[Edit, str, str]] = {
-    "rates": (_rates, "recording", "recording 1: the table rates"),
-    "temperatures": (_warmer, "recording", "recording 1: the temperatures of the readings"),
-    "data set": (_data_set, "recording", "recording 1: the data sets"),
-    "events": (_events, "campaign", "campaign 1: the events"),
-    "state of campaign": (_campaign_state, "campaign", "campaign 1: the state"),
-    "state of data set": (_data_set_state, "recording", "recording 1: the state of data sets"),
-    "document": (_document, "calibration", "version 1: the document"),
-    "answer": (_answer, "calibration", "version 1: the answer"),
-    "role of a key": (_role, "key", "API key 'guest': the role"),
+    "rates": (_rates, "recording", "recording 1: table rates changed"),
+    "temperatures": (_warmer, "recording", "recording 1: temperatures of the readings changed"),
+    "data set": (_data_set, "recording", "recording 1: data sets changed"),
+    "events": (_events, "campaign", "campaign 1: events changed"),
+    "state of campaign": (_campaign_state, "campaign", "campaign 1: state changed"),
+    "state of data set": (_data_set_state, "recording", "recording 1: state of data sets changed"),
+    "document": (_document, "calibration", "version 1: document changed"),
+    "answer": (_answer, "calibration", "version 1: answer changed"),
+    "role of a key": (_role, "key", "API key 'guest': role changed"),
     "last audit row": (_last_audit_row, "audit", "the audit trail was written anew"),
 }
 

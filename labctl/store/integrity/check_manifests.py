@@ -36,10 +36,6 @@ class _Sealed:
     reason: str
     parts: Parts
 
-    @property
-    def when(self) -> str:
-        return f"when it was sealed on {self.at[:10]} (manifest {self.sequence}, {self.reason})"
-
 
 @dataclass
 class Chain:
@@ -155,7 +151,9 @@ class ManifestCheck:
             self._check_kind(kind, blocks)
         for (name, _), sealed in self.chain.newest.items():
             if name in KINDS:
-                self._find(name, f"{sealed.title} is missing: it was there {sealed.when}")
+                self._find(
+                    name, f"{sealed.title} is missing: it was sealed on {sealed.at[:10]} (manifest {sealed.sequence})"
+                )
 
     def _check_kind(self, kind: Kind, blocks: Mapping[int, Parts | None]) -> None:
         key = kind.table.c[kind.key]
@@ -163,8 +161,8 @@ class ManifestCheck:
         for record in self._connection.scalars(sa.select(key).where(kind.whole()).order_by(key)).all():
             sealed = self.chain.newest.pop((kind.name, str(record)), None)
             if sealed is not None and sealed.act == "sealed":
-                for name in self._differing(kind, str(record), sealed, blocks):
-                    self._find(kind.name, f"{sealed.title}: the {name} are not as they were {sealed.when}")
+                for text in self._differing(kind, str(record), sealed, blocks):
+                    self._find(kind.name, f"{sealed.title}: {text} (manifest {sealed.sequence}, {sealed.reason})")
             elif record in at_rest:
                 what = "was never sealed" if sealed is None else "was reopened, and has ended without being sealed"
                 self._find(kind.name, f"{kind.name} {record} {what}: it was made or changed without labctl")
@@ -175,13 +173,14 @@ class ManifestCheck:
         try:
             now = dict(parts_of(self._connection, kind, record, blocks=False))
         except (StoreError, ValueError, TypeError, ArithmeticError) as error:
-            yield f"contents cannot be read ({error}) and"
+            yield f"it cannot be read ({error}), and could be when it was sealed on {sealed.at[:10]}"
             return
         if kind.has_blocks:
             now |= blocks.get(int(record), _NO_BLOCKS) or {}
         for name in differing(sealed.parts, now):
             was, rows = sealed.parts[name].get("rows"), now[name].get("rows")
-            yield f"{name} ({rows} rows, {was} then)" if was != rows else name
+            number = f" ({rows} rows, {was} then)" if was != rows else ""
+            yield f"{name} changed{number} since it was sealed on {sealed.at[:10]}"
 
 
 def _misfits(row: sa.Row[*tuple[Any, ...]], document: Mapping[str, Any], previous: str) -> Iterator[str]:

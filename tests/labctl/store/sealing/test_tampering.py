@@ -158,9 +158,9 @@ def test_a_chain_that_was_changed_is_found(location: str, key: PublicKey, statem
         (
             "UPDATE data_set_means SET std = NULL WHERE channel = 'gyro_z'",
             "recording",
-            "the means are not as they were",
+            "means changed",
         ),
-        ("UPDATE recordings SET info = 'x' WHERE id = 1", "recording", "recording 1: the contents cannot be read"),
+        ("UPDATE recordings SET info = 'x' WHERE id = 1", "recording", "recording 1: it cannot be read"),
     ],
 )
 def test_records_that_go_or_come_are_found(location: str, statement: str, part: str, words: str) -> None:
