@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 from labctl.config import seal_key
+from labctl.store.connection.anchor_file import parse_anchor
 from labctl.store.connection.database import Database, Writer
 from labctl.store.connection.location import is_url, shown
 from labctl.store.connection.transactions import run_transaction
@@ -14,6 +15,8 @@ from labctl.store.connection.writer_lock import NO_SERVICE, Holder, ServiceAddre
 from labctl.store.integrity.backup import Copy, copy_database
 from labctl.store.integrity.check import Checked, Finding, Progress, check
 from labctl.store.integrity.migration import Migrated, migrate_database, needs_migration
+from labctl.store.manifests.chain import ChainHead
+from labctl.store.manifests.signatures import PublicKey, read_public_key
 from labctl.store.records import (
     AuditRow,
     CalibrationRecord,
@@ -46,9 +49,6 @@ from labctl.store.repositories.recordings import Recordings
 from labctl.store.repositories.resume_points import ResumePoint, ResumePoints, Resumption
 from labctl.store.repositories.scheduled_starts import NewStart, StartEventRow, StartRow, Starts
 from labctl.store.repositories.units import Certifications, Units
-from labctl.store.sealing.anchor_file import parse_anchor
-from labctl.store.sealing.chain import ChainHead
-from labctl.store.sealing.signatures import PublicKey, read_public_key
 from labctl.store.sealing.signers import Signer, create_key, refuse_open_key, signer_of
 from labctl.store.sealing.signing import begin_signing, sign_chain
 

@@ -14,7 +14,7 @@ from labctl.recording import Recording, dataset_starts
 from labctl.recording.recording import Columns
 from labctl.store import sample_codec
 from labctl.store.dataset_statistics import means_rows
-from labctl.store.sealing.digests import block_digests
+from labctl.store.manifests.digests import block_digests
 
 #: Number of the blocks that hold a whole table of points or coefficients.
 WHOLE_TABLE = 0

@@ -1,4 +1,4 @@
-"""Edits of a database by hand, as somebody makes them who knows how labctl stores its records."""
+"""Edits of a database by hand, as a person makes them who knows how labctl stores its records."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ import sqlalchemy as sa
 from labctl.canonical_json import with_own_hash
 from labctl.store import sample_codec
 from labctl.store.connection.location import is_url
+from labctl.store.manifests import chain
+from labctl.store.manifests.contents import KINDS
+from labctl.store.manifests.digests import block_digests
+from labctl.store.manifests.parts import parts_of
 from labctl.store.repositories import audit
 from labctl.store.schema import tables as t
-from labctl.store.sealing import chain
-from labctl.store.sealing.contents import KINDS
-from labctl.store.sealing.digests import block_digests
-from labctl.store.sealing.parts import parts_of
 
 Edit = Callable[[sa.Connection], None]
 

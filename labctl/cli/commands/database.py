@@ -12,7 +12,7 @@ from labctl.cli.options import Database, Json
 from labctl.cli.output import console, print_json, stderr
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.admin import CheckResponse, MigrationResponse
+    from labctl.services.schemas.admin import CheckResponse
 
 
 def backup(
@@ -114,6 +114,7 @@ def migrate(
     database: Database = None,
 ) -> None:
     """Bring a database of an earlier version to the schema of this one, after a verified copy beside the file."""
+    from labctl.cli.printing.migration import migration_text
     from labctl.services.admin.maintenance import migrate as migrate_now
 
     with one_clear_line():
@@ -122,11 +123,3 @@ def migrate(
         print_json(answer)
         return
     console.print(migration_text(answer), markup=False, soft_wrap=True)
-
-
-def migration_text(answer: MigrationResponse) -> str:
-    """Return what was done, in one line."""
-    if answer.from_schema == answer.to_schema:
-        return f"{answer.database}: the schema is number {answer.to_schema} already; nothing was changed"
-    copy = "no copy was made" if answer.copied_to is None else f"the database as it was: {answer.copied_to}"
-    return f"{answer.database}: migrated from schema {answer.from_schema} to {answer.to_schema}; {copy}"

@@ -80,7 +80,7 @@ def serve(
 def _migrated(location: str) -> None:
     """Bring a database of an earlier version up to date before the service starts, and say so; a seal key that cannot
     be used is refused."""
-    from labctl.cli.commands.database import migration_text
+    from labctl.cli.printing.migration import migration_text
     from labctl.log import get_logger
     from labctl.services.admin.maintenance import migrate_before_service
     from labctl.services.admin.seal_keys import refuse_unusable_key

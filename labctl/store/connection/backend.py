@@ -8,7 +8,7 @@ import sqlalchemy as sa
 from sqlalchemy import exc
 
 from labctl.store.connection.writer_lock import ServiceAddress
-from labctl.store.sealing.chain import ChainHead
+from labctl.store.manifests.chain import ChainHead
 
 
 class Backend(Protocol):

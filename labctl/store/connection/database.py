@@ -20,8 +20,8 @@ from labctl.store.connection.postgresql_server import PostgresqlServer
 from labctl.store.connection.sqlite_file import SqliteFile
 from labctl.store.connection.writer_lock import NO_SERVICE, ServiceAddress
 from labctl.store.connection.writer_turn import WriterTurn
-from labctl.store.sealing import chain
-from labctl.store.sealing.chain import ChainHead
+from labctl.store.manifests import chain
+from labctl.store.manifests.chain import ChainHead
 
 ResultT = TypeVar("ResultT")
 

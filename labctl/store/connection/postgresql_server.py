@@ -14,7 +14,7 @@ from sqlalchemy import exc
 
 from labctl.store.connection.engines import server_engine
 from labctl.store.connection.writer_lock import ServiceAddress
-from labctl.store.sealing.chain import ChainHead
+from labctl.store.manifests.chain import ChainHead
 
 #: "labctl" in ASCII: the lock that a writing transaction has.
 WRITER_KEY = int.from_bytes(b"labctl", "big")

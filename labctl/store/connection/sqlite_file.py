@@ -16,14 +16,14 @@ from sqlalchemy import event as sa_event
 from sqlalchemy import exc
 
 from labctl.errors import StoreError
+from labctl.store.connection.anchor_file import anchor_fits, write_anchor
 from labctl.store.connection.commit_seal import count_commit, missing, seal
 from labctl.store.connection.engines import sqlite_engine
 from labctl.store.connection.file_identity import FileIdentity
 from labctl.store.connection.private_files import close_to_others, make_private
 from labctl.store.connection.start_check import first_damage
 from labctl.store.connection.writer_lock import ServiceAddress, WriterLock
-from labctl.store.sealing.anchor_file import anchor_fits, write_anchor
-from labctl.store.sealing.chain import ChainHead
+from labctl.store.manifests.chain import ChainHead
 
 
 class SqliteFile:

@@ -14,19 +14,19 @@ from sqlalchemy import exc
 
 from labctl.errors import BadCalibrationFile, StoreError
 from labctl.store import migrate, sample_codec
+from labctl.store.connection.anchor_file import anchor_path, read_anchor
 from labctl.store.connection.commit_seal import missing
 from labctl.store.connection.database import Database
 from labctl.store.connection.location import is_url, shown
 from labctl.store.import_parts import WHOLE_TABLE
 from labctl.store.integrity.check_manifests import ManifestCheck
 from labctl.store.integrity.check_means import MeansCheck
+from labctl.store.manifests.chain import ChainHead
+from labctl.store.manifests.digests import block_digests
+from labctl.store.manifests.parts import BlockParts, Parts
+from labctl.store.manifests.signatures import PublicKey
 from labctl.store.repositories.audit import Head, first_broken
 from labctl.store.schema import tables
-from labctl.store.sealing.anchor_file import anchor_path, read_anchor
-from labctl.store.sealing.chain import ChainHead
-from labctl.store.sealing.digests import block_digests
-from labctl.store.sealing.parts import BlockParts, Parts
-from labctl.store.sealing.signatures import PublicKey
 
 #: Blocks that are in memory at a time.
 AT_ONCE = 64

@@ -10,12 +10,12 @@ from typing import Any
 import sqlalchemy as sa
 
 from labctl.errors import StoreError
+from labctl.store.manifests import chain
+from labctl.store.manifests.chain import ChainHead
+from labctl.store.manifests.contents import KINDS, Kind
+from labctl.store.manifests.parts import BlockParts, Parts, differing, parts_of
+from labctl.store.manifests.signatures import PublicKey
 from labctl.store.schema import tables
-from labctl.store.sealing import chain
-from labctl.store.sealing.chain import ChainHead
-from labctl.store.sealing.contents import KINDS, Kind
-from labctl.store.sealing.parts import BlockParts, Parts, differing, parts_of
-from labctl.store.sealing.signatures import PublicKey
 
 #: Manifests that are in memory at a time.
 AT_ONCE = 500
@@ -141,8 +141,8 @@ class ManifestCheck:
             which = f"manifest {total} is" if last + 1 == total else f"manifests {last + 1} to {total} are"
             self._find(
                 "manifests",
-                f"{which} not signed by the key that was given: what they say may be by anybody who can write to the "
-                "database; `labctl seal-key sign` signs them, if it is as it should be",
+                f"{which} not signed by the key that was given: every user who can write to the database may "
+                "have written them; `labctl seal-key sign` signs them, if it is as it should be",
             )
 
     def check_records(self, blocks: Mapping[int, Parts | None]) -> None:

@@ -14,10 +14,10 @@ from labctl.acting_user import actor
 from labctl.json_types import JsonObject
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
+from labctl.store.manifests import chain
 from labctl.store.records import AuditRow
 from labctl.store.schema import tables
 from labctl.store.schema.types import EPOCH
-from labctl.store.sealing import chain
 
 FIRST = "0" * 64
 HEAD_ID = 1

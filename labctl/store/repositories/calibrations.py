@@ -15,12 +15,12 @@ from labctl.json_types.calibrations import JudgementDetail
 from labctl.json_types.models import KeptAnswer
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
+from labctl.store.manifests.contents import CALIBRATION, CERTIFICATION
 from labctl.store.records import CalibrationRecord, CertificationRow, Judgement
 from labctl.store.repositories.audit import append
 from labctl.store.repositories.drafts.marks import mark_fitted
 from labctl.store.repositories.units import SEEN
 from labctl.store.schema import tables
-from labctl.store.sealing.contents import CALIBRATION, CERTIFICATION
 from labctl.store.sealing.seals import seal
 
 

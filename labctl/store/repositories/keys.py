@@ -9,10 +9,10 @@ import sqlalchemy as sa
 from labctl.errors import Conflict, NotFound
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
+from labctl.store.manifests.contents import KEY
 from labctl.store.records import KeyRow
 from labctl.store.repositories.audit import append
 from labctl.store.schema import tables
-from labctl.store.sealing.contents import KEY
 from labctl.store.sealing.seals import changing, seal
 
 _k = tables.api_keys.c

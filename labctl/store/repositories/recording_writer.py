@@ -22,10 +22,10 @@ from labctl.recording import RecordingInfo
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.import_parts import MOST_BYTES, MOST_ROWS, TABLES, ImportPart
+from labctl.store.manifests.contents import RECORDING
 from labctl.store.repositories.audit import append
 from labctl.store.repositories.units import add_missing_unit, remember_unit
 from labctl.store.schema import tables
-from labctl.store.sealing.contents import RECORDING
 from labctl.store.sealing.seals import prepared_recordings, seal
 
 #: Where several processes write (PostgreSQL): an import that gave no sign for so long belongs to no process any more.

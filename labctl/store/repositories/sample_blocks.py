@@ -12,8 +12,8 @@ from typing_extensions import TypedDict
 from labctl.json_types.recordings import RawChannelJson
 from labctl.store import sample_codec
 from labctl.store.import_parts import block_row
+from labctl.store.manifests.digests import block_digests
 from labctl.store.schema import tables
-from labctl.store.sealing.digests import block_digests
 from procedures.contracts.journal import TableAngles
 
 

@@ -1,1 +1,1 @@
-"""Manifests: what every record was when it was sealed, each bound to the one before and to the audit trail."""
+"""Sealing records: when they come to rest, when they change afterwards, and the signatures over their manifests."""

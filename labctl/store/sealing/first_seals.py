@@ -9,11 +9,11 @@ import sqlalchemy as sa
 from instruments.clock import SystemClock
 from labctl.errors import StoreError
 from labctl.store import sample_codec
+from labctl.store.manifests import chain
+from labctl.store.manifests.contents import KINDS, Kind
+from labctl.store.manifests.digests import block_digests
+from labctl.store.manifests.parts import Parts, parts_of
 from labctl.store.schema import tables
-from labctl.store.sealing import chain
-from labctl.store.sealing.contents import KINDS, Kind
-from labctl.store.sealing.digests import block_digests
-from labctl.store.sealing.parts import Parts, parts_of
 from labctl.store.sealing.seals import seal
 
 #: Blocks and records that are read at a time.
@@ -43,7 +43,7 @@ def _seal_kind(connection: sa.Connection, kind: Kind, at: datetime, reason: str)
 def _parts(connection: sa.Connection, kind: Kind, record: str) -> Parts:
     try:
         return parts_of(connection, kind, record)
-    except StoreError as error:  # a block that is damaged already keeps nobody from migrating; the check reports it
+    except StoreError as error:  # a block that is damaged already prevents no migration; the check reports it
         return {**parts_of(connection, kind, record, blocks=False), "readings": {"unreadable": str(error)}}
 
 

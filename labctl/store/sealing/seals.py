@@ -16,10 +16,10 @@ import sqlalchemy as sa
 
 from labctl.errors import StoreError
 from labctl.store.connection.database import Database
+from labctl.store.manifests import chain
+from labctl.store.manifests.contents import CAMPAIGN, KINDS, RECORDING, Kind
+from labctl.store.manifests.parts import Parts, differing, parts_of
 from labctl.store.schema import tables
-from labctl.store.sealing import chain
-from labctl.store.sealing.contents import CAMPAIGN, KINDS, RECORDING, Kind
-from labctl.store.sealing.parts import Parts, differing, parts_of
 
 #: Kind and key of a record.
 Record = tuple[str, str]

@@ -12,7 +12,7 @@ from urllib.parse import unquote
 
 from labctl.errors import BadInput
 from labctl.store.connection.private_files import FILE
-from labctl.store.sealing.signatures import NEEDS, PublicKey, public_key, signed_text
+from labctl.store.manifests.signatures import NEEDS, PublicKey, public_key, signed_text
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ec import EllipticCurvePrivateKey
@@ -90,7 +90,9 @@ def _file_signer(path: Path) -> FileSigner:
     try:
         key = load_pem_private_key(path.read_bytes(), None)
     except (ValueError, TypeError) as error:
-        raise BadInput(f"seal key {path}: this is no private key in PEM form without a password") from error
+        raise BadInput(
+            f"seal key {path}: this is no private key in PEM form without a password; use `labctl seal-key create FILE`"
+        ) from error
     if not isinstance(key, Ed25519PrivateKey | EllipticCurvePrivateKey):
         raise BadInput(f"seal key {path}: this kind of key is not used; `labctl seal-key create FILE` makes a key")
     pem = _public_pem(key)
@@ -143,7 +145,7 @@ def token_uri(text: str) -> TokenUri:
     try:
         given = dict(_attribute(part) for part in [*path.split(";"), *query.split("&")] if part)
     except ValueError as error:
-        raise BadInput("LABCTL_SEAL_KEY: an attribute of the PKCS#11 URI has no '='") from error
+        raise BadInput("LABCTL_SEAL_KEY: an attribute of the PKCS#11 URI has no '='; write token=NAME") from error
     if missing := [name for name in ("token", "object", "module-path") if not given.get(name)]:
         raise BadInput(
             f"LABCTL_SEAL_KEY: the PKCS#11 URI has no {', '.join(missing)}; write "
@@ -198,7 +200,9 @@ class TokenSigner:
         try:
             made: bytes = self._key.sign(hashlib.sha256(signed_text(digest)).digest(), mechanism=self._mechanism)
         except self._trouble as error:
-            raise BadInput(f"{self._where}: {error or type(error).__name__}; nothing was signed") from error
+            raise BadInput(
+                f"{self._where}: {error or type(error).__name__}; nothing was signed; check the token"
+            ) from error
         return made
 
 

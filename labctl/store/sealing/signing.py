@@ -14,9 +14,9 @@ import sqlalchemy as sa
 from labctl.errors import LabctlError, StoreError
 from labctl.log import get_logger
 from labctl.store.connection.database import Database
+from labctl.store.manifests import chain
+from labctl.store.manifests.chain import ChainHead
 from labctl.store.schema import tables
-from labctl.store.sealing import chain
-from labctl.store.sealing.chain import ChainHead
 from labctl.store.sealing.signers import Signer, signer_of
 
 #: How long a process that ends waits for its last signature, s.

@@ -13,9 +13,9 @@ from labctl.errors import Conflict
 from labctl.json_types import JsonDocument
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
+from labctl.store.manifests.contents import CERTIFICATE
 from labctl.store.repositories.audit import append
 from labctl.store.schema import tables
-from labctl.store.sealing.contents import CERTIFICATE
 from labctl.store.sealing.seals import seal
 
 

@@ -10,10 +10,10 @@ import sqlalchemy as sa
 from labctl.json_types import JsonObject
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
+from labctl.store.manifests.contents import CAMPAIGN
 from labctl.store.repositories.audit import append
 from labctl.store.repositories.drafts.records import OPEN, DraftEvent, DraftRow, DraftState
 from labctl.store.schema import tables
-from labctl.store.sealing.contents import CAMPAIGN
 from labctl.store.sealing.seals import changing
 from procedures.contracts.campaign_state import CampaignState
 

@@ -18,8 +18,8 @@ from labctl.errors import BadInput
 from labctl.services.admin.seal_keys import create_seal_key, sign
 from labctl.store import Store, check, open_store, read_public_key, signer_of
 from labctl.store.connection.database import Database
+from labctl.store.manifests.signatures import public_key
 from labctl.store.sealing import signing
-from labctl.store.sealing.signatures import public_key
 from labctl.store.sealing.signers import Signer, token_uri
 
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)

@@ -20,7 +20,7 @@ from labctl.services.schemas.admin import KeyRequest, Role
 from labctl.services.schemas.calibrations import FitRequest
 from labctl.services.schemas.certification import CertifyRequest
 from labctl.store import Checked, PublicKey, check, open_store, read_public_key
-from labctl.store.sealing.anchor_file import anchor_path, write_anchor
+from labctl.store.connection.anchor_file import anchor_path, write_anchor
 from tests.helpers.certifying import REASON
 from tests.helpers.commands import local_executor
 from tests.helpers.paths import EXAMPLES

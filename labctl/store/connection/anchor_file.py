@@ -1,6 +1,6 @@
 """A small file beside an SQLite database that holds the end of its chain of manifests.
 
-Somebody who writes the whole chain anew, in the database alone, does not fit it. It is written after the commit, so it
+A chain that was written anew in the database alone does not fit it. The file is written after the commit, so it
 may lag behind by what a killed process committed last, but it is always of the same chain.
 """
 
@@ -13,8 +13,8 @@ from pathlib import Path
 import sqlalchemy as sa
 
 from labctl.store.connection.private_files import make_private
+from labctl.store.manifests.chain import ChainHead
 from labctl.store.schema import tables
-from labctl.store.sealing.chain import ChainHead
 
 WIDTH = 12
 HASH_LENGTH = 64

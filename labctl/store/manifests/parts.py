@@ -8,9 +8,9 @@ import sqlalchemy as sa
 
 from labctl.json_types import JsonObject
 from labctl.store import sample_codec
+from labctl.store.manifests.contents import Kind
+from labctl.store.manifests.digests import GROUPS, RowsDigest, block_digests, digest_of_rows
 from labctl.store.schema import tables
-from labctl.store.sealing.contents import Kind
-from labctl.store.sealing.digests import GROUPS, RowsDigest, block_digests, digest_of_rows
 
 #: Rows that are in memory at a time.
 AT_ONCE = 2000
