@@ -44,6 +44,7 @@ from labctl.store.repositories.drafts.records import DraftEvent, DraftRow, Draft
 from labctl.store.repositories.drafts.repository import Drafts
 from labctl.store.repositories.keys import Keys
 from labctl.store.repositories.leases import LeaseRow, Leases
+from labctl.store.repositories.manifests import ManifestRow, Manifests
 from labctl.store.repositories.recording_writer import Imports, ImportTicket
 from labctl.store.repositories.recordings import Recordings
 from labctl.store.repositories.resume_points import ResumePoint, ResumePoints, Resumption
@@ -86,6 +87,8 @@ __all__ = [
     "Keys",
     "LeaseRow",
     "Leases",
+    "ManifestRow",
+    "Manifests",
     "MeanRow",
     "Migrated",
     "NewCalibration",
@@ -148,6 +151,7 @@ class Store:
         self.keys = Keys(database)
         self.starts = Starts(database)
         self.leases = Leases(database)
+        self.manifests = Manifests(database)
         self._signing = begin_signing(database, seal_key()) if database.writes else None
 
     @property

@@ -215,7 +215,7 @@ class Campaigns:
         prepared = prepared_recordings(self._database, records)
         with (
             self._database.writing() as connection,
-            changing(connection, records, at, state.value, prepared),
+            changing(connection, records, at, CampaignState(state).value, prepared),
         ):
             connection.execute(
                 sa.update(tables.campaigns)
