@@ -13,12 +13,11 @@ from instruments.clock import VirtualClock
 from labctl.services.admin.seal_keys import create_seal_key
 from labctl.services.campaigns.execution import run
 from labctl.services.campaigns.preparation import prepare
-from labctl.services.commands.registry import CERTIFY, CREATE_KEY, FIT, IMPORT_RECORDING
-from labctl.services.commands.requests import RecordingFolder, ToUnit, ToVersion
+from labctl.services.commands.registry import CREATE_KEY, FIT, IMPORT_RECORDING
+from labctl.services.commands.requests import RecordingFolder, ToUnit
 from labctl.services.planning.loading import load_bench
 from labctl.services.schemas.admin import KeyRequest, Role
 from labctl.services.schemas.calibrations import FitRequest
-from labctl.services.schemas.certification import CertifyRequest
 from labctl.store import Checked, PublicKey, check, open_store, read_public_key
 from labctl.store.connection.anchor_file import anchor_path, write_anchor
 from tests.helpers.certifying import REASON
@@ -39,8 +38,7 @@ def fill(location: str) -> None:
         commands = local_executor(store, clock)
         commands.execute(IMPORT_RECORDING, RecordingFolder(EXAMPLES / "osu-fog"))
         commands.execute(FIT, ToUnit("OSU-FOG-2024", FitRequest(effects=["bias", "scale_factor"])))
-        request = CertifyRequest(by="A", reason=REASON, override=True)
-        commands.execute(CERTIFY, ToVersion("OSU-FOG-2024", 1, request))
+        store.calibrations.certify("OSU-FOG-2024", 1, "certify", by="A", reason=REASON, at=AT)
         commands.execute(CREATE_KEY, KeyRequest(name="guest", role=Role.VIEWER))
         commands.execute(CREATE_KEY, KeyRequest(name="head", role=Role.APPROVER))
 
