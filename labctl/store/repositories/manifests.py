@@ -1,4 +1,4 @@
-"""Manifests, to look at: what a certificate names of the records that it rests on."""
+"""Reads manifests: those that a certificate names of the records that it rests on."""
 
 from __future__ import annotations
 
