@@ -8,6 +8,7 @@ from pathlib import Path
 DATABASE_VARIABLE = "LABCTL_DATABASE"
 KEY_VARIABLE = "LABCTL_KEY"
 DUE_VARIABLE = "LABCTL_DUE_DAYS"
+SEAL_KEY_VARIABLE = "LABCTL_SEAL_KEY"
 LOG_LEVEL_VARIABLE = "LABCTL_LOG_LEVEL"
 
 
@@ -19,6 +20,11 @@ def variable(name: str) -> str:
 def key() -> str | None:
     """Return the API key to show to a service, where the environment has one."""
     return os.environ.get(KEY_VARIABLE) or None
+
+
+def seal_key() -> str:
+    """Return what names the key that signs manifests: a PEM file or a PKCS#11 URI; empty for none."""
+    return variable(SEAL_KEY_VARIABLE)
 
 
 def os_user() -> str:

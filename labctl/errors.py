@@ -230,6 +230,12 @@ class StoreError(LabctlError):
         self.cause = cause or text
 
 
+class OldSchema(StoreError):
+    """The database is of an earlier version; it is migrated when a person asks for it, and a service starts."""
+
+    slug = "old-schema"
+
+
 class DatabaseUnreachable(StoreError):
     """The server of the database does not answer; nothing was stored, and it can be tried again."""
 

@@ -59,6 +59,9 @@ def _core(parent: ET.Element, given: Certificate) -> None:
     identifications = child(parent, "identifications")
     _identification(identifications, "calibrationLaboratory", given.calibration.hash, "SHA-256 of the calibration")
     _identification(identifications, "calibrationLaboratory", given.calibration.address, "Address of the calibration")
+    for each in given.manifests:
+        name = f"SHA-256 of manifest {each.manifest}: {each.record}"
+        _identification(identifications, "calibrationLaboratory", each.hash, name)
     if given.customer.order:
         _identification(identifications, "customer", given.customer.order, "Order")
     if given.item.received is not None:

@@ -177,6 +177,14 @@ class CalibrationFacts(Part):
     address: str
 
 
+class ManifestNamed(Part):
+    """The manifest of a record, by which paper and database are compared; `labctl check` names manifests by number."""
+
+    record: str
+    manifest: int  #: its number in the chain
+    hash: str  #: SHA-256
+
+
 class Certificate(Part):
     """All of it."""
 
@@ -205,6 +213,7 @@ class Certificate(Part):
     external: str  #: results of external providers
     authorised: Authorisation
     calibration: CalibrationFacts
+    manifests: tuple[ManifestNamed, ...] = ()  #: of the recordings and the certification; none: issued before 0017
     statements: tuple[str, ...]
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, populate_by_name=True)

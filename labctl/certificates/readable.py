@@ -71,6 +71,7 @@ def _pages(given: Certificate) -> dict[str, object]:
         "statements": [text for text in given.statements if not text.startswith("SPECIMEN")],
         "hash": given.calibration.hash,
         "address": given.calibration.address,
+        "manifests": [[f"Manifest {each.manifest}, {each.record}", each.hash] for each in given.manifests],
     }
 
 

@@ -25,6 +25,7 @@ from labctl.cli.commands import (
     plugins,
     recordings,
     schedule,
+    seal_key,
     server,
     trend,
 )
@@ -50,6 +51,7 @@ campaign_control.add_to(campaign.app)
 app.add_typer(recordings.export_app, name="export")
 app.add_typer(keys.app, name="key")
 app.add_typer(audit.app, name="audit")
+app.add_typer(seal_key.app, name="seal-key")
 COMMANDS: dict[str, Callable[..., None]] = {
     "demo": server.demo,
     "serve": server.serve,
@@ -80,6 +82,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "compensate": calibrations.compensate,
     "backup": database.backup,
     "check": database.check,
+    "migrate": database.migrate,
 }
 for name, command in COMMANDS.items():
     app.command(name)(command)

@@ -6,12 +6,17 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 
+from labctl.config import seal_key
+from labctl.store.connection.anchor_file import parse_anchor
 from labctl.store.connection.database import Database, Writer
-from labctl.store.connection.location import is_url
+from labctl.store.connection.location import is_url, shown
 from labctl.store.connection.transactions import run_transaction
 from labctl.store.connection.writer_lock import NO_SERVICE, Holder, ServiceAddress, holder_of
 from labctl.store.integrity.backup import Copy, copy_database
 from labctl.store.integrity.check import Checked, Finding, Progress, check
+from labctl.store.integrity.migration import Migrated, migrate_database, needs_migration
+from labctl.store.manifests.chain import ChainHead
+from labctl.store.manifests.signatures import PublicKey, read_public_key
 from labctl.store.records import (
     AuditRow,
     CalibrationRecord,
@@ -39,11 +44,14 @@ from labctl.store.repositories.drafts.records import DraftEvent, DraftRow, Draft
 from labctl.store.repositories.drafts.repository import Drafts
 from labctl.store.repositories.keys import Keys
 from labctl.store.repositories.leases import LeaseRow, Leases
+from labctl.store.repositories.manifests import ManifestRow, Manifests
 from labctl.store.repositories.recording_writer import Imports, ImportTicket
 from labctl.store.repositories.recordings import Recordings
 from labctl.store.repositories.resume_points import ResumePoint, ResumePoints, Resumption
 from labctl.store.repositories.scheduled_starts import NewStart, StartEventRow, StartRow, Starts
 from labctl.store.repositories.units import Certifications, Units
+from labctl.store.sealing.signers import Signer, create_key, refuse_open_key, signer_of
+from labctl.store.sealing.signing import begin_signing, sign_chain
 
 __all__ = [
     "Audit",
@@ -60,6 +68,7 @@ __all__ = [
     "CertificateRow",
     "Certificates",
     "CertificationRow",
+    "ChainHead",
     "Checked",
     "Copy",
     "DataSetRow",
@@ -78,12 +87,16 @@ __all__ = [
     "Keys",
     "LeaseRow",
     "Leases",
+    "ManifestRow",
+    "Manifests",
     "MeanRow",
+    "Migrated",
     "NewCalibration",
     "NewCampaign",
     "NewStart",
     "NewUnit",
     "Progress",
+    "PublicKey",
     "RecordingRow",
     "Recordings",
     "ResumePoint",
@@ -91,6 +104,7 @@ __all__ = [
     "Resumption",
     "ServedCalibration",
     "ServiceAddress",
+    "Signer",
     "StartEventRow",
     "StartRow",
     "Starts",
@@ -103,9 +117,18 @@ __all__ = [
     "Writer",
     "check",
     "copy_database",
+    "create_key",
     "holder_of",
     "is_url",
+    "migrate_database",
+    "needs_migration",
     "open_store",
+    "parse_anchor",
+    "read_public_key",
+    "refuse_open_key",
+    "shown",
+    "sign_chain",
+    "signer_of",
 ]
 
 
@@ -128,6 +151,8 @@ class Store:
         self.keys = Keys(database)
         self.starts = Starts(database)
         self.leases = Leases(database)
+        self.manifests = Manifests(database)
+        self._signing = begin_signing(database, seal_key()) if database.writes else None
 
     @property
     def location(self) -> str:
@@ -155,10 +180,17 @@ class Store:
 
     def run(self, name: str, args: tuple[object, ...], kwargs: Mapping[str, object]) -> object:
         """Run a transaction that another process sent; raises what it raises, and KeyError for an unknown name."""
-        return run_transaction({type(each).__name__: each for each in vars(self).values()}, name, args, kwargs)
+        return run_transaction(
+            {type(each).__name__: each for each in vars(self).values() if hasattr(each, "_database")},
+            name,
+            args,
+            kwargs,
+        )
 
     def close(self) -> None:
         """Close the database."""
+        if self._signing is not None:
+            self._signing.close()
         self._database.close()
 
 
@@ -166,11 +198,12 @@ class Store:
 def open_store(
     location: str, *, write: bool, address: ServiceAddress = NO_SERVICE, writer: Writer | None = None
 ) -> Iterator[Store]:
-    """Open a database by path or URL, made and migrated on first use; `write` holds it for this process.
+    """Open a database by path or URL, made on first use; `write` holds it for this process.
 
     Without, transactions run by `writer`, the process that holds it.
 
-    Raises Conflict when another process holds it, StoreError when it is newer than the code or damaged.
+    Raises Conflict when another process holds it, StoreError when it is newer than the code or damaged, OldSchema
+    when it has to be migrated first.
     """
     store = Store(Database(location, write=write, address=address, writer=writer))
     try:

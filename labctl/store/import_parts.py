@@ -14,6 +14,7 @@ from labctl.recording import Recording, dataset_starts
 from labctl.recording.recording import Columns
 from labctl.store import sample_codec
 from labctl.store.dataset_statistics import means_rows
+from labctl.store.manifests.digests import block_digests
 
 #: Number of the blocks that hold a whole table of points or coefficients.
 WHOLE_TABLE = 0
@@ -24,7 +25,7 @@ MOST_ROWS, MOST_BYTES = 2000, 1 << 21
 BLOCK_BYTES = 2 << 20
 
 #: The tables that a part has rows of, in the order in which they refer to each other.
-TABLES = ("data_sets", "data_set_means", "sample_blocks", "environment")
+TABLES = ("data_sets", "data_set_means", "sample_blocks", "block_digests", "environment")
 ENVIRONMENT = ("t_s", "run", "temperature_c", "chamber_c", "chamber_setpoint_c")
 
 #: Column -> value, as SQL takes them.
@@ -140,6 +141,7 @@ def _blocks(recording: int, number: int, columns: Columns) -> Iterator[dict[str,
         block = {name: values[start : start + at_once] for name, values in columns.items()}
         yield {
             "sample_blocks": [block_row(recording, number, seq, sample_codec.pack(block, sample_codec.FINAL))],
+            "block_digests": [{"recording_id": recording, "number": number, "seq": seq, **block_digests(block)}],
         }
 
 

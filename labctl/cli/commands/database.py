@@ -1,15 +1,18 @@
-"""`labctl backup` and `labctl check`: copying a database, and checking that all is as it was written."""
+"""`labctl backup`, `labctl check`, `labctl migrate`: copying a database, checking it, and bringing it up to date."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import Database, Json
 from labctl.cli.output import console, print_json, stderr
+
+if TYPE_CHECKING:
+    from labctl.services.schemas.admin import CheckResponse
 
 
 def backup(
@@ -30,6 +33,8 @@ def backup(
         print_json(answer)
     else:
         console.print(f"{answer.file}: {answer.bytes} bytes, sha256 {answer.sha256}", markup=False, soft_wrap=True)
+        if answer.anchor:
+            console.print(f"anchor of its manifests: {answer.anchor}", markup=False, soft_wrap=True)
     if answer.remark:
         stderr.print(f"labctl: {answer.remark}", markup=False)
     for finding in answer.findings:
@@ -42,23 +47,79 @@ def backup(
         raise typer.Exit(1)
 
 
-def check(as_json: Json = False, database: Database = None) -> None:
-    """Check the database for damage: file, schema, every reading, calibrations, audit trail."""
+def check(
+    key: Annotated[
+        list[Path] | None,
+        typer.Option(
+            "--key",
+            metavar="PUBLIC.pem",
+            help="Public key of the seal key; every manifest must then be covered by its signature. Repeat the option "
+            "for keys that were used before.",
+        ),
+    ] = None,
+    anchor: Annotated[
+        str | None,
+        typer.Option(
+            "--anchor",
+            metavar="LENGTH:HASH",
+            help="Anchor that an earlier check or backup printed; the check fails if manifests up to it were changed.",
+        ),
+    ] = None,
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Check the database for damage and for changes without labctl: file, schema, every reading, calibrations, audit
+    trail, and each record against its manifest."""
     from labctl.services.admin.maintenance import check_database
 
     def said(part: str, done: int, total: int) -> None:
         status.update(f"{part} {done} of {total}" if total else part)
 
     with one_clear_line(), stderr.status("checking") as status:
-        answer = check_database(database, None if as_json else said)
+        answer = check_database(database, None if as_json else said, anchor=anchor, keys=key or ())
     if as_json:
         print_json(answer)
     else:
         for finding in answer.findings:
             console.print(f"{finding.part}: {finding.text}", markup=False, soft_wrap=True)
+        for text in (*answer.remarks, *_of_manifests(answer)):
+            console.print(text, markup=False, soft_wrap=True)
         looked = f"{answer.blocks} blocks, {answer.calibrations} calibrations, {answer.audit_rows} audit rows"
         number = len(answer.findings)
         verdict = "no damage found" if answer.ok else f"{number} finding{'s' if number > 1 else ''}"
         console.print(f"{answer.database}: {looked}: {verdict}", markup=False, soft_wrap=True)
     if not answer.ok:
         raise typer.Exit(1)
+
+
+def _of_manifests(answer: CheckResponse) -> list[str]:
+    """Return what was found of seals, in words."""
+    if not answer.manifests:
+        return []
+    signed = "none signed"
+    if answer.signed:
+        said = "verified" if answer.verified else "not verified: give --key"
+        signed = f"{answer.signed} signed by {', '.join(each[:16] for each in answer.keys)} ({said})"
+    number = answer.not_sealed
+    unsealed = f"; {number} record{'s are' if number > 1 else ' is'} not sealed yet" if number else ""
+    return [f"{answer.manifests} manifests, {signed}{unsealed}; anchor {answer.anchor}"]
+
+
+def migrate(
+    without_copy: Annotated[
+        bool,
+        typer.Option("--without-copy", help="Make no copy first; required for PostgreSQL, which pg_dump backs up."),
+    ] = False,
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Bring a database of an earlier version to the schema of this one, after a verified copy beside the file."""
+    from labctl.cli.printing.migration import migration_text
+    from labctl.services.admin.maintenance import migrate as migrate_now
+
+    with one_clear_line():
+        answer = migrate_now(database, copy=not without_copy)
+    if as_json:
+        print_json(answer)
+        return
+    console.print(migration_text(answer), markup=False, soft_wrap=True)

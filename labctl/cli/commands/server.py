@@ -73,10 +73,26 @@ def serve(
 
     with one_clear_line(), log_of_command("supervisor", default="info", location=request.location):
         try:
+            _migrated(request.location)
             left = serve_forever(request, ready)
         finally:
             give_up_blocked_stderr()
     stderr.print(f"labctl: stopped{'; ' if left else ''}{left}", markup=False)
+
+
+def _migrated(location: str) -> None:
+    """Bring a database of an earlier version up to date before the service starts, and say so; a seal key that cannot
+    be used is refused."""
+    from labctl.cli.printing.migration import migration_text
+    from labctl.log import get_logger
+    from labctl.services.admin.maintenance import migrate_before_service
+    from labctl.services.admin.seal_keys import refuse_unusable_key
+
+    refuse_unusable_key()
+    answer = migrate_before_service(location)
+    if answer is not None:
+        stderr.print(f"labctl: {migration_text(answer)}", markup=False)
+        get_logger().warning("database.migrated", said=migration_text(answer))
 
 
 def _found(source: str, database: str | None) -> tuple[str, str]:

@@ -2,27 +2,93 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from labctl.config import default_database
-from labctl.errors import LabctlError
-from labctl.services.schemas.admin import BackupNote, BackupResponse, CheckResponse, FindingResponse
-from labctl.store import Progress, check, copy_database
+from labctl.errors import BadInput, LabctlError
+from labctl.services.schemas.admin import (
+    BackupNote,
+    BackupResponse,
+    CheckResponse,
+    FindingResponse,
+    MigrationResponse,
+)
+from labctl.store import (
+    ChainHead,
+    Progress,
+    check,
+    copy_database,
+    is_url,
+    migrate_database,
+    needs_migration,
+    parse_anchor,
+    read_public_key,
+    shown,
+)
 
 
-def check_database(database: str | None, progress: Progress | None = None) -> CheckResponse:
-    """Check all of a database: file, schema, readings, calibrations, audit trail. Raises StoreError without one."""
+def check_database(
+    database: str | None,
+    progress: Progress | None = None,
+    *,
+    anchor: str | None = None,
+    keys: Sequence[Path] = (),
+) -> CheckResponse:
+    """Check all of a database: file, schema, readings, calibrations, audit trail, manifests.
+
+    `anchor` is LENGTH:HASH of the manifests as an earlier check or backup printed it; `keys` are files of public keys.
+    Raises StoreError without a database, BadInput for an anchor or a key that cannot be read.
+    """
     location = database or default_database()
-    found = check(location, progress=progress)
+    chain_anchor = None if anchor is None else _anchor(anchor)
+    found = check(location, chain_anchor=chain_anchor, keys=[read_public_key(path) for path in keys], progress=progress)
     return CheckResponse(
         ok=not found.findings,
         database=location,
         blocks=found.blocks,
         calibrations=found.calibrations,
         audit_rows=found.audit_rows,
+        manifests=found.manifests,
+        not_sealed=found.not_sealed,
+        signed=found.signed,
+        verified=bool(keys),
+        keys=list(found.keys),
+        anchor=None if found.head is None else str(found.head),
+        remarks=list(found.remarks),
         findings=[FindingResponse(part=each.part, text=each.text) for each in found.findings],
     )
+
+
+def _anchor(text: str) -> ChainHead:
+    try:
+        return parse_anchor(text)
+    except ValueError as error:
+        raise BadInput(f"--anchor {text!r}: expected LENGTH:HASH as `labctl check` prints it") from error
+
+
+def migrate(database: str | None, *, copy: bool = True) -> MigrationResponse:
+    """Bring a database to today's schema, after a verified copy beside it. Raises BadInput, StoreError, Conflict."""
+    location = database or default_database()
+    done = migrate_database(location, copy=copy)
+    return MigrationResponse(
+        database=shown(location),
+        from_schema=done.before,
+        to_schema=done.after,
+        copied_to=None if done.copy is None else str(done.copy.path),
+        bytes=None if done.copy is None else done.copy.bytes,
+        sha256=None if done.copy is None else done.copy.sha256,
+    )
+
+
+def migrate_before_service(location: str) -> MigrationResponse | None:
+    """Migrate a file of an earlier version, after a copy; None where there is nothing to do.
+
+    A server's database is left to `labctl migrate --without-copy`: opening it says so. Raises BadInput, StoreError.
+    """
+    if is_url(location) or not needs_migration(location):
+        return None
+    return migrate(location)
 
 
 def back_up(
@@ -39,11 +105,13 @@ def back_up(
         note(BackupNote(file=target.name, bytes=made.bytes, sha256=made.sha256))
     except LabctlError as error:
         remark = f"the backup is made, but could not be noted in the audit trail: {error}"
+    checked = check_database(str(target), progress)
     return BackupResponse(
         file=str(target),
         bytes=made.bytes,
         sha256=made.sha256,
         noted=not remark,
         remark=remark,
-        findings=check_database(str(target), progress).findings,
+        anchor=checked.anchor,
+        findings=checked.findings,
     )

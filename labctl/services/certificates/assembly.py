@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from datetime import datetime
 from importlib.metadata import version as package_version
 
@@ -12,6 +13,7 @@ from labctl.certificates.document import (
     CalibrationFacts,
     Certificate,
     Item,
+    ManifestNamed,
     Method,
     Replaced,
     StandardUsed,
@@ -68,8 +70,19 @@ def assembled(
         calibration=CalibrationFacts(
             version=facts.row.version, hash=facts.row.hash, address=address_of(facts.laboratory.url, facts.row)
         ),
+        manifests=tuple(_manifests(store, facts)),
         statements=(*statements(facts), *found.results.left_out),
     )  # fmt: skip
+
+
+def _manifests(store: Store, facts: Facts) -> Iterator[ManifestNamed]:
+    """Yield the manifests of the recordings that were fitted, and of the certification."""
+    for number in facts.row.recordings:
+        if (found := store.manifests.of_recording(number)) is not None:
+            yield ManifestNamed(record=f"recording {number}", manifest=found.sequence, hash=found.hash)
+    act = store.manifests.of_certification(facts.row.serial, facts.row.version)
+    if act is not None:
+        yield ManifestNamed(record=f"certification of {facts.what}", manifest=act.sequence, hash=act.hash)
 
 
 def _number(store: Store, facts: Facts, at: datetime) -> str:

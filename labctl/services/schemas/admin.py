@@ -103,6 +103,15 @@ class CheckResponse(ResponseModel):
     blocks: int
     calibrations: int
     audit_rows: int
+    manifests: int = Field(default=0, description="Manifests in the chain.")
+    not_sealed: int = Field(default=0, description="Records without a manifest because they are still changing.")
+    signed: int = Field(
+        default=0, description="How many manifests signatures cover; verified only if a public key was given."
+    )
+    verified: bool = Field(default=False, description="Whether the signatures were verified with a public key.")
+    keys: list[str] = Field(default=[], description="Fingerprints (SHA-256) of the keys that signatures name.")
+    anchor: str | None = Field(default=None, description="End of the chain, LENGTH:HASH; keep it in another place.")
+    remarks: list[str] = Field(default=[], description="What was not checked, and why.")
     findings: list[FindingResponse]
 
 
@@ -114,7 +123,35 @@ class BackupResponse(ResponseModel):
     sha256: str
     noted: bool
     remark: str = ""
+    anchor: str | None = Field(default=None, description="End of the chain of manifests in the copy, LENGTH:HASH.")
     findings: list[FindingResponse]
+
+
+class MigrationResponse(ResponseModel):
+    """A database that stands at today's schema."""
+
+    database: str
+    from_schema: str
+    to_schema: str
+    copied_to: str | None = Field(default=None, description="Copy of the database as it was before.")
+    bytes: int | None = None
+    sha256: str | None = None
+
+
+class SealKeyResponse(ResponseModel):
+    """A key that signs manifests; the private key is never shown."""
+
+    fingerprint: str = Field(description="SHA-256 of the public key in DER form.")
+    public_key: str = Field(description="Public key in PEM form.")
+    file: str | None = Field(default=None, description="File of the private key.")
+    public_file: str | None = None
+
+
+class SignedResponse(ResponseModel):
+    """What was signed."""
+
+    signed: int | None = Field(description="Number of the manifest that was signed; null: it is signed already.")
+    fingerprint: str
 
 
 class PluginResponse(ResponseModel):

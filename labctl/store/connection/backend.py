@@ -8,6 +8,7 @@ import sqlalchemy as sa
 from sqlalchemy import exc
 
 from labctl.store.connection.writer_lock import ServiceAddress
+from labctl.store.manifests.chain import ChainHead
 
 
 class Backend(Protocol):
@@ -49,6 +50,15 @@ class Backend(Protocol):
 
     def committed(self, commits: int) -> None:
         """Note the count that `before_commit` returned, once the transaction is committed."""
+        ...
+
+    @property
+    def anchor_fits(self) -> bool:
+        """Whether the chain of manifests goes on from what was noted outside the database."""
+        ...
+
+    def grown(self, head: ChainHead) -> None:
+        """Note the end of the chain of manifests, once the transaction that added to it is committed."""
         ...
 
     def is_unreachable(self, error: exc.DatabaseError) -> bool:

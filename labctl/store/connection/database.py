@@ -12,7 +12,7 @@ from sqlalchemy import exc
 from sqlalchemy.exc import DatabaseError
 
 from instruments.clock import Clock, WallClock
-from labctl.errors import DatabaseUnreachable, DiskFull, StoreError
+from labctl.errors import DatabaseUnreachable, DiskFull, OldSchema, StoreError
 from labctl.store import migrate
 from labctl.store.connection.backend import Backend
 from labctl.store.connection.location import is_url, shown
@@ -20,6 +20,8 @@ from labctl.store.connection.postgresql_server import PostgresqlServer
 from labctl.store.connection.sqlite_file import SqliteFile
 from labctl.store.connection.writer_lock import NO_SERVICE, ServiceAddress
 from labctl.store.connection.writer_turn import WriterTurn
+from labctl.store.manifests import chain
+from labctl.store.manifests.chain import ChainHead
 
 ResultT = TypeVar("ResultT")
 
@@ -36,7 +38,7 @@ class Writer(Protocol):
 
 
 class Database:
-    """A migrated database. `write` holds it for this process; without, only `reading` may be used.
+    """A database at today's schema. `write` holds it for this process; without, only `reading` may be used.
 
     `writer` runs the transactions of a process that does not hold it. `address` is written into the note that tells
     other processes who holds it, and into the leases that it takes. `clock` times how long a server that does not
@@ -61,11 +63,12 @@ class Database:
         self.address = address
         self._clock = clock or WallClock()
         self._turn = WriterTurn(self._shown)
+        self.on_growth: Callable[[ChainHead], None] | None = None  #: called when manifests were added and committed
         self._backend = self._open_backend(address, as_it_is=as_it_is)
         self._engine, self._reader = self._backend.engines()
         try:
             if not as_it_is:
-                self._migrate()
+                self._refuse_old()
             self._backend.opened(self._engine)
         except BaseException:
             self._dispose()
@@ -82,18 +85,41 @@ class Database:
             Database(self.location, write=True).close()
         return SqliteFile(self.location, address if self.writes else None)
 
-    def _migrate(self) -> None:
-        try:
-            found = self.outlast(self._revision)
-            if found == migrate.HEAD:
-                return
-            migrate.refuse_unknown(found, self._shown)
+    @property
+    def anchor_fits(self) -> bool:
+        """Whether the chain of manifests goes on from what the anchor file names; also where there is no file."""
+        return self._backend.anchor_fits
+
+    def _refuse_old(self) -> None:
+        """Make the tables of an empty database; one of an earlier version is only migrated when a person asks."""
+        found = self.revision()
+        if found is None:
             if not self.writes and not is_url(self.location):
                 Database(self.location, write=True).close()
-                return
-            with self._engine.begin() as connection:
-                self._backend.before_migration(connection)
-                migrate.upgrade(connection)
+            else:
+                self.upgrade()
+        elif found != migrate.HEAD:
+            migrate.refuse_unknown(found, self._shown)
+            raise OldSchema(
+                f"{self._shown}: the schema of the database is number {found}, this version of labctl needs number "
+                f"{migrate.HEAD}; run `labctl migrate --database {self._shown}`"
+            )
+
+    def revision(self) -> str | None:
+        """Return at which schema a database stands, None for an empty one. Raises StoreError for a damaged one."""
+        with self._as_database():
+            return self.outlast(self._revision)
+
+    def upgrade(self) -> None:
+        """Bring the database to today's tables in one transaction: all of it, or nothing. Raises StoreError."""
+        with self._as_database(), self._engine.begin() as connection:
+            self._backend.before_migration(connection)
+            migrate.upgrade(connection)
+
+    @contextmanager
+    def _as_database(self) -> Iterator[None]:
+        try:
+            yield
         except DatabaseError as error:
             trouble = self._trouble(error)
             if isinstance(trouble, DiskFull | DatabaseUnreachable) or self._backend.words_for(error):
@@ -137,13 +163,15 @@ class Database:
         """
         if self.writer is not None:
             raise StoreError(f"{self._shown}: another process is writing to the database; wait until that process ends")
-        number, ended = 0, False
+        number, ended, grown = 0, False, None
         with self._turn.take():
             try:
                 self._backend.before_begin(self._engine, synced=synced)
                 with self._engine.begin() as connection:
                     number = self._backend.begun(connection, synced=synced)
+                    chain.begin(connection)
                     yield connection
+                    grown = chain.finish(connection)
                     commits = self._backend.before_commit(connection, synced=synced)
                     ended = True
             except exc.DatabaseError as error:
@@ -154,6 +182,10 @@ class Database:
                     raise self._trouble(error) from error
                 commits = 0
             self._backend.committed(commits)
+            if grown is not None:
+                self._backend.grown(grown)
+                if self.on_growth is not None:
+                    self.on_growth(grown)
 
     def _is_kept(self, number: int) -> bool:
         """Return whether a transaction was committed whose commit was not answered. Raises DatabaseUnreachable."""

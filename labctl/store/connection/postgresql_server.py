@@ -14,6 +14,7 @@ from sqlalchemy import exc
 
 from labctl.store.connection.engines import server_engine
 from labctl.store.connection.writer_lock import ServiceAddress
+from labctl.store.manifests.chain import ChainHead
 
 #: "labctl" in ASCII: the lock that a writing transaction has.
 WRITER_KEY = int.from_bytes(b"labctl", "big")
@@ -76,6 +77,14 @@ class PostgresqlServer:
 
     def committed(self, commits: int) -> None:
         """Do nothing."""
+
+    @property
+    def anchor_fits(self) -> bool:
+        """Return True: nothing is noted outside."""
+        return True
+
+    def grown(self, head: ChainHead) -> None:
+        """Do nothing: a server has no folder beside it; `labctl check --anchor` takes a head that was noted down."""
 
     def is_unreachable(self, error: exc.DatabaseError) -> bool:
         """Return whether the connection is lost, or the server shuts down, starts, or is not there."""

@@ -16,12 +16,14 @@ from sqlalchemy import event as sa_event
 from sqlalchemy import exc
 
 from labctl.errors import StoreError
+from labctl.store.connection.anchor_file import anchor_fits, write_anchor
 from labctl.store.connection.commit_seal import count_commit, missing, seal
 from labctl.store.connection.engines import sqlite_engine
 from labctl.store.connection.file_identity import FileIdentity
 from labctl.store.connection.private_files import close_to_others, make_private
 from labctl.store.connection.start_check import first_damage
 from labctl.store.connection.writer_lock import ServiceAddress, WriterLock
+from labctl.store.manifests.chain import ChainHead
 
 
 class SqliteFile:
@@ -35,6 +37,7 @@ class SqliteFile:
         self._lock = None if address is None else WriterLock(location, address)
         self._identity: FileIdentity | None = None
         self._synced = True
+        self.anchor_fits = True  #: a chain that does not fit its anchor leaves it as it is, for the check to find
         try:
             if self._lock is not None and not Path(location).exists():
                 self._refuse_loss(None)
@@ -70,6 +73,7 @@ class SqliteFile:
         if self._lock is None:
             return
         self._make_private()
+        self.anchor_fits = anchor_fits(engine, self._location)
         self._identity = identity = FileIdentity(self._location)
         for event in ("connect", "close"):  # an interrupt inside a write opens the connection anew
             sa_event.listen(engine, event, lambda *_: identity.forget_log())
@@ -79,7 +83,7 @@ class SqliteFile:
         if self._lock is None:
             return
         make_private(Path(self._location))
-        close_to_others(*(Path(f"{self._location}{end}") for end in ("", "-wal", "-shm", ".lock", ".seal")))
+        close_to_others(*(Path(f"{self._location}{end}") for end in ("", "-wal", "-shm", ".lock", ".seal", ".anchor")))
 
     def _refuse_loss(self, connection: sa.Connection | None) -> None:
         """Raise StoreError when commits are missing: nothing is written to an archive that lost some."""
@@ -115,6 +119,11 @@ class SqliteFile:
         """Count it in the seal too."""
         if commits:
             seal(self._location, commits)
+
+    def grown(self, head: ChainHead) -> None:
+        """Note it in the anchor file, which is outside the database."""
+        if self.anchor_fits:
+            write_anchor(self._location, head)
 
     def is_unreachable(self, error: exc.DatabaseError) -> bool:  # noqa: ARG002
         """Return False: every error is about the file itself."""

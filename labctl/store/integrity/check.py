@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import sqlalchemy as sa
@@ -14,11 +14,17 @@ from sqlalchemy import exc
 
 from labctl.errors import BadCalibrationFile, StoreError
 from labctl.store import migrate, sample_codec
+from labctl.store.connection.anchor_file import anchor_path, read_anchor
 from labctl.store.connection.commit_seal import missing
 from labctl.store.connection.database import Database
-from labctl.store.connection.location import is_url
+from labctl.store.connection.location import is_url, shown
 from labctl.store.import_parts import WHOLE_TABLE
+from labctl.store.integrity.check_manifests import ManifestCheck
 from labctl.store.integrity.check_means import MeansCheck
+from labctl.store.manifests.chain import ChainHead
+from labctl.store.manifests.digests import block_digests
+from labctl.store.manifests.parts import BlockParts, Parts
+from labctl.store.manifests.signatures import PublicKey
 from labctl.store.repositories.audit import Head, first_broken
 from labctl.store.schema import tables
 
@@ -44,22 +50,40 @@ class Checked:
     blocks: int
     calibrations: int
     audit_rows: int
+    manifests: int = 0
+    not_sealed: int = 0  #: records that are still changing
+    signed: int = 0  #: manifests that the last signature covers: verified where a key was given
+    keys: tuple[str, ...] = ()  #: fingerprints of the keys that signatures name
+    head: ChainHead | None = None  #: end of the chain, to be noted down elsewhere
+    remarks: tuple[str, ...] = ()  #: what was not checked, and why
 
 
 def _no_progress(_part: str, _done: int, _total: int) -> None:
     pass
 
 
-def check(location: str, *, anchor: Head | None = None, progress: Progress | None = None) -> Checked:
-    """Check a database by path or URL. Raises StoreError when there is none."""
+def check(
+    location: str,
+    *,
+    anchor: Head | None = None,
+    chain_anchor: ChainHead | None = None,
+    keys: Sequence[PublicKey] = (),
+    progress: Progress | None = None,
+) -> Checked:
+    """Check a database by path or URL. Raises StoreError when there is none.
+
+    `anchor` is a head of the audit trail, `chain_anchor` one of the manifests, that were noted down elsewhere. With
+    `keys` every signature by them is verified, and every manifest has to be covered by one.
+    """
     run = _Check(location, anchor, progress or _no_progress)
+    run.chain_anchor, run.keys = chain_anchor, keys
     with closing(Database(location, write=False, as_it_is=True)) as database:
         try:
             with database.reading() as connection:
                 run.all_parts(connection)
         except StoreError as error:  # a damaged file need not answer any query
             run.find("file", str(error))
-    return Checked(tuple(run.findings), run.blocks, run.calibrations, run.audit_rows)
+    return run.result()
 
 
 class _Check:
@@ -71,6 +95,23 @@ class _Check:
         self._progress = progress
         self.findings: list[Finding] = []
         self.blocks = self.calibrations = self.audit_rows = 0
+        self.chain_anchor: ChainHead | None = None
+        self.keys: Sequence[PublicKey] = ()
+        self._manifests: ManifestCheck | None = None
+        self._block_parts: dict[int, BlockParts | None] = {}
+        self._remarks: list[str] = []
+
+    def result(self) -> Checked:
+        """Return what was found so far."""
+        said = Checked(tuple(self.findings), self.blocks, self.calibrations, self.audit_rows)
+        if self._manifests is None:
+            return replace(said, remarks=tuple(self._remarks))
+        found = self._manifests.chain
+        return replace(
+            said, manifests=found.head.length, not_sealed=found.not_sealed, signed=found.signed,
+            keys=tuple(sorted(found.keys)), head=found.head if found.head.length else None,
+            remarks=tuple(self._remarks),
+        )  # fmt: skip
 
     def find(self, part: str, text: str) -> None:
         """Note something down."""
@@ -87,6 +128,7 @@ class _Check:
             ("readings", self._check_readings),
             ("calibrations", self._check_calibrations),
             ("audit", self._check_audit),
+            ("manifests", self._check_manifests),
         )
         for part, check_part in parts:
             self._try(part, check_part, connection)
@@ -119,7 +161,7 @@ class _Check:
             self.find("schema", "this is not a labctl database, or its content is lost: there are no tables")
         else:
             hint = (
-                "any other labctl command migrates the database"
+                f"run `labctl migrate --database {shown(self._location)}`"
                 if found in migrate.KNOWN
                 else "use a newer version of labctl"
             )
@@ -172,6 +214,7 @@ class _Check:
             expected[place] = seq + 1
             where = f"recording {recording} data set {number}"
             columns = self._unpacked(f"{where} block {seq}", sample_codec.Block(n, codec, crc32, data))
+            self._note_block(recording, number, seq, n, columns)
             before, found = valid.get(place, 0), None if columns is None else _count(columns, n)
             valid[place] = None if found is None or before is None else before + found
             for text in means.take(recording, number, columns):
@@ -182,6 +225,16 @@ class _Check:
         for text in means.rest():
             self.find("readings", text)
         return valid
+
+    def _note_block(
+        self, recording: int, number: int, seq: int, n: int, columns: dict[str, NDArray[np.generic]] | None
+    ) -> None:
+        """Keep the digests of a block for the comparison with manifests; a damaged one has its own finding."""
+        parts = self._block_parts.setdefault(recording, BlockParts())
+        if columns is None:
+            self._block_parts[recording] = None
+        elif parts is not None:
+            parts.take(number, seq, n, block_digests(columns))
 
     def _unpacked(self, place: str, block: sample_codec.Block) -> dict[str, NDArray[np.generic]] | None:
         try:
@@ -224,6 +277,34 @@ class _Check:
         if broken := first_broken(connection, self._anchor):
             self.find("audit", f"row {broken.row}: {broken.what}")
         return True
+
+    def _check_manifests(self, connection: sa.Connection) -> bool:
+        self._manifests = ManifestCheck(connection, self.find, self.keys)
+        trail_fits = all(finding.part != "audit" for finding in self.findings)
+        self._manifests.check_chain(self._chain_anchors(), trail_fits=trail_fits)
+        blocks: Mapping[int, Parts | None] = {
+            recording: None if made is None else made.parts() for recording, made in self._block_parts.items()
+        }
+        self._manifests.check_records(blocks)
+        return True
+
+    def _chain_anchors(self) -> dict[str, ChainHead]:
+        """Return the heads that are noted down outside the database, by where that is."""
+        found = {} if self.chain_anchor is None else {"the given anchor": self.chain_anchor}
+        if is_url(self._location):
+            if not found:
+                self._remarks.append("a server has no anchor file; give --anchor LENGTH:HASH to compare one")
+            return found
+        path = anchor_path(self._location)
+        try:
+            kept = read_anchor(self._location)
+        except ValueError:
+            self._remarks.append(f"{path}: the anchor file is damaged; the end of the chain was not compared with it")
+            return found
+        if kept is None:
+            self._remarks.append(f"{path}: there is no anchor file; the end of the chain was not compared with it")
+            return found
+        return {**found, f"the anchor file {path.name}": kept}
 
 
 def _of_whole_recordings(recording: sa.ColumnElement[int]) -> sa.ColumnElement[bool]:

@@ -14,6 +14,7 @@ from labctl.acting_user import actor
 from labctl.json_types import JsonObject
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
+from labctl.store.manifests import chain
 from labctl.store.records import AuditRow
 from labctl.store.schema import tables
 from labctl.store.schema.types import EPOCH
@@ -66,6 +67,7 @@ def append(
             at=at, actor=who, action=action, subject=subject, detail=detail, previous_hash=previous, hash=own
         )
     )
+    chain.note_audit_row(connection, at)
     if found is not None:  # a head that was removed is never made again: verification reports that it is missing
         connection.execute(sa.update(h).where(h.c.id == HEAD_ID).values(length=found.length + 1, hash=own))
 

@@ -15,11 +15,13 @@ from labctl.json_types.calibrations import JudgementDetail
 from labctl.json_types.models import KeptAnswer
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
+from labctl.store.manifests.contents import CALIBRATION, CERTIFICATION
 from labctl.store.records import CalibrationRecord, CertificationRow, Judgement
 from labctl.store.repositories.audit import append
 from labctl.store.repositories.drafts.marks import mark_fitted
 from labctl.store.repositories.units import SEEN
 from labctl.store.schema import tables
+from labctl.store.sealing.seals import seal
 
 
 def _document_query() -> sa.Select[bytes, str]:
@@ -146,6 +148,7 @@ class Calibrations:
                     detail["recordings"] = list(new.fitted_to)
                 act = "fit" if new.parent is None else "improve"
                 append(connection, at, act, f"{serial} version {version}", detail)
+                seal(connection, (CALIBRATION.name, str(number)), at, act)
         except exc.IntegrityError as error:  # where several processes write: after the look, before the end
             if self.next_version(serial) == version:
                 raise
@@ -232,16 +235,17 @@ class Calibrations:
             )
         row = CertificationRow(serial, version, act, by, reason, at, due_at, judgement)
         with self._database.writing() as connection:
-            connection.execute(
+            number = connection.scalar(
                 sa.insert(tables.certifications).values(
                     serial=serial, version=version, act=act, by=by, reason=reason, at=at, due_at=due_at,
                     **_judgement_columns(judgement),
-                )
+                ).returning(tables.certifications.c.id)
             )  # fmt: skip
             detail = {"by": by, "reason": reason, "due": due_at.isoformat() if due_at else None}
             if judgement is not None:
                 detail |= _audited(judgement)
             append(connection, at, act, f"{serial} version {version}", detail, who=who or by)
+            seal(connection, (CERTIFICATION.name, str(number)), at, act)
         return row
 
     def document(self, serial: str, version: int | None) -> tuple[bytes, str]:

@@ -22,8 +22,16 @@ from labctl.store.connection.transactions import outlasting
 from labctl.store.dataset_statistics import means_rows
 from labctl.store.repositories import benches
 from labctl.store.repositories.audit import append
-from labctl.store.repositories.sample_blocks import DataSetHead, angle_values, blocks_of, scaled, write_block
+from labctl.store.repositories.sample_blocks import (
+    DataSetHead,
+    angle_values,
+    blocks_of,
+    scaled,
+    write_block,
+    write_final_block,
+)
 from labctl.store.schema import tables
+from labctl.store.sealing.seals import changing, of_campaign, prepared_recordings, sealed_at
 from procedures.contracts.campaign_state import ENDED, CampaignState
 from procedures.contracts.journal import NOT_SAFE, DataSetHeader, DataSetState, EnvironmentSample, Event, TableAngles
 from procedures.contracts.steps import StepResult
@@ -43,6 +51,7 @@ class StoreJournal:
         self._campaign = campaign
         r = tables.recordings.c
         with database.reading() as connection:
+            self._sealed_at = sealed_at(connection, campaign)
             rows = connection.execute(sa.select(r.gyro, r.id, r.channels).where(r.campaign_id == campaign)).all()
             self._power_on_s: float | None = connection.scalar(
                 sa.select(tables.campaigns.c.powered_on_s).where(tables.campaigns.c.id == campaign)
@@ -54,8 +63,14 @@ class StoreJournal:
 
     @contextmanager
     def _writing(self, *, synced: bool = True) -> Iterator[sa.Connection]:
+        """Write in one transaction; what is written after the campaign was sealed makes new manifests."""
         with defer_signals(), self._database.writing(synced=synced) as connection:
-            yield connection
+            if self._sealed_at is None:
+                yield connection
+            else:
+                records = of_campaign(connection, self._campaign)
+                with changing(connection, records, self._sealed_at, "written after the end"):
+                    yield connection
 
     @outlasting
     def campaign_state(self, state: CampaignState, reason: str, t_s: float, at: datetime) -> None:
@@ -69,13 +84,31 @@ class StoreJournal:
             values["ended_at"] = at
         level = "error" if state is CampaignState.FAILED else "info"
         message = f"campaign {state.value}" + (f": {reason}" if reason else "")
-        with self._writing() as connection:
+        with self._changing_state(state, at) as connection:
             connection.execute(
                 sa.update(tables.campaigns).where(tables.campaigns.c.id == self._campaign).values(**values)
             )
             self._add_event(connection, Event("state", message, level), t_s, at)
             change = {"state": state, "reason": reason}
             append(connection, at, "campaign state", f"campaign {self._campaign}", change)
+        self._sealed_at = at if state in ENDED else None
+
+    @contextmanager
+    def _changing_state(self, state: CampaignState, at: datetime) -> Iterator[sa.Connection]:
+        """Write in one transaction, which seals the campaign and its recordings where it ends with it."""
+        if state not in ENDED and self._sealed_at is None:
+            with self._writing() as connection:
+                yield connection
+            return
+        with self._database.reading() as connection:
+            records = of_campaign(connection, self._campaign)
+        prepared = prepared_recordings(self._database, records)
+        with (
+            defer_signals(),
+            self._database.writing() as connection,
+            changing(connection, records, at, state.value, prepared),
+        ):
+            yield connection
 
     def step_started(self, index: int, t_s: float, at: datetime) -> None:
         """Record that a step begins."""
@@ -216,7 +249,7 @@ class StoreJournal:
         reason: str,
         raw: dict[str, NDArray[np.generic]] | None,
     ) -> None:
-        d, b = tables.data_sets, tables.sample_blocks
+        d = tables.data_sets
         this = (d.c.recording_id == recording, d.c.number == dataset)
         n = 0
         turned: dict[str, float] = {}
@@ -229,8 +262,7 @@ class StoreJournal:
                 turned = {name: float(columns[key][-1].item()) for name, key in KNOWN_LATE.items()}
             means = means_rows(recording, dataset, columns, valid)
             connection.execute(sa.insert(tables.data_set_means), means)
-            connection.execute(sa.delete(b).where(b.c.recording_id == recording, b.c.number == dataset))
-            write_block(connection, recording, dataset, 0, sample_codec.pack(raw, sample_codec.FINAL))
+            write_final_block(connection, recording, dataset, raw)
         connection.execute(sa.update(d).where(*this).values(state=state.value, reason=reason, n=n, **turned))
 
     @outlasting

@@ -22,6 +22,7 @@ from labctl.store.repositories.campaign_summaries import CampaignSummaries, Camp
 from labctl.store.repositories.drafts.marks import make_due
 from labctl.store.repositories.recording_writer import new_recording
 from labctl.store.schema import tables
+from labctl.store.sealing.seals import changing, of_campaign, prepared_recordings
 from procedures.contracts.campaign_state import UNFINISHED, CampaignState
 
 #: Kind of the event that says who confirmed that the bench is clear.
@@ -209,7 +210,13 @@ class Campaigns:
         state: Literal[CampaignState.FAILED, CampaignState.ABORTED] = CampaignState.FAILED,
     ) -> None:
         """Mark a campaign that no process runs any more as over, with the reason."""
-        with self._database.writing() as connection:
+        with self._database.reading() as connection:
+            records = of_campaign(connection, campaign)
+        prepared = prepared_recordings(self._database, records)
+        with (
+            self._database.writing() as connection,
+            changing(connection, records, at, CampaignState(state).value, prepared),
+        ):
             connection.execute(
                 sa.update(tables.campaigns)
                 .where(tables.campaigns.c.id == campaign)

@@ -9,9 +9,11 @@ import sqlalchemy as sa
 from labctl.errors import Conflict, NotFound
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
+from labctl.store.manifests.contents import KEY
 from labctl.store.records import KeyRow
 from labctl.store.repositories.audit import append
 from labctl.store.schema import tables
+from labctl.store.sealing.seals import changing, seal
 
 _k = tables.api_keys.c
 _ALL = sa.select(_k.name, _k.role, _k.digest, _k.created_at, _k.revoked_at)
@@ -37,6 +39,7 @@ class Keys:
                 sa.insert(tables.api_keys).values(name=name, role=role, digest=digest, created_at=at, revoked_at=None)
             )
             append(connection, at, "key create", f"key {name}", {"role": role})
+            seal(connection, (KEY.name, name), at, "made")
         return KeyRow(name, role, digest, at, None)
 
     @transaction
@@ -50,8 +53,9 @@ class Keys:
                 raise Conflict(
                     f"key {name!r} was already revoked at {row.revoked_at.isoformat()}; no further action is needed"
                 )
-            connection.execute(sa.update(tables.api_keys).where(_k.name == name).values(revoked_at=at))
-            append(connection, at, "key revoke", f"key {name}", {"role": row.role, "reason": reason})
+            with changing(connection, [(KEY.name, name)], at, "revoked"):
+                connection.execute(sa.update(tables.api_keys).where(_k.name == name).values(revoked_at=at))
+                append(connection, at, "key revoke", f"key {name}", {"role": row.role, "reason": reason})
         return KeyRow(row.name, row.role, row.digest, row.created_at, at)
 
     def all(self) -> list[KeyRow]:

@@ -22,12 +22,18 @@ from labctl.recording import RecordingInfo
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.import_parts import MOST_BYTES, MOST_ROWS, TABLES, ImportPart
+from labctl.store.manifests.contents import RECORDING
 from labctl.store.repositories.audit import append
 from labctl.store.repositories.units import add_missing_unit, remember_unit
 from labctl.store.schema import tables
+from labctl.store.sealing.seals import prepared_recordings, seal
 
 #: Where several processes write (PostgreSQL): an import that gave no sign for so long belongs to no process any more.
 ABANDONED_AFTER = timedelta(minutes=15)
+
+
+#: What a recording has beside its blocks: tables, and the column by which their rows are removed some at a time.
+_REST = (("block_digests", "number"), ("data_set_means", "number"), ("data_sets", "number"), ("environment", "id"))
 
 
 @dataclass(frozen=True)
@@ -87,7 +93,8 @@ class Imports:
     @transaction
     def finish(self, ticket: ImportTicket, at: datetime, action: str, detail: JsonObject) -> int:
         """Take the mark away and write the audit row; returns the recording's number. Raises Conflict as `add_part`."""
-        r = tables.recordings
+        r, record = tables.recordings, (RECORDING.name, str(ticket.recording))
+        parts = prepared_recordings(self._database, [record])[record]
         with self._database.writing() as connection:
             _give_sign(connection, ticket)
             values = {"importing": None, "import_sign_at": None}
@@ -96,6 +103,7 @@ class Imports:
             )
             remember_unit(connection, info.serial, info.model, info.technology, at)
             append(connection, at, action, f"recording {ticket.recording}", detail)
+            seal(connection, record, at, action, parts)
         return ticket.recording
 
     @transaction
@@ -141,7 +149,7 @@ class Imports:
             _give_sign(connection, ticket)
             if _delete_blocks(connection, number):
                 return True
-            for name, key in (("data_set_means", "number"), ("data_sets", "number"), ("environment", "id")):
+            for name, key in _REST:
                 if _delete_rows(connection, tables.metadata.tables[name], key, number):
                     return True
             r = tables.recordings

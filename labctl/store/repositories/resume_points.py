@@ -15,6 +15,7 @@ from labctl.store.repositories.audit import append
 from labctl.store.repositories.campaign_journal import StoreJournal
 from labctl.store.repositories.sample_blocks import blocks_of
 from labctl.store.schema import tables
+from labctl.store.sealing.seals import changing, of_campaign, prepared_recordings
 from procedures.contracts.campaign_state import CampaignState
 from procedures.contracts.journal import DataSetState
 from procedures.contracts.steps import StepResult
@@ -138,7 +139,13 @@ class ResumePoints:
         values["added_runs"] = how.added_runs
         if how.new_session:
             values["powered_on_s"] = how.t_s
-        with self._database.writing() as connection:
+        with self._database.reading() as connection:
+            records = of_campaign(connection, campaign)
+        prepared = prepared_recordings(self._database, records)
+        with (
+            self._database.writing() as connection,
+            changing(connection, records, how.at, f"resumed: {how.reason}", prepared),
+        ):
             taken = connection.execute(
                 sa.update(c).where(c.c.id == campaign, c.c.state != CampaignState.DONE).values(**values)
             )

@@ -12,6 +12,7 @@ from typing_extensions import TypedDict
 from labctl.json_types.recordings import RawChannelJson
 from labctl.store import sample_codec
 from labctl.store.import_parts import block_row
+from labctl.store.manifests.digests import block_digests
 from labctl.store.schema import tables
 from procedures.contracts.journal import TableAngles
 
@@ -30,6 +31,18 @@ _ADD_BLOCK = sa.insert(tables.sample_blocks)
 def write_block(connection: sa.Connection, recording: int, number: int, seq: int, block: sample_codec.Block) -> None:
     """Write one block of the readings of a data set; `seq` counts the blocks of a data set from 0."""
     connection.execute(_ADD_BLOCK, block_row(recording, number, seq, block))
+
+
+def write_final_block(
+    connection: sa.Connection, recording: int, number: int, columns: dict[str, NDArray[np.generic]]
+) -> None:
+    """Put one block in the place of all blocks of a data set, packed for good, with the digests of its columns."""
+    b, d = tables.sample_blocks, tables.block_digests
+    for table in (b, d):
+        connection.execute(sa.delete(table).where(table.c.recording_id == recording, table.c.number == number))
+    write_block(connection, recording, number, 0, sample_codec.pack(columns, sample_codec.FINAL))
+    row = {"recording_id": recording, "number": number, "seq": 0, **block_digests(columns)}
+    connection.execute(sa.insert(d).values(**row))
 
 
 class EncoderAngles(TypedDict):

@@ -9,6 +9,7 @@ from labctl.store.schema.calibrations import calibration_recordings, calibration
 from labctl.store.schema.campaigns import campaigns, events, steps
 from labctl.store.schema.certificates import certificates
 from labctl.store.schema.drafts import drafts
+from labctl.store.schema.manifests import block_digests, manifest_head, manifests
 from labctl.store.schema.recordings import data_set_means, data_sets, environment, recordings, sample_blocks
 from labctl.store.schema.schedule import scheduled_starts, start_events
 from labctl.store.schema.types import Instant, metadata
@@ -20,6 +21,7 @@ __all__ = [
     "audit",
     "audit_head",
     "benches",
+    "block_digests",
     "calibration_recordings",
     "calibrations",
     "campaigns",
@@ -31,6 +33,8 @@ __all__ = [
     "environment",
     "events",
     "leases",
+    "manifest_head",
+    "manifests",
     "metadata",
     "recordings",
     "sample_blocks",

@@ -43,3 +43,16 @@ def test_the_item_is_where_the_page_says(item: str) -> None:
             assert part in found, key
             found = found[part]
         assert found not in ("", [], {}) or item in WITHOUT
+
+
+def test_the_manifests_of_the_recordings_and_of_the_certification_are_on_every_form() -> None:
+    forms = issued()[1]
+    named = Certificate.model_validate_json(forms.document).manifests
+    assert [each.record for each in named] == ["recording 1", "certification of FOG-0001 version 1"]
+    identified = {each.text for each in ET.fromstring(forms.xml).iter(f"{DCC}value")}
+    printed = readable_certificate(Certificate.model_validate_json(forms.document)).decode()
+    for each in named:
+        assert len(each.hash) == 64
+        assert each.hash in identified
+        assert each.hash in printed
+    assert "given.manifests" in TEMPLATE.read_text(encoding="utf-8")

@@ -29,7 +29,7 @@ from labctl.services.campaigns.status import campaign_status
 from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
 from labctl.services.schemas.campaigns import CampaignRequest, CampaignResponse, ConfirmRequest, ReasonRequest
-from labctl.store import Store, migrate, open_store
+from labctl.store import Store, migrate, migrate_database, open_store
 from labctl.store.connection.database import Database
 from tests.helpers.certifying import OVERRIDE, OVERRIDE_OPTIONS, REASON
 from tests.helpers.paths import EXAMPLES
@@ -140,6 +140,7 @@ def test_rows_of_before_the_head_get_one(location: str) -> None:
     columns = "at, actor, action, subject, detail, previous_hash, hash"
     first = "36d0cc4b23df7b1a40e0cb3c9b5a6c5c9d4b4a9f5a9f6f4f7a8d9b0c1d2e3f40"
     tamper(location, f"INSERT INTO audit ({columns}) VALUES (1, 'A', 'fit', 'G 1', '{{}}', '{'0' * 64}', '{first}')")
+    migrate_database(location, copy=False)
     with open_store(location, write=True) as store:
         head = store.audit.head()
         assert head is not None

@@ -20,7 +20,16 @@ from sqlalchemy.dialects import postgresql
 
 from labctl.errors import BadInput, Conflict, NotCertified, NotFound, StoreError
 from labctl.recording import Recording, RecordingInfo, to_points
-from labctl.store import Judgement, NewCalibration, ServiceAddress, Store, holder_of, migrate, open_store
+from labctl.store import (
+    Judgement,
+    NewCalibration,
+    ServiceAddress,
+    Store,
+    holder_of,
+    migrate,
+    migrate_database,
+    open_store,
+)
 from labctl.store.connection.database import Database
 from labctl.store.schema import tables
 from tests.helpers import migrated_databases
@@ -227,6 +236,7 @@ def test_acts_of_before_verdicts_were_kept_have_none(store: Store, location: str
         assert columns == {"id", "serial", "version", "act", "by", "reason", "at", "due_at"}
     store.close()
     known = Judgement("missing", 1, AT, True, {"verdict_text": "So it is.", "objections": [{"text": "it lacks"}]})
+    migrate_database(location, copy=False)
     with open_store(location, write=True) as migrated:
         assert [row.judgement for row in migrated.calibrations.history("G-1")] == [None]
         assert migrated.calibrations.certified_version("G-1") == 1
@@ -267,6 +277,7 @@ def test_all_recordings_of_a_version_are_kept_and_the_step_can_be_taken_back(sto
         command.downgrade(migrate.configuration(connection), "0010")
         assert not sa.inspect(connection).has_table("calibration_recordings")
     store.close()
+    migrate_database(location, copy=False)
     with open_store(location, write=True) as migrated:
         assert migrated.calibrations.get("G-1", 1).recordings == (second,)
         assert migrated.calibrations.get("G-1", 1).recording == second

@@ -19,7 +19,7 @@ from alembic import command
 
 from labctl.errors import BadRecording, Conflict, NotFound
 from labctl.recording import Recording, data_set_limits, to_points
-from labctl.store import Imports, Store, check, import_parts, migrate, open_store
+from labctl.store import Imports, Store, check, import_parts, migrate, migrate_database, open_store
 from labctl.store.connection.database import Database
 from tests.helpers.one_row_sets import AT, one_row_sets
 
@@ -296,5 +296,6 @@ def test_recordings_of_before_the_mark_are_whole(location: str) -> None:
             command.downgrade(migrate.configuration(connection), "0006")
             names = {column["name"] for column in sa.inspect(connection).get_columns("recordings")}
             assert names.isdisjoint({"importing", "import_sign_at"})
+    migrate_database(location, copy=False)
     with open_store(location, write=True) as migrated:
         assert [row.datasets for row in migrated.recordings.all()] == [3]

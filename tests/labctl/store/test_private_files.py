@@ -36,7 +36,7 @@ def test_a_database_and_all_beside_it(tmp_path: Path) -> None:
         assert reader.audit.rows()
         copy_database(str(location), tmp_path / "copy.sqlite")
         found = {path.name: mode(path) for path in tmp_path.iterdir()}
-    names = {f"lab.sqlite{end}" for end in ("", "-wal", "-shm", ".lock", ".holder", ".seal")}
+    names = {f"lab.sqlite{end}" for end in ("", "-wal", "-shm", ".lock", ".holder", ".seal", ".anchor")}
     assert found == dict.fromkeys({*names, "copy.sqlite"}, 0o600)
 
 

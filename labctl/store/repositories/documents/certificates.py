@@ -13,8 +13,10 @@ from labctl.errors import Conflict
 from labctl.json_types import JsonDocument
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
+from labctl.store.manifests.contents import CERTIFICATE
 from labctl.store.repositories.audit import append
 from labctl.store.schema import tables
+from labctl.store.sealing.seals import seal
 
 
 @dataclass(frozen=True)
@@ -70,8 +72,10 @@ class Certificates:
         }  # fmt: skip
         try:
             with self._database.writing() as connection:
-                connection.execute(sa.insert(tables.certificates).values(**values))
+                c = tables.certificates.c
+                number = connection.scalar(sa.insert(tables.certificates).values(**values).returning(c.id))
                 append(connection, row.at, "certificate", f"{row.serial} version {row.version}", detail, who=row.by)
+                seal(connection, (CERTIFICATE.name, str(number)), row.at, "issued")
         except exc.IntegrityError as error:
             raise Conflict(
                 f"certificate {row.number} of {row.serial} was issued by another request in the meantime; send this "

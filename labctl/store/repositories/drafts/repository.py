@@ -10,9 +10,11 @@ import sqlalchemy as sa
 from labctl.json_types import JsonObject
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
+from labctl.store.manifests.contents import CAMPAIGN
 from labctl.store.repositories.audit import append
 from labctl.store.repositories.drafts.records import OPEN, DraftEvent, DraftRow, DraftState
 from labctl.store.schema import tables
+from labctl.store.sealing.seals import changing
 from procedures.contracts.campaign_state import CampaignState
 
 
@@ -97,12 +99,13 @@ class Drafts:
             row = connection.execute(sa.select(d).where(d.c.recording_id == recording)).one()
             e, t = tables.events.c, sa.select(sa.func.coalesce(sa.func.max(tables.events.c.t_s), 0.0))
             last_s = float(connection.scalar(t.where(e.campaign_id == row.campaign_id)) or 0.0)
-            connection.execute(
-                sa.insert(tables.events).values(
-                    campaign_id=row.campaign_id, at=at, t_s=last_s, kind="draft", level=event.level,
-                    message=event.message, device=row.serial[:100],
-                )
-            )  # fmt: skip
+            with changing(connection, [(CAMPAIGN.name, str(row.campaign_id))], at, "draft"):
+                connection.execute(
+                    sa.insert(tables.events).values(
+                        campaign_id=row.campaign_id, at=at, t_s=last_s, kind="draft", level=event.level,
+                        message=event.message, device=row.serial[:100],
+                    )
+                )  # fmt: skip
             detail = {"unit": row.serial, "version": row.version, "state": row.state, "said": event.message}
             append(connection, at, "draft", f"campaign {row.campaign_id}", detail)
         return True

@@ -1,0 +1,220 @@
+"""Private keys that sign manifests: in a file of their owner's, or in a PKCS#11 token (RFC 7512 names it)."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import stat
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Protocol
+from urllib.parse import unquote
+
+from labctl.errors import BadInput
+from labctl.store.connection.private_files import FILE
+from labctl.store.manifests.signatures import NEEDS, PublicKey, public_key, signed_text
+
+if TYPE_CHECKING:
+    from cryptography.hazmat.primitives.asymmetric.ec import EllipticCurvePrivateKey
+    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
+
+SCHEME = "pkcs11:"
+P256_BYTES = 32
+
+
+class Signer(Protocol):
+    """Something that signs with one key."""
+
+    @property
+    def pem(self) -> bytes:
+        """The public key."""
+        ...
+
+    @property
+    def public(self) -> PublicKey:
+        """The public key as it is checked with."""
+        ...
+
+    def sign(self, digest: str) -> bytes:
+        """Return the signature over the hash of a manifest. Raises BadInput; may take as long as a token does."""
+        ...
+
+
+def signer_of(setting: str) -> Signer:
+    """Open the key that a setting names: a PEM file, or a PKCS#11 URI. Raises BadInput."""
+    try:
+        return _token_signer(setting) if setting.startswith(SCHEME) else _file_signer(Path(setting))
+    except ModuleNotFoundError as error:
+        raise BadInput(f"the seal key needs {error.name}, which is not installed; run {NEEDS}") from error
+
+
+def refuse_open_key(path: Path) -> None:
+    """Raise BadInput for a key file that is missing, or that others than its owner can read or write."""
+    try:
+        mode = path.stat().st_mode
+    except OSError as error:
+        raise BadInput(f"seal key {path}: {error.strerror}; `labctl seal-key create FILE` makes a key") from error
+    if mode & (stat.S_IRWXG | stat.S_IRWXO):
+        raise BadInput(
+            f"seal key {path}: its mode is {stat.S_IMODE(mode):04o}, so others than its owner have access to it; "
+            f"run `chmod 600 {path}`"
+        )
+
+
+@dataclass(frozen=True)
+class FileSigner:
+    """A key of the cryptography library."""
+
+    pem: bytes
+    public: PublicKey
+    _key: Ed25519PrivateKey | EllipticCurvePrivateKey
+
+    def sign(self, digest: str) -> bytes:
+        """Return the signature; of an ECDSA key r and s, 32 bytes each."""
+        from cryptography.hazmat.primitives.asymmetric.ec import ECDSA, EllipticCurvePrivateKey  # noqa: PLC0415
+        from cryptography.hazmat.primitives.asymmetric.utils import decode_dss_signature  # noqa: PLC0415
+        from cryptography.hazmat.primitives.hashes import SHA256  # noqa: PLC0415
+
+        if not isinstance(self._key, EllipticCurvePrivateKey):
+            return self._key.sign(signed_text(digest))
+        r, s = decode_dss_signature(self._key.sign(signed_text(digest), ECDSA(SHA256())))
+        return r.to_bytes(P256_BYTES, "big") + s.to_bytes(P256_BYTES, "big")
+
+
+def _file_signer(path: Path) -> FileSigner:
+    from cryptography.hazmat.primitives.asymmetric.ec import EllipticCurvePrivateKey  # noqa: PLC0415
+    from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey  # noqa: PLC0415
+    from cryptography.hazmat.primitives.serialization import load_pem_private_key  # noqa: PLC0415
+
+    refuse_open_key(path)
+    try:
+        key = load_pem_private_key(path.read_bytes(), None)
+    except (ValueError, TypeError) as error:
+        raise BadInput(
+            f"seal key {path}: this is no private key in PEM form without a password; use `labctl seal-key create FILE`"
+        ) from error
+    if not isinstance(key, Ed25519PrivateKey | EllipticCurvePrivateKey):
+        raise BadInput(f"seal key {path}: this kind of key is not used; `labctl seal-key create FILE` makes a key")
+    pem = _public_pem(key)
+    return FileSigner(pem, public_key(pem, str(path)), key)
+
+
+def _public_pem(key: Ed25519PrivateKey | EllipticCurvePrivateKey) -> bytes:
+    from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat  # noqa: PLC0415
+
+    return key.public_key().public_bytes(Encoding.PEM, PublicFormat.SubjectPublicKeyInfo)
+
+
+def create_key(path: Path) -> FileSigner:
+    """Make an Ed25519 key in a new private file, with its public key beside it (.pub). Raises BadInput, OSError."""
+    try:
+        from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey  # noqa: PLC0415
+        from cryptography.hazmat.primitives.serialization import (  # noqa: PLC0415
+            Encoding,
+            NoEncryption,
+            PrivateFormat,
+        )
+    except ModuleNotFoundError as error:
+        raise BadInput(f"a seal key needs {error.name}, which is not installed; run {NEEDS}") from error
+    beside = Path(f"{path}.pub")
+    for each in (path, beside):
+        if each.exists() or each.is_symlink():
+            raise BadInput(f"{each}: the file exists already, and a key is never overwritten; name a new file")
+    key = Ed25519PrivateKey.generate()
+    handle = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, FILE)
+    with os.fdopen(handle, "wb") as file:
+        os.fchmod(file.fileno(), FILE)
+        file.write(key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption()))
+    beside.write_bytes(_public_pem(key))
+    return _file_signer(path)
+
+
+@dataclass(frozen=True)
+class TokenUri:
+    """A key of a PKCS#11 token, as RFC 7512 names it."""
+
+    token: str
+    object: str
+    module: str
+    pin: str
+
+
+def token_uri(text: str) -> TokenUri:
+    """Read `pkcs11:token=T;object=O?module-path=FILE&pin-source=FILE`. Raises BadInput; no message shows a PIN."""
+    path, _, query = text.removeprefix(SCHEME).partition("?")
+    try:
+        given = dict(_attribute(part) for part in [*path.split(";"), *query.split("&")] if part)
+    except ValueError as error:
+        raise BadInput("LABCTL_SEAL_KEY: an attribute of the PKCS#11 URI has no '='; write token=NAME") from error
+    if missing := [name for name in ("token", "object", "module-path") if not given.get(name)]:
+        raise BadInput(
+            f"LABCTL_SEAL_KEY: the PKCS#11 URI has no {', '.join(missing)}; write "
+            "pkcs11:token=NAME;object=NAME?module-path=FILE&pin-source=FILE"
+        )
+    return TokenUri(given["token"], given["object"], given["module-path"], _pin(given))
+
+
+def _attribute(part: str) -> tuple[str, str]:
+    name, value = part.split("=", 1)
+    return name, unquote(value)
+
+
+def _pin(given: dict[str, str]) -> str:
+    if "pin-value" in given:
+        return given["pin-value"]
+    if "pin-source" not in given:
+        return ""
+    path = Path(given["pin-source"].removeprefix("file:"))
+    refuse_open_key(path)
+    return path.read_text(encoding="utf-8").strip()
+
+
+class TokenSigner:
+    """An ECDSA key on P-256 in a PKCS#11 token; it never leaves it."""
+
+    def __init__(self, uri: TokenUri) -> None:
+        """Log in and find the key. Raises BadInput."""
+        import pkcs11  # noqa: PLC0415  only where a token is used
+        from pkcs11.exceptions import PKCS11Error, UserAlreadyLoggedIn  # noqa: PLC0415  as above
+        from pkcs11.util.ec import encode_ec_public_key  # noqa: PLC0415  as above
+
+        where = f"seal key pkcs11:token={uri.token};object={uri.object}"
+        try:
+            token = pkcs11.lib(uri.module).get_token(token_label=uri.token)
+            try:
+                self._session = token.open(user_pin=uri.pin or None)
+            except UserAlreadyLoggedIn:  # a process logs in once
+                self._session = token.open()
+            self._key: Any = self._session.get_key(object_class=pkcs11.ObjectClass.PRIVATE_KEY, label=uri.object)
+            public: Any = self._session.get_key(object_class=pkcs11.ObjectClass.PUBLIC_KEY, label=uri.object)
+            der = encode_ec_public_key(public)
+        except (PKCS11Error, RuntimeError, KeyError, OSError) as error:
+            said = " ".join(str(error).split()) or type(error).__name__
+            raise BadInput(f"{where}: {said}; check token, object, module and PIN") from error
+        self._where, self._mechanism, self._trouble = where, pkcs11.Mechanism.ECDSA, PKCS11Error
+        self.pem = _pem_of(der)
+        self.public = public_key(self.pem, where)
+
+    def sign(self, digest: str) -> bytes:
+        """Return r and s, 32 bytes each, as the token gives them."""
+        try:
+            made: bytes = self._key.sign(hashlib.sha256(signed_text(digest)).digest(), mechanism=self._mechanism)
+        except self._trouble as error:
+            raise BadInput(
+                f"{self._where}: {error or type(error).__name__}; nothing was signed; check the token"
+            ) from error
+        return made
+
+
+def _pem_of(der: bytes) -> bytes:
+    from cryptography.hazmat.primitives.serialization import (  # noqa: PLC0415
+        Encoding,
+        PublicFormat,
+        load_der_public_key,
+    )
+
+    return load_der_public_key(der).public_bytes(Encoding.PEM, PublicFormat.SubjectPublicKeyInfo)
+
+
+def _token_signer(setting: str) -> TokenSigner:
+    return TokenSigner(token_uri(setting))
