@@ -174,7 +174,7 @@ class Supervisor:
     def _respond(self, stop: StopRequest) -> Stopping:
         """Begin a stop that came over HTTP while no web process answered."""
         if self._place is None:
-            return NotHere("this service drives no bench")
+            return NotHere("this service drives no bench", stands=True)
         return AttemptedStop(StopAttempt(self._place, stop))
 
     def _secure_orphan(self) -> None:

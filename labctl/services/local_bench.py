@@ -85,7 +85,7 @@ class LocalBench:
     def request_stop(self, stop: StopRequest) -> Stopping:
         """Begin a stop; returns how it goes on. Waits for no lock, no disk and no database."""
         if self.runner is None:
-            return NotHere("this service drives no bench")
+            return NotHere("this service drives no bench", stands=True)
         return self.runner.stops.request(stop)
 
     @property

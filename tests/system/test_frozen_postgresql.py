@@ -1,4 +1,4 @@
-"""A stop while the PostgreSQL server is frozen and API keys are required: the table stops all the same.
+"""A stop while the PostgreSQL server is frozen and API keys are required: the table stops nevertheless.
 
 What counts is what the table hears. The server keeps its connections open and answers nothing: whatever waits for it
 waits until it goes on.
@@ -82,7 +82,7 @@ def turning(service: ServiceProcess, simulator: Simulator) -> int:
 
 
 def stopped(simulator: Simulator) -> int:
-    """Wait until the table was told to stop, and stands; returns how many lines the instruments have heard then."""
+    """Wait until the table was commanded to stop, and stands; returns how many lines the instruments have heard then."""
     wait_until(simulator, lambda lines: any(ABORT in line["heard"] for line in lines))
     wait_until(simulator, lambda lines: not lines[-1]["table_turns"])
     return len(simulator.heard)

@@ -50,7 +50,7 @@ class StopExecution:
         """Begin a stop; returns how it goes on. Waits for no lock, no disk and no database."""
         job = self._job()
         if job is not None and stop.campaign not in {None, job.row.id}:
-            return NotHere(f"campaign {job.row.id} runs on this bench, not campaign {stop.campaign}")
+            return NotHere(_another(job, stop), stands=False)
         if job is None:
             if stop.campaign is None:
                 self._latch.remember(stop)
@@ -70,7 +70,7 @@ class StopExecution:
                 job.control.abort(stop.reason)
                 return CampaignStop.of(job)
             if job is not None:
-                return ""
+                return _another(job, stop)
             left = self._secure()
             self.carry_out()
             return left
@@ -138,3 +138,8 @@ class StopExecution:
                 self.carry_out()
         except (StoreError, OSError) as error:
             log.error("stop.not_carried_out", error=str(error))
+
+
+def _another(job: CampaignJob, stop: StopRequest) -> str:
+    """Return why a stop of one campaign does not end another."""
+    return f"campaign {job.row.id} runs on this bench, not campaign {stop.campaign}, and goes on"

@@ -110,10 +110,10 @@ class NotHere:
     """A stop of a campaign that does not run here, or of a service that drives no bench."""
 
     campaign: int | None = None
-    stands = True
 
-    def __init__(self, text: str) -> None:
-        self.text = text
+    def __init__(self, text: str, *, stands: bool) -> None:
+        """Say why; `stands`: whether nothing moves that this service could stop."""
+        self.text, self.stands = text, stands
 
     def is_heard(self, within_s: float) -> bool:  # noqa: ARG002  there is nothing to wait for
         """Return True."""

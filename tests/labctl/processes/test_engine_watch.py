@@ -79,7 +79,7 @@ def test_a_stuck_engine_sends_one_beat_to_its_supervisor_and_no_more(
     settings = BenchSettings(str(tmp_path / "lab.sqlite"), None, False, 1.0, tmp_path, "http://127.0.0.1:1")
     waker = Waker()
     here, there = Pipe()
-    address = HeldAddress(lambda _: NotHere("no bench"), lambda: "")
+    address = HeldAddress(lambda _: NotHere("no bench", stands=True), lambda: "")
     guarded = Supervision(settings, store, waker, lambda: stuck[0], address, lambda: False)
     guarded.take_charge(settings, there)
     assert here.recv() == "beat"  # the answer that it is in charge
