@@ -36,7 +36,8 @@ if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page
 
 ROUNDS = int(os.environ.get("LABCTL_STUDY_PAGE_STOPS", "50"))
-FIRST = int(os.environ.get("LABCTL_STUDY_FIRST", "0"))
+#: The numbers of the rounds to run, where not all of them.
+ONLY = {int(each) for each in os.environ.get("LABCTL_STUDY_ONLY", "").split()}
 PICTURES = Path(os.environ["LABCTL_STUDY_PICTURES"]) if "LABCTL_STUDY_PICTURES" in os.environ else None
 NOTICED_S = 2.0
 #: The message goes, and the page says that the table stands, within this, s.
@@ -200,8 +201,9 @@ def one(browser: Browser, drawn: Drawn) -> Round:
             else:
                 time.sleep(WATCHED_S)
             found.turned_again = stopped_s is not None and watch.turned_again(stopped_s)
-            page.context.close()
         finally:
+            for context in browser.contexts:
+                context.close()
             found.left_behind = _ended(service)
     return found
 
@@ -303,7 +305,9 @@ def run() -> dict[str, float]:
     """Run all rounds, a line for each."""
     rounds = []
     with chromium() as browser:
-        for drawn in drawn_rounds(FIRST + ROUNDS)[FIRST:]:
+        for drawn in drawn_rounds(ROUNDS):
+            if ONLY and drawn.seed not in ONLY:
+                continue
             try:
                 rounds.append(one(browser, drawn))
             except TimeoutError as error:
