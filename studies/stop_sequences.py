@@ -26,6 +26,7 @@ from typing import Any
 import httpx
 import numpy as np
 
+from instruments.errors import InstrumentError
 from labctl.errors import LabctlError
 from labctl.processes.calls import Caller
 from labctl.processes.settings import CALLS, ServeRequest
@@ -44,6 +45,8 @@ ASKED_S, STOPPED_S = 3.0, 15.0
 #: How long the table is watched at the end of a sequence, once every process goes on or was started again, s.
 WATCHED_S = 2.0
 TURNS_WITHIN_S = 60.0
+#: So much of the log is shown of a sequence that did not end as promised.
+LOG_CHARACTERS = 20_000
 #: Sequences run beside each other, so that the computer is busy, s.
 TOLD_WITHIN_S = 5.0
 #: What a sequence is drawn from, each as often as it stands here.
@@ -54,6 +57,10 @@ ACTS = (
 )  # fmt: skip
 
 
+class NoAnswer(Exception):
+    """Nobody answers at the address of the service."""
+
+
 @dataclass
 class Stop:
     """A stop that was asked for."""
@@ -62,7 +69,7 @@ class Stop:
     turning: bool  #: whether the table turned then
     line: int  #: how much the instruments had heard by then
     confirmed_s: float | None = None  #: when the one who asked was told that the table stands
-    refused_s: float | None = None  #: when the one who asked was told that it does not, or got no answer
+    unheard: bool = False  #: whether the one who asked got no answer, and with it that it was not heard
 
 
 @dataclass
@@ -81,7 +88,7 @@ class Story:
 
         Before that another process may make the bench safe for a reason of its own, which looks the same.
         """
-        if stop.confirmed_s is not None:
+        if stop.confirmed_s is not None or stop.unheard:
             return stop.confirmed_s
         told = next((k for k in range(stop.line, len(heard)) if heard[k].is_stop), None)
         after = heard[told + 1 :] if told is not None else []
@@ -133,7 +140,10 @@ class Bench:
             caller.close()
 
     def stop(self, way: str) -> bool | None:
-        """Ask for a stop; returns whether the table is said to stand, None where nothing is said."""
+        """Ask for a stop; returns whether the table is said to stand, None where nothing can be said.
+
+        Raises NoAnswer where the page, which then shows NOT STOPPED, gets no answer.
+        """
         if way == "signal":
             with contextlib.suppress(ProcessLookupError):
                 os.kill(self.supervisor.pid, signal.SIGTERM)
@@ -142,9 +152,9 @@ class Bench:
             url = f"{self.url}/api/campaigns/{max(self.campaign, 1)}/abort"
             try:
                 answer = httpx.post(url, json={"by": "Ada", "reason": "study"}, timeout=STOPPED_S)
-                return bool(answer.json().get("stands"))
-            except (httpx.HTTPError, ValueError):
-                return False
+            except httpx.HTTPError as error:
+                raise NoAnswer from error
+            return bool(answer.json().get("stands"))
         words = [sys.executable, "-m", "labctl", "stop", "--database", str(self.database)]
         environment = {**os.environ, "XDG_STATE_HOME": str(self.state)}
         return subprocess.run(words, capture_output=True, env=environment, timeout=90.0, check=False).returncode == 0
@@ -183,7 +193,7 @@ class Bench:
         request = ServeRequest(bench=str(self.file), port=0, database=str(self.database))
         self.supervisor, ready = forked_service.start(request, self.state, self.log)
         if ready is None:
-            raise RuntimeError(f"the service did not start: {self.log.read_text()[-2000:]}")
+            raise RuntimeError("the service did not start")
         self.url = ready.url
 
     def close(self) -> None:
@@ -216,11 +226,11 @@ def _begin_turning(bench: Bench, story: Story) -> None:
         if not bench.serves:  # also one that was asked to end in the sequence before, and has ended since
             bench.serve()
         if time.monotonic() > until_s:
-            raise RuntimeError(f"the table did not turn: {refused}; {bench.log.read_text()[-3000:]}")
+            raise RuntimeError(f"the table did not turn: {refused}")
         story.released_s.append(time.monotonic())
         try:
             bench.start_campaign()
-        except LabctlError as error:
+        except (LabctlError, InstrumentError) as error:
             refused = str(error)
         for _ in range(100):
             if bench.table.turns():
@@ -234,9 +244,11 @@ def _carry_out(bench: Bench, story: Story, act: str) -> None:
     if verb == "stop":
         stop = Stop(time.monotonic(), bench.table.turns(), len(bench.table.heard))
         story.stops.append(stop)
-        stands = bench.stop(what.removeprefix("by "))
-        if stands is not None:
-            stop.confirmed_s, stop.refused_s = (time.monotonic(), None) if stands else (None, time.monotonic())
+        try:
+            if bench.stop(what.removeprefix("by ")):
+                stop.confirmed_s = time.monotonic()
+        except NoAnswer:
+            stop.unheard = True
         return
     if verb in {"start", "resume"}:
         story.released_s.append(time.monotonic())
@@ -244,7 +256,7 @@ def _carry_out(bench: Bench, story: Story, act: str) -> None:
         "start": bench.start_campaign, "resume": bench.resume_campaign, "thaw": bench.thaw, "restart": bench.serve,
         "kill": lambda: bench.signal(what, signal.SIGKILL), "freeze": lambda: bench.signal(what, signal.SIGSTOP),
     }  # fmt: skip
-    with contextlib.suppress(LabctlError):  # refused, or no answer: that is among what may happen
+    with contextlib.suppress(LabctlError, InstrumentError):  # refused, or no answer: that is among what may happen
         acts[verb]()
 
 
@@ -266,7 +278,8 @@ def _work(numbers: queue.SimpleQueue[int], stories: list[Story]) -> None:
                 except Exception as error:  # noqa: BLE001  it is reported with the sequence
                     story.trouble = f"{type(error).__name__}: {error}"
                 _report(story, len(stories))
-                if story.trouble:
+                if story.trouble or story.started_again:
+                    print(bench.log.read_text()[-LOG_CHARACTERS:], flush=True)
                     break
                 bench.table.heard.clear()
 

@@ -84,9 +84,9 @@ def test_a_step_that_fails_because_another_thread_stopped_its_table_is_ended_by_
 ) -> None:
     def stopped_from_outside() -> None:
         getattr(rig.control, ask)("the lamp smokes")
-        rig.table.fail("spin", RequestRejected("table", "stands still"))
+        raise RequestRejected("table", "stands still")
 
-    rig.when_step("acquire", stopped_from_outside)
+    rig.table.faults["spin"] = stopped_from_outside
     outcome = rig.run()
     rig.assert_safe()
     assert outcome.state == state

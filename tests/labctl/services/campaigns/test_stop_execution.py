@@ -100,3 +100,17 @@ def test_a_campaign_that_a_person_has_started_is_not_taken_for_one_that_was_left
     assert len(looked) == 2
     assert looked[0] == looked[1]
     assert (store.campaigns.get(1).state, store.campaigns.get(1).reason) == ("done", "all steps done")
+
+
+def test_a_stop_of_one_campaign_is_not_said_to_have_stopped_another(runner: BenchRunner) -> None:
+    answers: list[tuple[bool, str]] = []
+
+    def ask() -> None:
+        if not answers and runner.running is not None:
+            stopping = runner.stops.request(StopRequest.new("Ada", "key", "tea", 7))
+            answers.append((stopping.is_over(0.0) and stopping.stands, stopping.text))
+
+    runner.listen(ask)
+    start(runner)
+    finish(runner)
+    assert answers == [(False, "campaign 1 runs on this bench, not campaign 7, and goes on")]
