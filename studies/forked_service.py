@@ -139,8 +139,7 @@ def _run_supervisor(request: ServeRequest, ready: Connection, state: str, log: s
     _enter({"XDG_STATE_HOME": state, "STUDY_LOG": log}, log)
     # children of this process come from the same server
     forkserver._forkserver.ensure_running = lambda: None  # type: ignore[method-assign]  # noqa: SLF001
-    supervisor.Child = ForkedChild  # type: ignore[misc]
-    supervisor.WebKeeper = PageKeeper  # type: ignore[assignment, misc]
+    vars(supervisor).update(Child=ForkedChild, WebKeeper=PageKeeper)
     first_of_all()
     status = 0
     try:

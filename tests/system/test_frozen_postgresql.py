@@ -82,7 +82,7 @@ def turning(service: ServiceProcess, simulator: Simulator) -> int:
 
 
 def stopped(simulator: Simulator) -> int:
-    """Wait until the table was commanded to stop, and stands; returns how many lines the instruments have heard then."""
+    """Wait until the table was commanded to stop, and stands; returns how much the instruments have heard by then."""
     wait_until(simulator, lambda lines: any(ABORT in line["heard"] for line in lines))
     wait_until(simulator, lambda lines: not lines[-1]["table_turns"])
     return len(simulator.heard)
