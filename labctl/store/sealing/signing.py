@@ -20,7 +20,7 @@ from labctl.store.schema import tables
 from labctl.store.sealing.signers import Signer, signer_of
 
 #: How long a process that ends waits for its last signature, s.
-LAST_SIGNATURE_S = 5.0
+LAST_SIGNATURE_S = 2.0
 
 log = get_logger()
 
@@ -67,7 +67,7 @@ class Signing:
                 keep_signature(self._database, head, signature, signer)
 
     def close(self) -> None:
-        """Sign what is due, and end; a signature that takes longer than 5 s is left out."""
+        """Sign what is due, and end; a signature that takes longer than 2 s is left out."""
         self._database.on_growth = None
         with self._changed:
             self._over = True
