@@ -52,12 +52,12 @@ class Heard:
 
     @property
     def is_stop(self) -> bool:
-        """Whether the table was told to stop."""
+        """Whether the table was commanded to stop."""
         return self.device == "table" and ABORT in self.text
 
     @property
     def shows_motion(self) -> bool:
-        """Whether the table turned, or was told to move: during homing the log does not say that it turns."""
+        """Whether the table turned, or was commanded to move: during homing the log does not say that it turns."""
         return self.table_turns or (self.device == "table" and bool(MOVES.search(self.text)))
 
 
@@ -89,7 +89,7 @@ class Table:
         return bool(self.heard and self.heard[-1].table_turns)
 
     def told_s(self, after: int) -> float | None:
-        """Return when the table was told to stop, or stood, after so many lines; None where it did neither."""
+        """Return when the table was commanded to stop, or stood, after so many lines; None where it did neither."""
         return next((line.at_s for line in self.heard[after:] if line.is_stop or not line.table_turns), None)
 
     def close(self) -> None:

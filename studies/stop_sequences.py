@@ -58,7 +58,7 @@ ACTS = (
 
 
 class NoAnswer(Exception):
-    """Nobody answers at the address of the service."""
+    """No process answers at the address of the service."""
 
 
 @dataclass
@@ -68,8 +68,8 @@ class Stop:
     asked_s: float
     turning: bool  #: whether the table turned then
     line: int  #: how much the instruments had heard by then
-    confirmed_s: float | None = None  #: when the one who asked was told that the table stands
-    unheard: bool = False  #: whether the one who asked got no answer, and with it that it was not heard
+    confirmed_s: float | None = None  #: when the answer came that the table stands
+    unheard: bool = False  #: whether no answer came, so that the stop may have reached no process
 
 
 @dataclass

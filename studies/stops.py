@@ -121,7 +121,7 @@ class Service:
 def ask(service: Service, way: str, campaign: int) -> float | None:
     """Ask for a stop; returns after how many seconds it was read that the bench is not stopped, None where it was not.
 
-    A page that gets no answer shows NOT STOPPED over everything at once; whoever signals a process that is gone reads
+    A page that gets no answer shows NOT STOPPED over everything at once; a person who signals a process that is gone reads
     that there is no such process.
     """
     begun_s = time.monotonic()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,6 +12,10 @@ from labctl.cli.command_log import log_of_command
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import BenchName, Database, Json, SimulatedStart, simulated_start
 from labctl.cli.output import console, give_up_blocked_stderr, print_json, stderr
+
+if TYPE_CHECKING:
+    from labctl.processes.settings import ServeRequest
+    from labctl.processes.supervisor import Ready
 
 MaxUpload = Annotated[
     int, typer.Option("--max-upload-mib", metavar="N", help="Largest recording that may be sent, in MiB.")
@@ -48,8 +52,7 @@ def serve(
     """Serve calibrations over HTTP and run campaigns on the bench. Ctrl-C stops it and leaves the bench in its
     safe state."""
     from labctl.processes.settings import ServeRequest
-    from labctl.processes.supervisor import Ready, serve_forever
-    from labctl.services.schemas.service import ServiceReady
+    from labctl.processes.supervisor import serve_forever
 
     with one_clear_line():
         start_at = simulated_start(simulated_from)
@@ -59,17 +62,7 @@ def serve(
     )  # fmt: skip
 
     def ready(service: Ready) -> None:
-        named = request.bench_name
-        unconfirmed, cut_short = ("", "") if named is None else _found(named, database)
-        if as_json:
-            said = ServiceReady(**asdict(service), unconfirmed=unconfirmed, cut_short=cut_short)
-            print_json(said, one_line=True)
-            return
-        console.print(f"labctl listens on {service.url}  (HTTP interface: {service.url}/api-docs)", markup=False)
-        if start_at is not None:
-            console.print(f"the date of this service is simulated: {start_at:%Y-%m-%d %H:%M} UTC", markup=False)
-        for text in filter(None, (unconfirmed, cut_short)):
-            console.print(text, style="yellow", markup=False, soft_wrap=True)
+        _print_ready(service, request, as_json=as_json)
 
     with one_clear_line(), log_of_command("supervisor", default="info", location=request.location):
         try:
@@ -78,6 +71,23 @@ def serve(
         finally:
             give_up_blocked_stderr()
     stderr.print(f"labctl: stopped{'; ' if left else ''}{left}", markup=False)
+
+
+def _print_ready(service: Ready, request: ServeRequest, *, as_json: bool) -> None:
+    """Print where a service answers, and how its bench was found."""
+    from labctl.services.schemas.service import ServiceReady
+
+    named, start_at = request.bench_name, request.simulated_start
+    unconfirmed, cut_short = ("", "") if named is None else _found(named, request.database)
+    if as_json:
+        said = ServiceReady(**asdict(service), unconfirmed=unconfirmed, cut_short=cut_short)
+        print_json(said, one_line=True)
+        return
+    console.print(f"labctl listens on {service.url}  (HTTP interface: {service.url}/api-docs)", markup=False)
+    if start_at is not None:
+        console.print(f"the date of this service is simulated: {start_at:%Y-%m-%d %H:%M} UTC", markup=False)
+    for text in filter(None, (unconfirmed, cut_short)):
+        console.print(text, style="yellow", markup=False, soft_wrap=True)
 
 
 def _migrated(location: str) -> None:

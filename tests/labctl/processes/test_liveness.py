@@ -45,7 +45,7 @@ def test_time_without_a_processor_does_not_count(delays: dict[int, float]) -> No
     assert silence.s == 1.0
     clock.sleep(20.0)
     delays[12] += 20.0
-    assert silence.s == 24.0 - 7.0  # not for ever
+    assert silence.s == 24.0 - 7.0  # not without end
     silence.restart()
     assert (silence.late_s, silence.s) == (0.0, 0.0)
 

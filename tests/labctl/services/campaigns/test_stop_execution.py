@@ -34,7 +34,7 @@ def runner(store: Store) -> Iterator[BenchRunner]:
 
 
 class StoppedBefore:
-    """A lock in whose way comes a stop: whoever waits for it gets it when the stop was carried out."""
+    """A lock with a stop before it: a caller gets the lock when the stop was carried out."""
 
     def __init__(self, runner: BenchRunner) -> None:
         self._runner, self._lock = runner, runner._guard
