@@ -121,8 +121,8 @@ class Service:
 def ask(service: Service, way: str, campaign: int) -> float | None:
     """Ask for a stop; returns after how many seconds it was read that the bench is not stopped, None where it was not.
 
-    A page that gets no answer shows NOT STOPPED over everything at once; a person who signals a process that is gone reads
-    that there is no such process.
+    A page that gets no answer shows NOT STOPPED over everything at once; a person who signals a process that is gone
+    reads that there is no such process.
     """
     begun_s = time.monotonic()
     said = {"page": _ask_page, "command": _ask_command, "signal": _ask_by_signal}[way](service, campaign)
