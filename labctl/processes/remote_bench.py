@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import threading
 from collections.abc import Callable, Mapping
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +43,8 @@ STANDS_S = 4.5
 #: A bench process without an answer for so long gets no request but to stop.
 SILENT_S = 3.0
 RECONNECT_S = 0.5
+#: The same request, by the page of the supervisor and again here: what comes later is another one.
+REPEATED_WITHIN = timedelta(seconds=10)
 
 
 class RemoteWriter:
@@ -118,7 +121,10 @@ class RemoteControl:
         except BenchSilent as silent:
             last = self._last_live(asked.campaign)
             if last is None:
-                raise BenchSilent(f"the table stands ({attempt.text}); that is not recorded yet: {silent}") from silent
+                raise BenchSilent(
+                    f"the table stands ({attempt.text}), but that is not recorded yet; try again once the bench process "
+                    f"answers: {silent}"
+                ) from silent
             text = f"the table stands, but that is not recorded yet: {silent}"
             return last.model_copy(update={"wish": "abort", "step_text": attempt.text, "unrecorded": text})
 
@@ -134,7 +140,8 @@ class RemoteControl:
 
     def _attempt(self, reason: str, campaign: int | None) -> StopAttempt:
         assert self._place is not None
-        return StopAttempt(self._place, StopRequest.new(actor().name, actor().via, reason, campaign))
+        stop = StopRequest.new(actor().name, actor().via, reason, campaign)
+        return StopAttempt(self._place, _asked_before(stop, self._place.latch.state()) or stop)
 
     def _recorded(self, asked: ToCampaign[ReasonRequest]) -> CampaignResponse:
         answer: CampaignResponse = self._ask("abort", asked, timeout_s=ANSWER_S)
@@ -154,6 +161,19 @@ class RemoteControl:
     def close(self) -> None:
         """Close the connections."""
         self._calls.close()
+
+
+def _asked_before(stop: StopRequest, latch: LatchState) -> StopRequest | None:
+    """Return the stop in the latch that this one repeats, so that it is carried out and recorded once; None: it is new.
+
+    While the web process is late its supervisor carries out a stop, and may then pass the same request on to it.
+    """
+    for known in reversed(latch.held):
+        with contextlib.suppress(ValueError):
+            age = datetime.fromisoformat(stop.at) - datetime.fromisoformat(known.at)
+            if (known.reason, known.campaign) == (stop.reason, stop.campaign) and age < REPEATED_WITHIN:
+                return known
+    return None
 
 
 class RemoteBench:

@@ -8,29 +8,25 @@ from __future__ import annotations
 
 import json
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
 import httpx
 import pytest
 
 from labctl.services.admin.api_keys import create_key
 from labctl.services.schemas.admin import KeyRequest, Role
-from labctl.services.schemas.campaigns import BENCH_CHECKS
-from labctl.store import AuditRow, open_store
+from labctl.store import open_store
 from studies.postgresql_cluster import Cluster
 from tests.helpers.postgresql import running_cluster
 from tests.helpers.processes import WAIT_S, ServiceProcess, running
-from tests.helpers.simulator_process import FIRST_DPS, RECIPE, Simulator
-from tests.helpers.waiting import before_next_request
+from tests.helpers.simulator_process import Simulator
+from tests.helpers.stopped_table import ended, stopped, stops, turning
 
 pytestmark = pytest.mark.timeout(400)  # processes that start on a busy machine
 
-ABORT = "!1a"
-START = {"recipe": RECIPE.format(rate=FIRST_DPS), "confirmed_by": "Ada", "checks": list(BENCH_CHECKS)}
 #: More requests that wait for the database than any pool of threads of the web process has threads.
 CROWD = 60
 
@@ -67,51 +63,9 @@ def service(cluster: Cluster, simulator: Simulator, thawed: None) -> Iterator[Se
         yield made
 
 
-def wait_until(simulator: Simulator, holds: Callable[[list[dict[str, Any]]], bool]) -> None:
-    """Wait until what the instruments have heard is as expected."""
-    while not (simulator.heard and holds(simulator.heard)):  # the test has a time-out
-        before_next_request()
-
-
-def turning(service: ServiceProcess, simulator: Simulator) -> int:
-    """Start a campaign; returns its number once the table turns."""
-    started = service.http.post("/api/campaigns", json=START)
-    assert started.status_code == 201, started.text
-    wait_until(simulator, lambda lines: lines[-1]["table_turns"])
-    return int(started.json()["id"])
-
-
-def stopped(simulator: Simulator) -> int:
-    """Wait until the table was commanded to stop, and stands; returns how much the instruments have heard by then."""
-    wait_until(simulator, lambda lines: any(ABORT in line["heard"] for line in lines))
-    wait_until(simulator, lambda lines: not lines[-1]["table_turns"])
-    return len(simulator.heard)
-
-
 def abort_of(service: ServiceProcess, campaign: int) -> httpx.Response:
     asked = {"reason": "a hand in the bench", "by": "Ada"}
     return service.http.post(f"/api/campaigns/{campaign}/abort", json=asked)
-
-
-def ended(service: ServiceProcess, campaign: int) -> dict[str, Any]:
-    """Ask until the campaign has ended; returns it."""
-    while True:
-        with suppress(httpx.TransportError, ValueError):
-            answer = service.http.get(f"/api/campaigns/{campaign}", timeout=WAIT_S)
-            if answer.status_code == 200 and answer.json()["state"] in {"aborted", "failed", "done"}:
-                found: dict[str, Any] = answer.json()
-                return found
-        before_next_request()
-
-
-def stops(service: ServiceProcess) -> list[AuditRow]:
-    """Wait until a stop is in the audit trail, and return all that are."""
-    while True:
-        with open_store(str(service.database), write=False) as store:
-            found = [row for row in store.audit.rows() if row.action in {"campaign abort", "bench stop"}]
-        if found:
-            return found
-        before_next_request()
 
 
 def recorded_once(service: ServiceProcess, campaign: int, reason: str) -> None:

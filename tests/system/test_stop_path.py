@@ -10,17 +10,19 @@ import json
 import os
 import signal
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import httpx
 import pytest
 
+from labctl.processes.supervisor_watch import is_stopped
 from labctl.services.schemas.campaigns import BENCH_CHECKS
 from labctl.store import open_store
 from tests.helpers.processes import WAIT_S, ServiceProcess, running
 from tests.helpers.simulator_process import FIRST_DPS, RECIPE, Simulator
-from tests.helpers.waiting import before_next_request
+from tests.helpers.waiting import before_next_request, eventually
 
 pytestmark = pytest.mark.timeout(400)  # processes that start on a busy machine
 
@@ -191,6 +193,7 @@ def test_a_signal_to_a_supervisor_that_stands_still_is_carried_out_by_the_others
     campaign = turning(service, simulator)
     for pid in (service.process.pid, service.bench_pid):
         os.kill(pid, signal.SIGSTOP)
+        eventually(partial(is_stopped, pid))  # a signal that comes before that may still be heard
     service.process.send_signal(signal.SIGTERM)
     wait_until(simulator, lambda lines: any(ABORT in line["heard"] for line in lines))
     wait_until(simulator, lambda lines: not lines[-1]["table_turns"])

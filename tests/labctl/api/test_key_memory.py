@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import threading
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime
 from pathlib import Path
 from unittest.mock import patch
@@ -41,7 +42,9 @@ def key_of(store: Store, name: str) -> str:
 
 
 def caller(memory: KeyMemory, key: str) -> str:
-    return asyncio.run(memory.caller_of(f"Bearer {key}")).name
+    """Ask in a thread: a browser that another test of this process has opened leaves its event loop in this one."""
+    with ThreadPoolExecutor(1) as pool:
+        return pool.submit(lambda: asyncio.run(memory.caller_of(f"Bearer {key}"))).result().name
 
 
 def test_a_key_that_was_made_since_the_last_reading_is_known_at_once(store: Store, memory: KeyMemory) -> None:
