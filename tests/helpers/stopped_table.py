@@ -1,4 +1,4 @@
-"""A service that drives a table at the end of a wire: a campaign that turns it, its stop, and what is recorded of it."""
+"""A service that drives a table at the end of a wire: a campaign that turns it, and its recorded stop."""
 
 from __future__ import annotations
 

@@ -71,7 +71,8 @@ def abort_of(service: ServiceProcess, campaign: int) -> httpx.Response:
 def recorded_once(service: ServiceProcess, campaign: int, reason: str) -> None:
     found = ended(service, campaign)
     assert (found["state"], reason in found["reason"]) == ("aborted", True), found["reason"]
-    assert [row.detail["reason"] for row in stops(service)] == [reason]
+    rows = stops(service)
+    assert [row.detail["reason"] for row in rows] == [reason], [(row.id, row.who, row.detail) for row in rows]
 
 
 def test_a_stop_with_a_key_is_carried_out_while_the_database_is_frozen(
