@@ -122,8 +122,8 @@ class RemoteControl:
             last = self._last_live(asked.campaign)
             if last is None:
                 raise BenchSilent(
-                    f"the table stands ({attempt.text}), but that is not recorded yet; try again once the bench process "
-                    f"answers: {silent}"
+                    f"the table stands ({attempt.text}), but that is not recorded yet; try again once the bench "
+                    f"process answers: {silent}"
                 ) from silent
             text = f"the table stands, but that is not recorded yet: {silent}"
             return last.model_copy(update={"wish": "abort", "step_text": attempt.text, "unrecorded": text})
