@@ -21,8 +21,13 @@ def record_action(store: Store, at: datetime, action: str, campaign: int, reason
     store.audit.record(at, f"campaign {action}", f"campaign {campaign}", {"reason": reason})
 
 
-def abort_abandoned(store: Store, campaign: int, reason: str, at: datetime) -> CampaignResponse:
-    """Close a campaign that no process runs any more. Raises NotFound, and Conflict for one that has ended."""
+def abort_abandoned(
+    store: Store, campaign: int, reason: str, at: datetime, stops: BenchStops | None = None
+) -> CampaignResponse:
+    """Close a campaign that no process runs any more. Raises NotFound, and Conflict for one that has ended.
+
+    `stops` are those of the bench, where this process has them: a stop that the latch has is recorded once.
+    """
     answer = campaign_status(store, campaign)
     if answer.state in ENDED:
         raise Conflict(
@@ -33,15 +38,21 @@ def abort_abandoned(store: Store, campaign: int, reason: str, at: datetime) -> C
             f"campaign {campaign} may still be running: {described(driver)}. Nothing was changed; "
             "abort the campaign at that process"
         )
-    record_action(store, at, "abort", campaign, reason)
     row = store.campaigns.get(campaign)
+    of_bench = BenchStops(store, row.bench_name)
+    stops = stops if stops is not None and stops.place == of_bench.place else of_bench
+    asked = [stop for stop in stops.state.open if stop.campaign == campaign]
+    for stop in asked:
+        stops.record(stop, at)
+    if not asked:
+        record_action(store, at, "abort", campaign, reason)
     said = f"left unfinished; {reason}"
     if row.state in UNDER_WAY and outlives_its_process(row):
         text = f"the process that ran campaign {campaign} ended before it could make the bench safe"
         store.benches.mark(row.bench_name, text, at)
         said += f". Bench {row.bench_name} has not been made safe: check it, then run `labctl bench clear`"
     store.campaigns.close_unfinished(campaign, said, at, CampaignState.ABORTED)
-    BenchStops(store, row.bench_name).note_closed(campaign, said)
+    stops.note_closed(campaign, said)
     log.warning("campaign.closed", campaign=campaign, bench=row.bench_name, reason=said)
     return campaign_status(store, campaign)
 

@@ -77,7 +77,8 @@ class ServiceControl:
         if runner is None or not runner.runs_or_was_stopped(asked.campaign):
             new = StopRequest.new(actor().name, actor().via, reason, asked.campaign)
             left = None if runner is None else runner.stop_left(asked.campaign, new)
-            return left or abort_abandoned(context.store, asked.campaign, reason, context.now())
+            stops = None if runner is None else runner.stop_latch
+            return left or abort_abandoned(context.store, asked.campaign, reason, context.now(), stops)
         stop = runner.stop_of(asked.campaign) or StopRequest.new(actor().name, actor().via, reason, asked.campaign)
         answer = runner.abort(asked.campaign, stop)
         if missing := self._recorded(context, runner, stop):
