@@ -41,10 +41,10 @@ def key_of(store: Store, name: str) -> str:
     return create_key(store, KeyRequest(name=name, role=Role.OPERATOR), NOW).key
 
 
-def caller(memory: KeyMemory, key: str) -> str:
+def caller(memory: KeyMemory, key: str, scheme: str = "Bearer") -> str:
     """Ask in a thread: a browser that another test of this process has opened leaves its event loop in this one."""
     with ThreadPoolExecutor(1) as pool:
-        return pool.submit(lambda: asyncio.run(memory.caller_of(f"Bearer {key}"))).result().name
+        return pool.submit(lambda: asyncio.run(memory.caller_of(f"{scheme} {key}"))).result().name
 
 
 def test_a_key_that_was_made_since_the_last_reading_is_known_at_once(store: Store, memory: KeyMemory) -> None:
@@ -60,7 +60,7 @@ def test_a_key_that_is_not_in_force_is_refused(store: Store, memory: KeyMemory) 
         with pytest.raises(NotIdentified, match="unknown or revoked"):
             caller(memory, each)
     with pytest.raises(NotIdentified):
-        asyncio.run(memory.caller_of(f"Basic {key}"))
+        caller(memory, key, "Basic")
 
 
 def test_while_the_database_is_frozen_known_keys_are_taken_and_others_refused(store: Store, memory: KeyMemory) -> None:

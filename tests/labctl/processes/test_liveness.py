@@ -16,12 +16,15 @@ from labctl.processes.liveness import Silence, run_delays_s
 from labctl.processes.supervisor_watch import SupervisorWatch, is_stopped, unheard_end
 from labctl.stop.places import ProcessId
 from procedures.execution.signals import ENDING
+from tests.helpers.signal_defaults import default_signals
 from tests.helpers.waiting import eventually
 
 
 @pytest.fixture
 def sleeper() -> Iterator[subprocess.Popen[bytes]]:
-    with subprocess.Popen([sys.executable, "-c", "import signal; signal.pause()"]) as process:
+    with default_signals():  # one that is ignored is not kept for a process that stands still
+        process = subprocess.Popen([sys.executable, "-c", "import signal; signal.pause()"])
+    with process:
         yield process
         process.kill()
 
