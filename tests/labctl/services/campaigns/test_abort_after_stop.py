@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,8 @@ import pytest
 from instruments.clock import VirtualClock
 from labctl.errors import Conflict
 from labctl.services.campaigns.bench_runner import BenchRunner
+from labctl.services.campaigns.preparation import prepare
+from labctl.services.campaigns.unattended import abort_abandoned
 from labctl.services.commands.context import CommandContext
 from labctl.services.commands.requests import ToCampaign
 from labctl.services.commands.service_control import ServiceControl
@@ -17,6 +20,9 @@ from labctl.services.planning.loading import load_bench
 from labctl.services.schemas.campaigns import CampaignRequest, ReasonRequest
 from labctl.stop.latch import StopRequest
 from labctl.store import Store, open_store
+from procedures.contracts.campaign_state import CampaignState
+
+AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
 
 
 @pytest.fixture
@@ -40,3 +46,18 @@ def test_a_campaign_that_ended_by_the_stop_is_answered_and_written_down_and_the_
     assert [row.action for row in store.audit.rows()].count("campaign abort") == 1
     with pytest.raises(Conflict, match="has already ended"):
         control.abort(context, asked)
+
+
+def test_a_stop_that_the_latch_has_is_recorded_once_for_a_campaign_that_no_process_runs(store: Store) -> None:
+    bench = load_bench("single-axis-sim")
+    prepared = prepare(store, "short", bench, VirtualClock(), clip=False)
+    store.campaigns.journal(prepared.id).campaign_state(CampaignState.RUNNING, "started", 0.0, AT)
+    prepared.bench.close()
+    runner = BenchRunner(store, bench, VirtualClock)
+    stop = StopRequest.new("Ada", "key", "a hand in the bench (Ada)", prepared.id)
+    runner.stop_latch.place.latch.request(stop)
+    assert abort_abandoned(store, prepared.id, stop.reason, AT, runner.stop_latch).state == "aborted"
+    runner.stops.carry_out()
+    rows = [row for row in store.audit.rows() if row.action == "campaign abort"]
+    assert [(row.who, row.detail["stop"]) for row in rows] == [("Ada", stop.id)]
+    runner.close()

@@ -25,7 +25,6 @@ from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.execution import run, run_here
 from labctl.services.campaigns.preparation import prepare
 from labctl.services.campaigns.status import campaign_status, list_campaigns
-from labctl.services.campaigns.unattended import abort_abandoned
 from labctl.services.commands.context import CommandContext
 from labctl.services.commands.registry import ABORT_CAMPAIGN
 from labctl.services.commands.requests import ToCampaign
@@ -34,7 +33,6 @@ from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
 from labctl.services.recordings.loading import newest_row
 from labctl.services.schemas.campaigns import CampaignRequest, ReasonRequest, StartRequest
-from labctl.stop.latch import StopRequest
 from labctl.store import Store, open_store
 from labctl.store.connection.database import Database
 from procedures.contracts.campaign_state import CampaignState
@@ -395,15 +393,3 @@ def test_another_terminal_is_told_where_a_campaign_runs(tmp_path: Path) -> None:
     for result in said:
         assert result.exit_code == 2
         assert f"campaign 1 runs in process {os.getpid()}'s terminal: Ctrl-C there ends it safely" in result.stderr
-
-
-def test_a_stop_that_the_latch_has_is_recorded_once_for_a_campaign_that_no_process_runs(store: Store) -> None:
-    campaign = left_running(store)
-    runner = BenchRunner(store, BENCH, VirtualClock)
-    stop = StopRequest.new("Ada", "key", "a hand in the bench (Ada)", campaign)
-    runner.stop_latch.place.latch.request(stop)
-    assert abort_abandoned(store, campaign, stop.reason, AT, runner.stop_latch).state == "aborted"
-    runner.stops.carry_out()
-    rows = [row for row in store.audit.rows() if row.action == "campaign abort"]
-    assert [(row.who, row.detail["stop"]) for row in rows] == [("Ada", stop.id)]
-    runner.close()
