@@ -12,25 +12,24 @@ from contextlib import suppress
 from pathlib import Path
 
 from labctl.log import get_logger
+from labctl.stop.places import ProcessId
 from procedures.execution.signals import ENDING
 
 log = get_logger()
 
 LOOK_S = 0.5
-#: proc_pid_status(5): stopped by a signal, or by a debugger.
-STOPPED = frozenset({"T", "t"})
 
 
 def is_stopped(pid: int) -> bool:
     """Return whether a process stands still because a signal or a debugger has stopped it."""
-    return _status(pid).get("State", "")[:1] in STOPPED
+    return ProcessId.of(pid).stands_still
 
 
 def unheard_end(pid: int) -> bool:
     """Return whether a process that stands still was asked to end by a signal that it could not hear yet."""
-    status = _status(pid)
-    if status.get("State", "")[:1] not in STOPPED:
+    if not is_stopped(pid):
         return False
+    status = _status(pid)
     waiting = int(status.get("ShdPnd", "0"), 16) | int(status.get("SigPnd", "0"), 16)
     return any(waiting & (1 << (number - 1)) for number in ENDING)
 

@@ -9,7 +9,7 @@ import contextlib
 import json
 import os
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -18,15 +18,13 @@ import httpx
 import pytest
 
 from labctl.processes.supervisor_watch import is_stopped
-from labctl.services.schemas.campaigns import BENCH_CHECKS
 from labctl.store import open_store
 from tests.helpers.processes import WAIT_S, ServiceProcess, running
-from tests.helpers.simulator_process import FIRST_DPS, RECIPE, Simulator
+from tests.helpers.simulator_process import Simulator
+from tests.helpers.stopped_table import ABORT, START, turning, wait_until
 from tests.helpers.waiting import before_next_request, eventually
 
 pytestmark = pytest.mark.timeout(400)  # processes that start on a busy machine
-
-ABORT, START = "!1a", {"recipe": RECIPE.format(rate=FIRST_DPS), "confirmed_by": "Ada", "checks": list(BENCH_CHECKS)}
 
 
 @pytest.fixture
@@ -42,20 +40,6 @@ def simulator(tmp_path: Path) -> Iterator[Simulator]:
 def service(simulator: Simulator, tmp_path: Path) -> Iterator[ServiceProcess]:
     with running(tmp_path / "lab.sqlite", "--bench", str(simulator.bench)) as made:
         yield made
-
-
-def turning(service: ServiceProcess, simulator: Simulator) -> int:
-    """Start a campaign; returns its number once the table turns."""
-    started = service.http.post("/api/campaigns", json=START)
-    assert started.status_code == 201, started.text
-    wait_until(simulator, lambda lines: lines[-1]["table_turns"])
-    return int(started.json()["id"])
-
-
-def wait_until(simulator: Simulator, holds: Callable[[list[dict[str, Any]]], bool]) -> None:
-    """Wait until what the instruments have heard is as expected."""
-    while not (simulator.heard and holds(simulator.heard)):  # the test has a time-out
-        before_next_request()
 
 
 def status(url: str, campaign: int) -> dict[str, Any]:
