@@ -142,11 +142,13 @@ class Bench:
     def stop(self, way: str) -> bool | None:
         """Ask for a stop; returns whether the table is said to stand, None where nothing can be said.
 
-        Raises NoAnswer where the page, which then shows NOT STOPPED, gets no answer.
+        Raises NoAnswer where the page, which then shows NOT STOPPED, gets no answer, and where there is no supervisor
+        to signal: a shell then says that there is no such process.
         """
         if way == "signal":
-            with contextlib.suppress(ProcessLookupError):
-                os.kill(self.supervisor.pid, signal.SIGTERM)
+            if not self.serves:
+                raise NoAnswer
+            os.kill(self.supervisor.pid, signal.SIGTERM)  # one that ended since then is not reaped yet
             return None
         if way == "page":
             url = f"{self.url}/api/campaigns/{max(self.campaign, 1)}/abort"

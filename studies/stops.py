@@ -4,8 +4,8 @@ Each round runs `labctl serve` on simulated instruments at pseudo-terminals and 
 campaign, lets one or two processes of the service suffer at random moments, and then asks for a stop: by the page's
 request, by `labctl stop`, or by a signal to the supervisor. The log of the table says when it was stopped and whether
 it turned again. `LABCTL_STUDY_STOPS` is how many rounds, `LABCTL_STUDY_AT_ONCE` how many run beside each other,
-`LABCTL_STUDY_BUSY` how many busy processes run beside them; with `LABCTL_STUDY_CRITICISMS=1` 50 clients ask each
-service for criticisms meanwhile.
+`LABCTL_STUDY_BUSY` how many busy processes run beside each from the moment when its table turns; with
+`LABCTL_STUDY_CRITICISMS=1` 50 clients ask its service for criticisms meanwhile.
 """
 
 from __future__ import annotations
@@ -13,11 +13,13 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import tempfile
 import time
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -36,6 +38,8 @@ CRITICISMS = os.environ.get("LABCTL_STUDY_CRITICISMS", "0") == "1"
 SEED = int(os.environ.get("LABCTL_STUDY_SEED", "29"))
 #: The table is stopped within this, or the one who asked reads NOT STOPPED within `SAID_S`, s.
 TOLD_S, SAID_S = (2.0, 5.0) if BUSY == 0 else (5.0, 5.0)
+#: How long the load runs before the first fault, s: the clients of `criticisms_of` have then asked.
+LOADED_S = 3.0 if BUSY or CRITICISMS else 0.0
 #: How long the table is watched after the stop, while what died is started again, s.
 WATCHED_S = 8.0
 #: A service that was asked to end has this long, and a bench process without a supervisor a minute more, s.
@@ -44,6 +48,7 @@ PROCESSES = ("supervisor", "web", "bench")
 FAULTS = (signal.SIGKILL, signal.SIGSTOP, signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)
 WAYS = ("page", "command", "signal")
 NOT_STOPPED = "NOT STOPPED"
+DATABASE = "lab.sqlite"
 EXAMPLE = Path(__file__).parents[1] / "labctl" / "examples" / "osu-fog"
 
 
@@ -88,7 +93,7 @@ class Service:
     """`labctl serve` on a bench."""
 
     def __init__(self, folder: Path, bench: Path) -> None:
-        self.database = folder / "lab.sqlite"
+        self.database = folder / DATABASE
         self.environment = {**os.environ, "XDG_STATE_HOME": str(folder / "state")}
         self.log = folder / "service.log"
         words = ["serve", "--bench", str(bench), "--port", "0", "--json", "--database", str(self.database)]
@@ -161,9 +166,10 @@ def _ask_command(service: Service, _campaign: int) -> bool:
     return False
 
 
-def one(faults: tuple[Fault, ...], way: str) -> Round:
-    """Run one round."""
+def one(prepared: Path, faults: tuple[Fault, ...], way: str) -> Round:
+    """Run one round on a copy of the database in a folder."""
     with tempfile.TemporaryDirectory() as name, simulators(Path(name)) as (bench, table):
+        shutil.copytree(prepared, name, dirs_exist_ok=True)
         service = Service(Path(name), bench)
         try:
             return _suffered(service, table, faults, way)
@@ -174,13 +180,12 @@ def one(faults: tuple[Fault, ...], way: str) -> Round:
 
 
 def _suffered(service: Service, table: Table, faults: tuple[Fault, ...], way: str) -> Round:
-    if CRITICISMS:
-        _fit_example(service)
     start = {"recipe": RECIPE, "confirmed_by": "the study", "checks": list(BENCH_CHECKS)}
-    with criticisms_of(service.url) if CRITICISMS else contextlib.nullcontext():
-        campaign = httpx.post(f"{service.url}/api/campaigns", json=start, timeout=120.0).json()["id"]
-        while not table.turns():
-            time.sleep(0.05)
+    campaign = httpx.post(f"{service.url}/api/campaigns", json=start, timeout=120.0).json()["id"]
+    while not table.turns():
+        time.sleep(0.05)
+    with _load(service):
+        time.sleep(LOADED_S)
         for fault in faults:
             time.sleep(fault.after_s)
             with contextlib.suppress(ProcessLookupError):
@@ -201,9 +206,25 @@ def _suffered(service: Service, table: Table, faults: tuple[Fault, ...], way: st
     return Round(faults, way, None if told_s is None else told_s - begun_s, stood, said_s, turned_again, left)
 
 
-def _fit_example(service: Service) -> None:
-    for words in (("import", str(EXAMPLE)), ("fit", "OSU-FOG-2024", "--model", "ojeda2000")):
-        service.command(*words).wait()
+@contextlib.contextmanager
+def _load(service: Service) -> Iterator[None]:
+    """Keep the computer busy beside a service, and the service with criticisms."""
+    busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(BUSY)]
+    try:
+        with criticisms_of(service.url) if CRITICISMS else contextlib.nullcontext():
+            yield
+    finally:
+        for each in busy:
+            each.kill()
+            each.wait()
+
+
+def _prepare(folder: Path) -> None:
+    """Make a database in a folder; with a calibration to criticise where criticisms are asked for."""
+    if CRITICISMS:
+        for words in (("import", str(EXAMPLE)), ("fit", "OSU-FOG-2024", "--model", "ojeda2000")):
+            made = [sys.executable, "-m", "labctl", *words, "--database", str(folder / DATABASE)]
+            subprocess.run(made, check=True, stdout=subprocess.DEVNULL)
 
 
 def _turned_again(table: Table, before: int, stood: bool) -> bool:
@@ -245,17 +266,13 @@ def run() -> dict[str, float]:
     """Run all rounds, a line for each."""
 
     def shown(asked: tuple[tuple[Fault, ...], str]) -> Round:
-        found = one(*asked)
+        found = one(Path(prepared), *asked)
         print(f"   {'as promised' if found.well else 'NOT AS PROMISED'}: {found}", flush=True)
         return found
 
-    busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(BUSY)]
-    try:
-        with ThreadPoolExecutor(AT_ONCE) as pool:
-            rounds = list(pool.map(shown, drawn(ROUNDS)))
-    finally:
-        for each in busy:
-            each.kill()
+    with tempfile.TemporaryDirectory() as prepared, ThreadPoolExecutor(AT_ONCE) as pool:
+        _prepare(Path(prepared))
+        rounds = list(pool.map(shown, drawn(ROUNDS)))
     told = [each.told_s for each in rounds if each.told_s is not None and not each.stood]
     return {
         "rounds": float(len(rounds)),
