@@ -9,6 +9,7 @@ STUDIES = (
     "coverage",
     "use_coverage",
     "budget_coverage",
+    "rate_vector_coverage",
     "hand_turns",
     "poses",
     "joint_recordings",

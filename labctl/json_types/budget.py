@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, NotRequired
 
 from typing_extensions import TypedDict
 
@@ -38,6 +38,7 @@ class BenchConditionsJson(TypedDict):
     turn_common_u: float | None
     max_rate_dps: float | None
     stated: list[StandardJson]
+    mountings: NotRequired[dict[str, float]]  #: position -> its share in the slopes over the rate
 
 
 class BudgetLineJson(TypedDict):
@@ -86,10 +87,34 @@ class ExpandedJson(TypedDict):
     expanded: float | None
 
 
-class AxisBoundJson(TypedDict):
-    """The largest expanded uncertainty of one axis over the calibrated range, and the budget at that place.
+class VectorBoundJson(TypedDict):
+    """The largest expanded uncertainty of one output over all rate vectors up to `reach_dps`, and where that is.
 
-    `bound_dps` is null where the uncertainty is unknown somewhere in the range, and `why` says why.
+    `bound_dps` holds in the frame of the case, `aligned_bound_dps` up to a rotation of the frame: for a unit that is
+    aligned in use. Both are null where the uncertainty is unknown somewhere, and `why` says why.
+    """
+
+    bound_dps: float | None
+    aligned_bound_dps: float | None
+    reach_dps: float
+    rates_dps: dict[str, float]
+    temperature_c: float
+    why: str
+
+
+class CrossRatesJson(TypedDict):
+    """What rates about axes without an output add to a corrected rate, per deg/s; null is unknown, and why."""
+
+    about: list[str]
+    per_dps: float | None
+    why: str
+
+
+class AxisBoundJson(TypedDict):
+    """The largest expanded uncertainty of one axis over the calibrated range, the others at rest, and its budget there.
+
+    `bound_dps` is null where the uncertainty is unknown somewhere in the range, and `why` says why. `vector` is that of
+    rates about any axis; `cross_rates` is null where every body axis has an output.
     """
 
     bound_dps: float | None
@@ -98,6 +123,8 @@ class AxisBoundJson(TypedDict):
     why: str
     budget: BudgetJson
     coefficients: dict[str, ExpandedJson]
+    vector: NotRequired[VectorBoundJson]
+    cross_rates: NotRequired[CrossRatesJson | None]
 
 
 class UncertaintyJson(TypedDict):

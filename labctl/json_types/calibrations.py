@@ -52,6 +52,8 @@ class AxisEvidenceJson(TypedDict):
     repeatability_dps: float | None
     repeatability_freedom: int | None
     repeatability_source: str
+    across_dps: NotRequired[dict[str, list[float]]]  #: rates about the other body axes about which the unit was turned
+    correlation: NotRequired[dict[str, float]]  #: of its residuals with those of the other outputs
 
 
 class CertificationJson(TypedDict):

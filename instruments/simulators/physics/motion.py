@@ -41,6 +41,8 @@ class Move:
     @property
     def end_s(self) -> float:
         """Time at which the table is at rest again, s."""
+        if self.steps == 0:  # a place to stand at, without ramps
+            return self.start_s
         ramps = self.rate_hz**2 / self.acceleration_hz_s
         return self.start_s + 2 * self.ramp_s + (self.steps - ramps) / self.rate_hz
 

@@ -254,16 +254,21 @@ async def uncertainty(
     version: int,
     service: ServiceDep,
     rate_dps: Annotated[
-        float,
-        Query(description="True rate for which the uncertainty is computed, about one axis after the other, deg/s."),
+        list[float],
+        Query(
+            min_length=1,
+            max_length=3,
+            description="True rate for which the uncertainty is computed, deg/s: given once, about one axis after the "
+            "other, the others at rest; given three times, the rate vector about x, y and z.",
+        ),
     ],
     temperature_c: Annotated[float, Query(description="Temperature by the gyro's thermometer, deg C.")],
     grid: Annotated[
         bool, Query(description="Also compute the uncertainty on a small grid over the calibrated range.")
     ] = False,
 ) -> UncertaintyResponse:
-    """GUM components of a corrected rate at one rate and temperature, and whether that point lies in the
-    calibrated range."""
+    """GUM components of a corrected rate, or of a corrected rate vector, at one temperature, and whether that place
+    lies in the calibrated range."""
     return await while_connected(request, service, uncertainty_at, serial, version, rate_dps, temperature_c, grid=grid)
 
 

@@ -7,18 +7,32 @@ from typing import TYPE_CHECKING
 from labctl.cli.output import console, format_number, stderr, table
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.uncertainty import BudgetLineResponse, BudgetResponse, UncertaintyResponse
+    from collections.abc import Mapping
+
+    from labctl.services.schemas.uncertainty import (
+        AnyAxisUncertainty,
+        BudgetLineResponse,
+        BudgetResponse,
+        UncertaintyResponse,
+        VectorUncertainty,
+    )
 
 #: Lines that are evaluated from the recording; the others are standards, whose names say what they are.
-EVALUATED = frozenset({"coefficients", "model", "repeatability"})
+EVALUATED = frozenset({"coefficients", "model", "repeatability", "cross_rates"})
 
 
 def print_uncertainty(answer: UncertaintyResponse) -> None:
     """Print the budget of each axis, its coefficients, and what is not stated."""
-    where = f"{answer.rate_dps:g} deg/s, {answer.temperature_c:g} deg C"
+    rate = f"{answer.rate_dps:g} deg/s about this axis alone"
+    if answer.vector is not None:
+        rate = ", ".join(f"{axis} {value:g}" for axis, value in answer.vector.rates_dps.items()) + " deg/s"
+    where = f"{rate}, {answer.temperature_c:g} deg C"
     for axis, budget in answer.budget.items():
         _print_lines(f"{answer.serial} version {answer.version}, axis {axis}, corrected rate at {where}", budget)
+    if answer.vector is not None:
+        _print_covariance(answer.vector)
     _print_coefficients(answer)
+    _print_any_axis(answer.any_axis)
     if not answer.inside:
         console.print("this rate or temperature was not calibrated: the figures are extrapolated", style="yellow")
     if answer.not_stated:
@@ -52,6 +66,38 @@ def _print_lines(title: str, budget: BudgetResponse) -> None:
     for line in budget.lines:
         if line.contribution is None and line.stated:
             console.print(f"{line.source} is unknown: {line.why}", style="yellow", markup=False)
+
+
+def _print_covariance(vector: VectorUncertainty) -> None:
+    rows = table(
+        "corrected rate vector: covariance, (deg/s)^2, and U, deg/s",
+        "output", *vector.outputs, "U, frame of the case", "U, up to a rotation of the frame",
+        numbers=len(vector.outputs) + 2,
+    )  # fmt: skip
+    for axis, row in zip(vector.outputs, vector.covariance_dps2, strict=True):
+        rows.add_row(
+            axis, *(format_number(value, 2) for value in row), format_number(vector.expanded_dps[axis], 2),
+            format_number(vector.aligned_expanded_dps[axis], 2),
+        )  # fmt: skip
+    console.print(rows)
+
+
+def _print_any_axis(any_axis: Mapping[str, AnyAxisUncertainty]) -> None:
+    if not any_axis:
+        return
+    reach = next(iter(any_axis.values())).reach_dps
+    rows = table(
+        f"largest U of a corrected rate, turned about any axis up to {reach:g} deg/s",
+        "output", "U, frame of the case", "U, up to a rotation of the frame", "per deg/s across", numbers=3,
+    )  # fmt: skip
+    for axis, one in any_axis.items():
+        across = "" if one.cross_rates is None else format_number(one.cross_rates.per_dps, 3)
+        rows.add_row(axis, format_number(one.bound_dps, 2), format_number(one.aligned_bound_dps, 2), across)
+    console.print(rows)
+    reasons = [text for one in any_axis.values() for text in (one.why, one.cross_rates.why if one.cross_rates else "")]
+    for text in dict.fromkeys(reasons):
+        if text:
+            console.print(f"unknown about any axis: {text}", style="yellow", markup=False)
 
 
 def _contribution(line: BudgetLineResponse) -> str:

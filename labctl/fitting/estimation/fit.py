@@ -80,6 +80,7 @@ def fit_preset(data: FitData, preset: Preset) -> FitResult:
         valid_rates_dps(fitted, data),
         {axis: _noise_json(floor.axes[axis], solution) for axis, solution in found.solutions.items()},
         _environment(data, found.turning),
+        _mountings(data),
         residual,
         left_out_dps=_left_out_dps(fitted, data),
         joint=joint_findings(data, model, preset, found),
@@ -119,6 +120,14 @@ def _noise_json(noise: AxisNoise, solution: Solution) -> AxisNoiseJson:
         "per_rate": drift.per_rate,
         "covariance_scale": None if np.isnan(solution.scale) else solution.scale,
     }
+
+
+def _mountings(data: FitData) -> dict[str, float]:
+    """Return position -> the share of its data sets in what is known of slopes over the rate: squares of the rate."""
+    squares = data.channels.table_rate_dps() ** 2
+    shares = {position: float(squares[rows].sum()) for position, rows in data.channels.positions()}
+    whole = sum(shares.values())
+    return {position: share / whole for position, share in shares.items() if share > 0}
 
 
 def _environment(data: FitData, turning: Mapping[str, Array]) -> FitEnvironment:

@@ -35,6 +35,7 @@ class FitResult:
     rate_dps: tuple[float | None, float | None]  #: range of the true rates over all axes, deg/s; None: no limit
     noise: Mapping[str, AxisNoiseJson] = field(default_factory=dict)  #: axis -> white noise and drift, as JSON
     environment: FitEnvironment = field(default_factory=FitEnvironment)
+    mountings: Mapping[str, float] = field(default_factory=dict)  #: position -> its share in the slopes over the rate
     residual_dps: Mapping[str, Array] = field(default_factory=dict)  #: axis -> (m,) corrected minus true rate, deg/s
     poses: PosesJson | None = None  #: what a calibration by hand says beside its coefficients
     left_out_dps: Mapping[str, float] = field(default_factory=dict)  #: effect that is not exported -> its RMS, deg/s

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from labctl.fitting.uncertainty.combination import combined_u, coverage_factor, effective_freedom
+from labctl.fitting.uncertainty.combination import combined_u, coverage_factor, effective_freedom, half_width
 from labctl.json_types.budget import BudgetJson, BudgetLineJson
 
 
@@ -53,7 +53,7 @@ class Budget:
     combined: float | None  #: standard; None where a line of type A is unknown
     freedom: float | None  #: effective degrees of freedom; None: infinite
     k: float | None  #: coverage factor for 95.45 %
-    expanded: float | None  #: k times combined, and the size of the known errors that nothing corrects for
+    expanded: float | None  #: k times combined, widened for known errors that nothing corrects for (`half_width`)
 
     @property
     def not_stated(self) -> tuple[str, ...]:
@@ -88,8 +88,8 @@ def budget_of(result: str, unit: str, lines: Sequence[BudgetLine], value: float 
     combined = combined_u(np.array(sizes))
     freedom = effective_freedom(sizes, [line.freedom for line in known])
     k = coverage_factor(sizes, [line.distribution for line in known], freedom)
-    left = abs(sum(line.uncorrected for line in known))
-    return Budget(result, unit, value, tuple(lines), combined, freedom, k, k * combined + left)
+    expanded = half_width(k * combined, sum(line.uncorrected for line in known))
+    return Budget(result, unit, value, tuple(lines), combined, freedom, k, expanded)
 
 
 def without_repeatability(lines: Sequence[BudgetLine]) -> float | None:

@@ -11,9 +11,9 @@ from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.uncertainty.budget import Budget, BudgetLine, budget_of
 from labctl.fitting.uncertainty.conditions import BenchConditions
 from labctl.fitting.uncertainty.evaluated_lines import coefficient_line, model_line, repeatability_line
-from labctl.fitting.uncertainty.rate import require_law_of_rate_and_temperature
+from labctl.fitting.uncertainty.rate_vector import require_law_of_rate_and_temperature
 from labctl.fitting.uncertainty.sensitivity import coefficients_of
-from labctl.fitting.uncertainty.standard_lines import Sensitivities, no_conditions, standard_lines
+from labctl.fitting.uncertainty.standard_lines import Sensitivities, standard_lines
 from labctl.fitting.uncertainty.use import AxisEvidence
 
 
@@ -47,9 +47,9 @@ def _of_axis(
     for name, (unit, law) in known.items():
         lines: list[BudgetLine] = [coefficient_line(fitted, law, temperature_c, evidence, unit)]
         if name == "bias":
-            lines += [model_line(fitted, evidence, 0.0, temperature_c), repeatability_line(fitted, evidence)]
+            lines += [model_line(fitted, axis, evidence, {}, temperature_c), repeatability_line(fitted, evidence)]
         sensitivities = _sensitivities(name, values, law.temperature_slope(fitted, temperature_c), bench)
-        lines += standard_lines(bench, sensitivities) if bench is not None else [no_conditions()]
+        lines += [source.lines[0] for source in standard_lines(bench, sensitivities)]
         found[name] = budget_of(name, unit, lines, values[name])
     return found
 
@@ -62,11 +62,17 @@ def _sensitivities(
     One error of the time base is the same at all rates, so it is in the scale factor in full; a tilt of a mounting is a
     misalignment, and in a scale factor by the misalignments of the unit and by its cosine.
     """
+    nothing = {"relative_rate": 0.0, "rate_dps": 0.0, "angle": 0.0, "angle_squared": 0.0, "level": 0.0}
     if name == "bias":
-        return Sensitivities(0.0, 0.0, temperature, 0.0, 0.0, 1.0)
+        return Sensitivities.of_one(**nothing | {"temperature": temperature, "level": 1.0})
     gain = 1.0 + values.get("scale_factor", 0.0)
     if name != "scale_factor":
-        return Sensitivities(values[name], 0.0, temperature, gain, 0.0, 0.0)
+        mounted = bench.mountings_with(name.removeprefix("misalignment_")) if bench is not None else 1.0
+        own = {"relative_rate": values[name], "temperature": temperature, "angle": gain / math.sqrt(mounted)}
+        return Sensitivities.of_one(**nothing | own)
     across = math.hypot(*(value for other, value in values.items() if other.startswith("misalignment")))
     fastest = bench.max_rate_dps if bench is not None else None
-    return Sensitivities(gain, 1.0 / fastest if fastest else 0.0, temperature, across, gain / 2, 0.0)
+    return Sensitivities.of_one(
+        relative_rate=gain, rate_dps=1.0 / fastest if fastest else 0.0, temperature=temperature, angle=across,
+        angle_squared=gain / 2, level=0.0,
+    )  # fmt: skip

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.special import j0, ndtri, stdtrit
+from scipy.special import j0, ndtr, ndtri, stdtrit
 
 from labctl.fitting.numeric.arrays import Array
 
@@ -20,8 +20,8 @@ LEAST_SHARE = 0.1
 SMOOTHING = 0.02
 #: Nodes of that integral, and how far it goes in units of one over the normal part.
 NODES, REACH = 6000, 5.0
-#: Where the factor is looked for, and how often the interval is halved.
-LEAST_K, MOST_K, HALVINGS = 0.5, 6.0, 24
+#: Where the factor is looked for, and how exactly.
+LEAST_K, MOST_K, TOLERANCE = 0.5, 6.0, 1e-8
 
 
 def combined_u(contributions: Array, correlation: Array | None = None) -> float:
@@ -73,13 +73,31 @@ def coverage_factor(
     for share, name in zip(shares, distributions, strict=True):
         if name in _CHARACTERISTIC:
             phi = phi * _CHARACTERISTIC[name](share * t)
-    low, high = LEAST_K, MOST_K
-    for _ in range(HALVINGS):
-        k = (low + high) / 2
+
+    def excess(k: float) -> float:
         # (2/pi) times the integral of phi(t) sin(k t) / t, by the trapezoidal rule
-        inside = 2 / math.pi * float(np.sum(phi * np.sin(k * t) / t) + 0.5 * k) * float(t[0])
-        low, high = (k, high) if inside < level else (low, k)
-    return (low + high) / 2 * widening
+        return 2 / math.pi * float(np.sum(phi * np.sin(k * t) / t) + 0.5 * k) * float(t[0]) - level
+
+    from scipy.optimize import brentq
+
+    return float(brentq(excess, LEAST_K, MOST_K, xtol=TOLERANCE)) * widening
+
+
+def half_width(expanded: float, offset: float, level: float = LEVEL) -> float:
+    """Return the half width of an interval about a stated value that is off by a known, uncorrected error, in its unit.
+
+    The rest of the error is normal with an expanded uncertainty of `expanded` for the same `level`. Adding the size of
+    the known error to it (GUM F.2.4.5) would cover more: of an error that is large beside the rest only one side counts
+    (Phillips, Eberhardt and Parry 1997, J. Res. NIST 102, 577).
+    """
+    u = expanded / student_factor(None, level)
+    if offset == 0 or u == 0:
+        return expanded + abs(offset)
+    off = abs(offset) / u
+    most = off + student_factor(None, level)
+    from scipy.optimize import brentq
+
+    return u * float(brentq(lambda k: ndtr(k - off) - ndtr(-k - off) - level, off, most, xtol=TOLERANCE))
 
 
 def _rectangular(t: Array) -> Array:

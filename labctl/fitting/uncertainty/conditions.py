@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import date
 from typing import Literal
@@ -25,18 +25,31 @@ class BenchConditions:
     turn_common_u: float | None = None  #: of turns, in the coefficients already
     max_rate_dps: float | None = None
     standards: tuple[Standard, ...] = field(default_factory=tuple)
+    mountings: Mapping[str, float] = field(default_factory=dict)  #: position -> its share in the slopes over the rate
 
     def of(self, quantity: str) -> tuple[Standard, ...]:
         """Return the standards of a quantity."""
         return tuple(each for each in self.standards if each.quantity == quantity)
 
+    def mountings_with(self, axis: str) -> float:
+        """Return how many mountings the slopes along a body axis are the mean of, in effect; 1 where not stored.
+
+        Each has a fixture angle of its own. Two of equal shares count as two, one beside which the other hardly was
+        measured as little more than one.
+        """
+        shares = [share for position, share in self.mountings.items() if position.lstrip("-") == axis]
+        return sum(shares) ** 2 / sum(share**2 for share in shares) if shares else 1.0
+
     def to_json(self) -> BenchConditionsJson:
         """Return this as JSON."""
-        return {
+        found: BenchConditionsJson = {
             "used_on": self.used_on.isoformat(), "motion": self.motion, "thermometer": self.thermometer,
             "latitude_deg": self.latitude_deg, "turn_common_u": self.turn_common_u, "max_rate_dps": self.max_rate_dps,
             "stated": [each.model_dump(mode="json") for each in self.standards],  # type: ignore[misc]
         }  # fmt: skip
+        if self.mountings:
+            found["mountings"] = dict(self.mountings)
+        return found
 
     @staticmethod
     def from_json(record: BenchConditionsJson) -> BenchConditions:
@@ -44,16 +57,24 @@ class BenchConditions:
         return BenchConditions(
             date.fromisoformat(record["used_on"]), record["motion"], record["thermometer"], record["latitude_deg"],
             record["turn_common_u"], record["max_rate_dps"],
-            tuple(Standard.model_validate(each) for each in record["stated"]),
+            tuple(Standard.model_validate(each) for each in record["stated"]), record.get("mountings", {}),
         )  # fmt: skip
 
 
-def conditions_of(info: RecordingInfo, environment: FitEnvironment, used_on: Sequence[date] = ()) -> BenchConditions:
-    """Return the conditions of a fit: head of its recording, which thermometer it went by, and the recordings' days."""
+def conditions_of(
+    info: RecordingInfo,
+    environment: FitEnvironment,
+    used_on: Sequence[date] = (),
+    mountings: Mapping[str, float] | None = None,
+) -> BenchConditions:
+    """Return the conditions of a fit: head of its recording, which thermometer it went by, and the recordings' days.
+
+    `mountings` is that of the fit's result.
+    """
     thermometer: Thermometer = (
         "reference" if info.thermometer else "chamber" if "temperature" in environment else "unit"
     )
     return BenchConditions(
         max(used_on, default=info.started_at.date()), info.motion, thermometer, info.latitude_deg, info.turn_common_u,
-        info.max_rate_dps, info.standards,
+        info.max_rate_dps, info.standards, mountings or {},
     )  # fmt: skip

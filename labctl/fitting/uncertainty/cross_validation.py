@@ -39,15 +39,15 @@ def left_variance(data: FitData, preset: Preset) -> dict[str, Array]:
     outside = [_left_out(data, preset, masks, found.solutions) for masks in (by_temperature, rate_folds(data))]
     left = {}
     for axis, values in inside.items():
-        within = _within_runs(data, values)
-        products = np.stack([within * _within_runs(data, without[axis]) for without in outside])
+        within = within_runs(data, values)
+        products = np.stack([within * within_runs(data, without[axis]) for without in outside])
         known = np.isfinite(products)
         total = np.where(known, products, 0.0).sum(axis=0)
         left[axis] = np.where(known.any(axis=0), total / np.maximum(known.sum(axis=0), 1), np.nan)
     return left
 
 
-def _within_runs(data: FitData, values: Array) -> Array:
+def within_runs(data: FitData, values: Array) -> Array:
     """Return values (m,) without the mean of each powered run, where there are several: that is repeatability."""
     runs = np.asarray(data.channels["run"]) if "run" in data.channels else np.ones(len(values))
     numbers = np.unique(runs)

@@ -1,4 +1,4 @@
-"""What a calibration's document says of its uncertainty: a bound over the calibrated range, and each coefficient's."""
+"""What a calibration's document says of its uncertainty: bounds over the calibrated range, and each coefficient's."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from labctl.fitting.uncertainty.conditions import BenchConditions
 from labctl.fitting.uncertainty.grid import grid_rates, grid_temperatures
 from labctl.fitting.uncertainty.rate import RateUncertainty, rate_uncertainty
 from labctl.fitting.uncertainty.use import AxisEvidence
+from labctl.fitting.uncertainty.vector_bound import cross_rates, vector_bounds
 from labctl.json_types.budget import AxisBoundJson, ExpandedJson, UncertaintyJson
 
 
@@ -32,6 +33,10 @@ class Covered:
             return grid_rates(low, high)
         measured = [rate for one in evidence.values() for rate in one.model_error.rate_dps.tolist()]
         return grid_rates(min(measured, default=0.0), max(measured, default=0.0))
+
+    def reach_dps(self, evidence: Mapping[str, AxisEvidence]) -> float:
+        """Return the fastest rate of the grid, deg/s: the radius of the ball of rate vectors."""
+        return max(map(abs, self.rates(evidence)))
 
     def temperatures(self) -> list[float]:
         """Return the temperatures of the grid, deg C."""
@@ -52,9 +57,13 @@ def uncertainty_json(
         ]
         at_c = warm[len(warm) // 2]
         coefficients = coefficient_budgets(fitted, at_c, evidence=evidence, name=name, bench=bench)
+        reach = covered.reach_dps(evidence)
+        vectors = vector_bounds(fitted, reach, warm, evidence=evidence, name=name, bench=bench)
     except (BadInput, NotEnoughData):
         return None
     axes = {axis: _bound([(r, t, found[axis]) for r, t, found in places], coefficients[axis]) for axis in fitted.axes}
+    for axis, bound in axes.items():
+        bound["vector"], bound["cross_rates"] = vectors[axis], cross_rates(fitted, coefficients[axis])
     unstated = [source for one in axes.values() for source in one["budget"]["not_stated"]]
     return {
         "coverage": LEVEL,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.models.presets import POSES
 from labctl.fitting.uncertainty.budget import BudgetLine
@@ -37,13 +39,20 @@ def coefficient_line(
     return BudgetLine("coefficients", "fit", "A", "normal", u, unit, 1.0, u, freedom, why=why)
 
 
-def model_line(fitted: FittedModel, evidence: AxisEvidence | None, rate_dps: float, temperature_c: float) -> BudgetLine:
-    """Return the line of what the model leaves near a place, deg/s.
+def model_line(
+    fitted: FittedModel,
+    axis: str,
+    evidence: AxisEvidence | None,
+    rates_dps: Mapping[str, float],
+    temperature_c: float,
+) -> BudgetLine:
+    """Return the line of what the model leaves in one output near a rate vector, body axis -> deg/s, in deg/s.
 
     Its degrees of freedom are taken as infinite: the estimate has a floor that covers its own scatter.
     """
-    u = evidence.model_error.at(rate_dps, temperature_c) if evidence else None
-    why = evidence.model_error.unknown_at(rate_dps, temperature_c) if evidence else _lacking(fitted)
+    own, across = rates_dps.get(axis, 0.0), {name: rate for name, rate in rates_dps.items() if name != axis}
+    u = evidence.model_error.at_vector(own, across, temperature_c) if evidence else None
+    why = evidence.model_error.unknown_at_vector(own, across, temperature_c) if evidence else _lacking(fitted)
     return BudgetLine("model", "held-out data sets", "A", "normal", u, "deg/s", 1.0, u, why=why or BY_HELD_OUT)
 
 

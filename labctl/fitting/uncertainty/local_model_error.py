@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from labctl.fitting.numeric.arrays import Array
 
@@ -12,6 +14,8 @@ from labctl.fitting.numeric.arrays import Array
 NEAR_SHARE = 0.12
 #: Data sets, weighted, that a neighbourhood needs.
 LEAST_NEAR = 3.0
+#: Where fewer are near, as in a plan with one data set at each place, the neighbourhood grows by these factors in turn.
+WIDENED = (1.0, 1.5, 2.0, 3.0)
 #: Farther than this many widths from every data set nothing is known.
 FARTHEST = 2.0
 #: The least variance that is stated, as a share of the standard uncertainty of the estimate itself: a smaller one could
@@ -25,58 +29,125 @@ MOST_KEPT, TEMPERATURES = 2000, 10
 class LocalModelError:
     """Data sets of one axis, (m,) each: where they were, the variance left there, and that of the readings' noise."""
 
-    rate_dps: Array
+    rate_dps: Array  #: about the axis itself
     temperature_c: Array
     left_var: Array  #: (deg/s)^2, NaN where it is not known
     white_var: Array  #: (deg/s)^2
+    across_dps: Mapping[str, Array] = field(default_factory=dict)  #: rates about the other body axes that were turned
 
     def at(self, rate_dps: float, temperature_c: float) -> float | None:
-        """Return the standard error of the model there, deg/s, drift of the campaign included; None if unknown."""
+        """Return the standard error of the model there, deg/s, drift of the campaign included; None if unknown.
+
+        The rates about the other axes are not asked for: data sets at any of them count.
+        """
         if self.unknown_at(rate_dps, temperature_c) is not None:
             return None
-        known = np.isfinite(self.left_var)
-        weight = np.exp(-0.5 * self._away(rate_dps, temperature_c) ** 2)
+        return float(np.sqrt(self._variance(self._away(rate_dps, temperature_c))))
+
+    def at_vector(self, rate_dps: float, across_dps: Mapping[str, float], temperature_c: float) -> float | None:
+        """Return the standard error at a rate about the axis itself and rates about others, deg/s; None if unknown.
+
+        A single-axis table turns about one body axis after the other, so what the model leaves at each of these rates
+        is added: beside that of the axis itself, what a rate about another axis leaves beyond that of rest.
+        """
+        if self.unknown_at_vector(rate_dps, across_dps, temperature_c) is not None:
+            return None
+        own = self._variance(self._away(rate_dps, temperature_c))
+        turned = {axis: rate for axis, rate in across_dps.items() if rate}
+        if not turned:
+            return float(np.sqrt(own))
+        away = self._away(0.0, temperature_c)
+        rest = own if _unknown(away) else self._variance(away)
+        beyond = (self._variance(self._away_across(axis, rate, temperature_c)) - rest for axis, rate in turned.items())
+        return float(np.sqrt(own + sum(max(each, 0.0) for each in beyond)))
+
+    def _variance(self, away: Array) -> float:
+        """Return the variance left, (deg/s)^2, where the data sets with a known one are so far away, in widths."""
+        known, weight = np.isfinite(self.left_var), _weights(away)
         near = _effective_number(weight)
         weight /= weight.sum()
         left = float(weight @ self.left_var[known])
         noise = float(weight @ self.white_var[known])
         unseen = LEAST_SHARE * np.sqrt(2 / near) * max(left, noise)
-        return float(np.sqrt(max(left - noise, unseen)))
+        return float(max(left - noise, unseen))
 
     def thinned(self) -> LocalModelError:
         """Return the same with the means over groups of neighbouring data sets where there are more than are kept.
 
-        A group has neighbouring rates at neighbouring temperatures; each of its members says as much as any other.
+        A group has neighbouring rates about one body axis at neighbouring temperatures; each of its members says as
+        much as any other.
         """
         known = np.flatnonzero(np.isfinite(self.left_var))
         if len(self.left_var) <= MOST_KEPT or len(known) == 0:
             return self
+        rates = np.stack([self.rate_dps, *self.across_dps.values()])
+        about = np.argmax(np.abs(rates), axis=0)
         groups = [
             group
-            for level in np.array_split(known[np.argsort(self.temperature_c[known], kind="stable")], TEMPERATURES)
-            for group in np.array_split(
-                level[np.argsort(self.rate_dps[level], kind="stable")], MOST_KEPT // (10 * TEMPERATURES)
-            )
+            for axis in range(len(rates))
+            for level in np.array_split(_sorted(known[about[known] == axis], self.temperature_c), TEMPERATURES)
+            for group in np.array_split(_sorted(level, rates[axis]), MOST_KEPT // (10 * TEMPERATURES))
             if len(group)
         ]
-        columns = (self.rate_dps, self.temperature_c, self.left_var, self.white_var)
-        return LocalModelError(*(np.array([column[group].mean() for group in groups]) for column in columns))
+
+        def mean(column: Array) -> Array:
+            return np.array([column[group].mean() for group in groups])
+
+        return LocalModelError(
+            mean(self.rate_dps), mean(self.temperature_c), mean(self.left_var), mean(self.white_var),
+            {axis: mean(each) for axis, each in self.across_dps.items()},
+        )  # fmt: skip
 
     def unknown_at(self, rate_dps: float, temperature_c: float) -> str | None:
         """Return why the error there is unknown, in words; None where it is known."""
         away = self._away(rate_dps, temperature_c)
         if len(away) == 0:
             return "no data set could be left out of the fit: the model needs all data sets"
-        if away.min() > FARTHEST:
-            return "no data set was measured near there"
-        if _effective_number(np.exp(-0.5 * away**2)) < LEAST_NEAR:
-            return f"fewer than {LEAST_NEAR:g} data sets were measured near there"
+        return _unknown(away)
+
+    def unknown_at_vector(self, rate_dps: float, across_dps: Mapping[str, float], temperature_c: float) -> str | None:
+        """Return why the error at a rate vector is unknown, in words; None where it is known."""
+        if (why := self.unknown_at(rate_dps, temperature_c)) is not None:
+            return why
+        for axis, rate in across_dps.items():
+            if rate and not np.any(self.across_dps.get(axis, np.zeros(1))):
+                return f"the unit was not turned about {axis}"
+            if rate and (why := _unknown(self._away_across(axis, rate, temperature_c))) is not None:
+                return f"about {axis}, {why}"
         return None
 
     def _away(self, rate_dps: float, temperature_c: float) -> Array:
         """Return how far a place is from each data set whose variance is known, in widths of the neighbourhood."""
         away = np.hypot(_scaled(self.rate_dps, rate_dps), _scaled(self.temperature_c, temperature_c))
         return np.asarray(away[np.isfinite(self.left_var)])
+
+    def _away_across(self, axis: str, rate_dps: float, temperature_c: float) -> Array:
+        """Return the same for a rate about another body axis alone."""
+        along = [_scaled(rates, rate_dps if name == axis else 0.0) for name, rates in self.across_dps.items()]
+        along += [_scaled(self.rate_dps, 0.0), _scaled(self.temperature_c, temperature_c)]
+        return np.asarray(np.linalg.norm(along, axis=0)[np.isfinite(self.left_var)])
+
+
+def _unknown(away: Array) -> str | None:
+    """Return why nothing is known so far, in widths, from the data sets; None where something is."""
+    if away.min() > FARTHEST:
+        return "no data set was measured near there"
+    if _effective_number(_weights(away)) < LEAST_NEAR:
+        return f"fewer than {LEAST_NEAR:g} data sets were measured near there"
+    return None
+
+
+def _sorted(rows: NDArray[np.int64], by: Array) -> NDArray[np.int64]:
+    return rows[np.argsort(by[rows], kind="stable")]
+
+
+def _weights(away: Array) -> Array:
+    """Return the weights of data sets so far away, in widths: of the narrowest neighbourhood with enough of them."""
+    for factor in WIDENED:
+        weight = np.exp(-0.5 * (away / factor) ** 2)
+        if _effective_number(weight) >= LEAST_NEAR:
+            break
+    return np.asarray(weight)
 
 
 def _effective_number(weight: Array) -> float:

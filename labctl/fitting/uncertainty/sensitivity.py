@@ -6,6 +6,7 @@ Each has a value, a gradient along the coefficients (for their covariance) and a
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -70,16 +71,33 @@ def channels_at(axis: str, rates: dict[str, Array], n: int, temperature_c: float
     return Channels(columns, {name: rates.get(name, np.zeros(n)) for name in BODY_AXES})
 
 
-def corrected_rate(fitted: FittedModel, axis: str, rate_dps: float, temperature_c: float) -> LawFunction:
-    """Return the error of a rate about an axis, the others at rest, as it appears in the corrected rate, deg/s.
+def error_at(axis: str, rates_dps: Mapping[str, float]) -> LawFunction:
+    """Return the modelled error of one output at one rate vector, body axis -> deg/s (0 about an axis not named)."""
+    return LawFunction(axis, {name: np.array([rate]) for name, rate in rates_dps.items()}, np.ones(1))
 
-    A law in the true rate is inverted: its error counts by one over one plus its slope (GUM 5.1.3).
+
+def response(fitted: FittedModel, rates_dps: Mapping[str, float], temperature_c: float) -> Array:
+    """Return the slopes of the n outputs along the rates about x, y and z at a rate vector, (n, 3)."""
+    axes = tuple(fitted.axes)
+    slopes = np.zeros((len(axes), len(BODY_AXES)))
+    for column, turned in enumerate(BODY_AXES):
+        at = rates_dps.get(turned, 0.0)
+        ends = {name: np.full(2, rate) for name, rate in rates_dps.items()} | {turned: np.array([at, at + STEP_DPS])}
+        for row, axis in enumerate(axes):
+            error = fitted.error_dps(channels_at(axis, ends, 2, temperature_c), axis)
+            slopes[row, column] = np.diff(error)[0] / STEP_DPS + (axis == turned)
+    return slopes
+
+
+def correction_gain(fitted: FittedModel, response_of_outputs: Array) -> Array:
+    """Return how errors of the outputs appear in the corrected rates, (n, n) over the outputs in order (GUM 5.1.3).
+
+    The identity for a law of the output; a law of the true rate is inverted with the slopes of `response`, (n, 3).
     """
-    slope = 0.0
-    if fitted.model.argument == "rate":
-        here = channels_at(axis, {axis: np.array([rate_dps, rate_dps + STEP_DPS])}, 2, temperature_c)
-        slope = float(np.diff(fitted.error_dps(here, axis))[0] / STEP_DPS)
-    return LawFunction(axis, {axis: np.array([rate_dps])}, np.ones(1), abs(1.0 + slope))
+    axes = tuple(fitted.axes)
+    if fitted.model.argument != "rate":
+        return np.eye(len(axes))
+    return np.asarray(np.linalg.inv(response_of_outputs[:, [BODY_AXES.index(axis) for axis in axes]]))
 
 
 def coefficients_of(axis: str) -> dict[str, tuple[str, LawFunction]]:

@@ -6,7 +6,10 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+
 from labctl.fitting.data.earth import EARTH_RATE_DPS
+from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.uncertainty.budget import BudgetLine
 from labctl.fitting.uncertainty.conditions import BenchConditions
 from labctl.recording import Standard
@@ -22,24 +25,44 @@ NO_TIME_BASE = (
     "state the standard with u = 0"
 )
 NO_LATITUDE = "not known: latitude_deg is not stated, so the Earth's rate is part of the bias"
+SECOND = "with the second order (GUM 5.1.2, note)"
 IN_COEFFICIENTS = "in the coefficients: the fit takes turn_common_u of the recipe"
 NO_SENSITIVITY = "its sensitivity is not known: the model has no supply_sensitivity"
 
 
 @dataclass(frozen=True)
 class Sensitivities:
-    """Derivatives of a result along what a standard can be wrong by, in the unit of the result."""
+    """Derivatives of n results along what a standard can be wrong by, in their unit; (n, m) for m independent errors.
 
-    relative_rate: float  #: along a relative error of the reference rate
-    rate_dps: float  #: along an error of the reference rate, deg/s, that is the same at all rates but rest
-    temperature: float  #: per K
-    angle: float  #: per radian of the unit against the axis of rotation
-    angle_squared: float  #: per square radian: what is left where the first order vanishes
-    level: float  #: per deg/s of the Earth's rate along the table axis
+    One error that all results share has one column; the angles of the mountings have one for each of their directions.
+    """
+
+    relative_rate: Array  #: (n, 1) along a relative error of the reference rate
+    rate_dps: Array  #: (n, 1) along an error of the reference rate, deg/s, that is the same at all rates but rest
+    temperature: Array  #: (n, 1) per K
+    angle: Array  #: (n, m) per radian of a mounting against the axis of rotation
+    level: Array  #: (n, 1) per deg/s of the Earth's rate along the table axis
+    angle_squared: Array  #: (n,) per square radian: what is left where the first order vanishes
+
+    @staticmethod
+    def of_one(
+        *, relative_rate: float, rate_dps: float, temperature: float, angle: float, angle_squared: float, level: float
+    ) -> Sensitivities:
+        """Return those of a single result."""
+        own = [np.full((1, 1), each) for each in (relative_rate, rate_dps, temperature, angle, level)]
+        return Sensitivities(own[0], own[1], own[2], own[3], own[4], np.array([angle_squared]))
+
+
+@dataclass(frozen=True)
+class SourceLines:
+    """One source of uncertainty of n results: a line for each of them, and what it adds to their covariance."""
+
+    lines: tuple[BudgetLine, ...]
+    covariance: Array  #: (n, n); zero where the source is unknown
 
 
 #: Quantity and unit -> sensitivity in the unit of the result per unit of the standard; None: not known.
-_SENSITIVITY: dict[tuple[str, str], Callable[[Sensitivities, BenchConditions], float | None]] = {
+_SENSITIVITY: dict[tuple[str, str], Callable[[Sensitivities, BenchConditions], Array | None]] = {
     ("clock", "ppm"): lambda s, _: 1e-6 * s.relative_rate,
     ("table_rate", "ppm"): lambda s, _: 1e-6 * s.relative_rate,
     ("table_rate", "deg/s"): lambda s, _: s.rate_dps,
@@ -58,10 +81,20 @@ def _level_dps_per_deg(latitude_deg: float) -> float:
     return EARTH_RATE_DPS * math.cos(math.radians(latitude_deg)) * RAD_PER_DEG
 
 
-def standard_lines(bench: BenchConditions, s: Sensitivities) -> list[BudgetLine]:
-    """Return a line for each standard of the bench, and one for each quantity that should be stated and is not."""
-    stated = [_line(each, bench, s) for each in bench.standards if _matters(each.quantity, bench)]
-    return [*stated, *_missing(bench)]
+def standard_lines(bench: BenchConditions | None, s: Sensitivities) -> list[SourceLines]:
+    """Return the lines of each standard of the bench, and of each quantity that should be stated and is not.
+
+    None: an older version of labctl, which did not store the standards, made the version.
+    """
+    n = len(s.angle_squared)
+    if bench is None:
+        return [_of_all(_unknown("standards", NOT_KEPT), n)]
+    stated = [_of_standard(each, bench, s) for each in bench.standards if _matters(each.quantity, bench)]
+    return [*stated, *(_of_all(line, n) for line in _missing(bench))]
+
+
+def _of_all(line: BudgetLine, n: int) -> SourceLines:
+    return SourceLines((line,) * n, np.zeros((n, n)))
 
 
 def _matters(quantity: str, bench: BenchConditions) -> bool:
@@ -71,26 +104,55 @@ def _matters(quantity: str, bench: BenchConditions) -> bool:
     return bench.motion == "turns" if quantity == "turn_angle" else True
 
 
-def _line(standard: Standard, bench: BenchConditions, s: Sensitivities) -> BudgetLine:
-    sensitivity = _SENSITIVITY[standard.quantity, standard.unit_name](s, bench)
-    why = ""
+def _of_standard(standard: Standard, bench: BenchConditions, s: Sensitivities) -> SourceLines:
+    sensitivity, why = _sensitivity(standard, bench, s)
+    n, u = len(s.angle_squared), standard.standard_u
+    if sensitivity is None:
+        line = _line(standard, bench, None, None, why)
+        return SourceLines((line,) * n, np.zeros((n, n)))
+    second = np.zeros(n)
+    if standard.quantity in {"fixture_angle", "tilt"}:
+        second = _second_order(np.abs(s.angle_squared), RAD_PER_DEG * u)
+    covariance = u**2 * sensitivity @ sensitivity.T + np.diag(second**2)
+    lines = tuple(
+        _line(
+            standard,
+            bench,
+            _size(sensitivity[row]),
+            math.sqrt(covariance[row, row]),
+            why or SECOND * int(second[row] > 0),
+        )
+        for row in range(n)
+    )
+    return SourceLines(lines, covariance)
+
+
+def _sensitivity(standard: Standard, bench: BenchConditions, s: Sensitivities) -> tuple[Array | None, str]:
+    """Return how the results follow errors of a standard, (n, m), None where that is not known; and why it is so."""
     if standard.quantity in {"thermometer", "chamber_gradient"} and bench.thermometer == "unit":
-        sensitivity, why = 0.0, OWN_THERMOMETER
-    elif standard.quantity == "turn_angle" and bench.turn_common_u is not None:
-        sensitivity, why = 0.0, IN_COEFFICIENTS
-    elif sensitivity is None:
-        why = NO_SENSITIVITY if standard.quantity == "supply" else NO_LATITUDE
-    u = standard.standard_u
-    contribution = None if sensitivity is None else abs(sensitivity) * u
-    if standard.quantity in {"fixture_angle", "tilt"} and contribution is not None:
-        second = _second_order(abs(s.angle_squared), RAD_PER_DEG * u)
-        contribution, why = math.hypot(contribution, second), "with the second order (GUM 5.1.2, note)" * (second > 0)
+        return np.zeros_like(s.temperature), OWN_THERMOMETER
+    if standard.quantity == "turn_angle" and bench.turn_common_u is not None:
+        return np.zeros_like(s.relative_rate), IN_COEFFICIENTS
+    found = _SENSITIVITY[standard.quantity, standard.unit_name](s, bench)
+    if found is None:
+        return None, NO_SENSITIVITY if standard.quantity == "supply" else NO_LATITUDE
+    return found, ""
+
+
+def _size(sensitivity: Array) -> float:
+    """Return the sensitivity of one result (m,) along one error with its sign, along several their root sum square."""
+    return float(sensitivity[0]) if len(sensitivity) == 1 else float(np.linalg.norm(sensitivity))
+
+
+def _line(
+    standard: Standard, bench: BenchConditions, sensitivity: float | None, contribution: float | None, why: str
+) -> BudgetLine:
     return BudgetLine(
         source=standard.quantity,
         name=standard.label,
         kind="B",
         distribution="normal" if standard.half_width is None else standard.distribution,
-        u=u,
+        u=standard.standard_u,
         unit=standard.unit_name,
         sensitivity=sensitivity,
         contribution=contribution,
@@ -103,12 +165,12 @@ def _line(standard: Standard, bench: BenchConditions, s: Sensitivities) -> Budge
     )
 
 
-def _second_order(per_square_radian: float, u_rad: float) -> float:
+def _second_order(per_square_radian: Array, u_rad: float) -> Array:
     """Return the root mean square of c (a^2 + b^2) for two tilts of standard uncertainty u: what a cosine loses.
 
     Mean 2 c u^2 and standard deviation 2 c u^2 of two normal tilts; nothing corrects for the mean, so both count.
     """
-    return math.sqrt(8.0) * per_square_radian * u_rad**2
+    return np.asarray(math.sqrt(8.0) * per_square_radian * u_rad**2)
 
 
 def _missing(bench: BenchConditions) -> list[BudgetLine]:
@@ -127,11 +189,6 @@ def _missing(bench: BenchConditions) -> list[BudgetLine]:
     if bench.latitude_deg is None and bench.motion != "poses":
         lines.append(_unknown("earth_rate", NO_LATITUDE))
     return lines
-
-
-def no_conditions() -> BudgetLine:
-    """Return the line of a version whose standards are not known."""
-    return _unknown("standards", NOT_KEPT)
 
 
 _UNITS = {"standards": "", "clock": "ppm", "thermometer": "deg C", "chamber_gradient": "deg C", "earth_rate": "deg/s"}

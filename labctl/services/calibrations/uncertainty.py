@@ -2,43 +2,61 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 
 from labctl.calibration import Calibration, read_calibration
+from labctl.errors import BadInput
+from labctl.fitting.data.channels import BODY_AXES
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.numeric.blas_threads import single_threaded
+from labctl.fitting.numeric.json_numbers import none_for_nan
 from labctl.fitting.uncertainty import (
     COVERAGE,
     AxisEvidence,
     BenchConditions,
     RateUncertainty,
+    RateVectorUncertainty,
     coefficient_budgets,
+    of_budget,
     rate_uncertainty,
+    rate_vector_uncertainty,
 )
 from labctl.fitting.uncertainty.combination import LEVEL
 from labctl.fitting.uncertainty.document import Covered
 from labctl.services.calibrations.contributions import contributions_over
 from labctl.services.criticism.versions import version_of
 from labctl.services.schemas.uncertainty import (
+    AnyAxisUncertainty,
     AxisUncertainty,
     BudgetResponse,
     UncertaintyGrid,
     UncertaintyResponse,
+    VectorUncertainty,
 )
 from labctl.store import Store
 
 
 def uncertainty_at(
-    store: Store, serial: str, version: int, rate_dps: float, temperature_c: float, *, grid: bool = False
+    store: Store, serial: str, version: int, rate_dps: Sequence[float], temperature_c: float, *, grid: bool = False
 ) -> UncertaintyResponse:
-    """Return the uncertainty about each axis, with `grid` also over the validity. Raises NotFound, BadInput."""
+    """Return the uncertainty of each output, with `grid` also over the validity. Raises NotFound, BadInput.
+
+    `rate_dps` is one rate, about one axis after the other, or a rate vector about x, y and z.
+    """
     document, _ = store.calibrations.document(serial, version)
     return uncertainty_answer(read_calibration(document), rate_dps, temperature_c, grid=grid)
 
 
 def uncertainty_of_unit(
-    store: Store, serial: str, version: int | None, rate_dps: float | None, temperature_c: float | None, *, grid: bool
+    store: Store,
+    serial: str,
+    version: int | None,
+    rate_dps: Sequence[float] | None,
+    temperature_c: float | None,
+    *,
+    grid: bool,
 ) -> UncertaintyResponse:
     """Return the uncertainty of a version, or of the newest, at half of the fastest rate and the middle temperature.
 
@@ -49,7 +67,7 @@ def uncertainty_of_unit(
     rates, warm = covered.rates(_Known.of(calibration).evidence), covered.temperatures()
     return uncertainty_answer(
         calibration,
-        max(rates) / 2 if rate_dps is None else rate_dps,
+        [max(rates) / 2] if rate_dps is None else rate_dps,
         warm[len(warm) // 2] if temperature_c is None else temperature_c,
         grid=grid,
     )
@@ -57,14 +75,15 @@ def uncertainty_of_unit(
 
 @single_threaded
 def uncertainty_answer(
-    calibration: Calibration, rate_dps: float, temperature_c: float, *, grid: bool = False
+    calibration: Calibration, rate_dps: Sequence[float], temperature_c: float, *, grid: bool = False
 ) -> UncertaintyResponse:
-    """Return the uncertainty of a calibration about each axis with its budgets, with `grid` also over the validity.
+    """Return the uncertainty of a calibration's outputs with its budgets, with `grid` also over the validity.
 
     Raises BadInput, NotEnoughData.
     """
     known = _Known.of(calibration)
-    found = known.at(rate_dps, temperature_c)
+    vector = None if len(rate_dps) == 1 else known.at_vector(_vector(rate_dps), temperature_c)
+    found = known.at(rate_dps[0], temperature_c) if vector is None else known.of_vector(vector)
     coefficients = coefficient_budgets(
         known.fitted, temperature_c, evidence=known.evidence, name=known.name, bench=known.bench
     )
@@ -72,7 +91,7 @@ def uncertainty_answer(
     return UncertaintyResponse(
         serial=calibration.serial,
         version=calibration.version,
-        rate_dps=rate_dps,
+        rate_dps=math.hypot(*rate_dps) if vector is not None else rate_dps[0],
         temperature_c=temperature_c,
         coverage_factor=COVERAGE,
         coverage=LEVEL,
@@ -83,10 +102,45 @@ def uncertainty_answer(
             axis: {name: BudgetResponse.model_validate(one.to_json()) for name, one in named.items()}
             for axis, named in coefficients.items()
         },
+        vector=None if vector is None else _vector_response(vector),
+        any_axis=over_any_axis(calibration),
         not_stated=list(dict.fromkeys(name for one in budgets.values() for name in one.not_stated)),
         overdue=any(one.overdue for one in budgets.values()),
         grid=uncertainty_grid(calibration) if grid else None,
     )
+
+
+def _vector(rate_dps: Sequence[float]) -> dict[str, float]:
+    if len(rate_dps) != len(BODY_AXES):
+        raise BadInput(
+            f"rate_dps has {len(rate_dps)} numbers: give one rate in deg/s, or three, about the body axes x, y and z"
+        )
+    return dict(zip(BODY_AXES, rate_dps, strict=True))
+
+
+def _vector_response(found: RateVectorUncertainty) -> VectorUncertainty:
+    return VectorUncertainty(
+        rates_dps=dict(found.rates_dps),
+        outputs=list(found.outputs),
+        covariance_dps2=none_for_nan(found.covariance),
+        expanded_dps={axis: budget.expanded for axis, budget in found.budgets.items()},
+        aligned_covariance_dps2=none_for_nan(found.aligned_covariance),
+        aligned_expanded_dps={axis: budget.expanded for axis, budget in found.aligned_budgets.items()},
+    )
+
+
+def over_any_axis(calibration: Calibration) -> dict[str, AnyAxisUncertainty]:
+    """Return output -> its largest U over all rate vectors up to the calibrated rate, as the document states it.
+
+    Nothing where the document states none: an older version of labctl made it, or no uncertainty is defined.
+    """
+    stated = calibration.document.get("uncertainty")
+    found = {}
+    for axis, bound in stated["axes"].items() if stated is not None else ():
+        if (vector := bound.get("vector")) is not None:
+            cross = bound.get("cross_rates")
+            found[axis] = AnyAxisUncertainty.model_validate({**vector, "cross_rates": cross})
+    return found
 
 
 @single_threaded
@@ -111,10 +165,15 @@ def places_of(calibration: Calibration) -> tuple[list[float], list[float]]:
     return list(covered.rates(_Known.of(calibration).evidence)), list(covered.temperatures())
 
 
-def is_inside(calibration: Calibration, rate_dps: float, temperature_c: float) -> bool:
-    """Return whether a rate and a temperature are within the calibrated ranges."""
+def is_inside(calibration: Calibration, rate_dps: Sequence[float], temperature_c: float) -> bool:
+    """Return whether a rate or a rate vector, and a temperature, are within the calibrated ranges.
+
+    A rate vector is where no rate about any axis is faster than the fastest that was calibrated.
+    """
     (cold, warm), (slow, fast) = calibration.temperature_c, calibration.rate_dps
-    return cold <= temperature_c <= warm and slow <= rate_dps <= fast
+    if len(rate_dps) == 1:
+        return cold <= temperature_c <= warm and slow <= rate_dps[0] <= fast
+    return cold <= temperature_c <= warm and math.hypot(*rate_dps) <= max(abs(slow), abs(fast))
 
 
 @dataclass(frozen=True)
@@ -135,6 +194,14 @@ class _Known:
             None if stated is None else BenchConditions.from_json(stated),
             f"{calibration.serial} version {calibration.version}",
         )
+
+    def at_vector(self, rates_dps: Mapping[str, float], temperature_c: float) -> RateVectorUncertainty:
+        return rate_vector_uncertainty(
+            self.fitted, rates_dps, temperature_c, evidence=self.evidence, name=self.name, bench=self.bench
+        )
+
+    def of_vector(self, found: RateVectorUncertainty) -> dict[str, RateUncertainty]:
+        return {axis: of_budget(budget, self.evidence.get(axis)) for axis, budget in found.budgets.items()}
 
     def at(self, rate_dps: float, temperature_c: float) -> dict[str, RateUncertainty]:
         return rate_uncertainty(

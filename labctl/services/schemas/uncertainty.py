@@ -49,8 +49,8 @@ class BudgetResponse(ResponseModel):
     effective_degrees_of_freedom: float | None = Field(description="Welch-Satterthwaite; null: infinite.")
     k: float | None = Field(description="Coverage factor for a probability of 95.45 %.")
     expanded: float | None = Field(
-        description="Expanded uncertainty: k times `combined`, plus the magnitude of "
-        "known errors that are not corrected."
+        description="Expanded uncertainty: k times `combined`, widened so that it covers with the same probability "
+        "where known errors are not corrected."
     )
     not_stated: list[str] = Field(description="Standards that are not stated and therefore not in the result.")
     overdue: bool = Field(description="Whether a standard was past its due date when it was used.")
@@ -132,12 +132,56 @@ class UncertaintyGrid(ResponseModel):
     )
 
 
+class VectorUncertainty(ResponseModel):
+    """Uncertainty of the corrected rates at one rate vector; matrices have one row and column for each output."""
+
+    rates_dps: dict[str, float] = Field(description="True rate about each body axis, deg/s.")
+    outputs: list[str] = Field(description="Outputs in the order of the rows and columns.")
+    covariance_dps2: list[list[float | None]] = Field(
+        description="Covariance of the corrected rates in the frame of the case, (deg/s)^2; null: a contribution is "
+        "unknown."
+    )
+    expanded_dps: dict[str, float | None] = Field(
+        description="For each output: expanded uncertainty U in the frame of the case, deg/s; null: unknown."
+    )
+    aligned_covariance_dps2: list[list[float | None]] = Field(
+        description="Covariance up to a rotation of the frame, (deg/s)^2: for a unit whose axes are aligned in use, so "
+        "that the common angle of the mountings does not count."
+    )
+    aligned_expanded_dps: dict[str, float | None] = Field(
+        description="For each output: U up to a rotation of the frame, deg/s; null: unknown."
+    )
+
+
+class CrossRates(ResponseModel):
+    """What rates about axes without an output add to a corrected rate: nothing can correct it."""
+
+    about: list[str] = Field(description="Body axes without an output.")
+    per_dps: float | None = Field(
+        description="Error of the corrected rate per deg/s about these axes, in the worst direction, with the coverage "
+        "of U; null: unknown."
+    )
+    why: str = Field(description="Why it is unknown; empty where it is known.")
+
+
+class AnyAxisUncertainty(ResponseModel):
+    """Largest U of one output over all rate vectors up to the calibrated rate, about any axis."""
+
+    bound_dps: float | None = Field(description="U in the frame of the case, deg/s; null: unknown somewhere.")
+    aligned_bound_dps: float | None = Field(description="U up to a rotation of the frame, deg/s.")
+    reach_dps: float = Field(description="Largest magnitude of the rate vectors, deg/s.")
+    rates_dps: dict[str, float] = Field(description="Rate vector where U is largest, or unknown, deg/s.")
+    temperature_c: float = Field(description="Temperature there, deg C.")
+    why: str = Field(description="Why it is unknown; empty where it is known.")
+    cross_rates: CrossRates | None = Field(description="null: every body axis has an output.")
+
+
 class UncertaintyResponse(ResponseModel):
     """The uncertainty of a corrected rate on later days; the noise of a single reading is not included."""
 
     serial: str
     version: int
-    rate_dps: float
+    rate_dps: float = Field(description="The rate, deg/s; of a rate vector its magnitude.")
     temperature_c: float
     coverage_factor: float = Field(description="`expanded_dps` over `combined_dps`.")
     coverage: float = Field(description="Probability that the interval contains the true value.")
@@ -146,6 +190,14 @@ class UncertaintyResponse(ResponseModel):
     budget: dict[str, BudgetResponse] = Field(description="For each axis: the budget of the corrected rate, deg/s.")
     coefficients: dict[str, dict[str, BudgetResponse]] = Field(
         description="For each axis: the budgets of bias, scale factor and misalignments at this temperature."
+    )
+    vector: VectorUncertainty | None = Field(
+        default=None, description="null where one rate was given: about one axis after the other, the others at rest."
+    )
+    any_axis: dict[str, AnyAxisUncertainty] = Field(
+        default_factory=dict,
+        description="For each output: its largest U where the unit turns about any axis. Empty where the version does "
+        "not state it: fit it again.",
     )
     not_stated: list[str] = Field(
         description="Reference standards whose uncertainty the bench file does not "

@@ -131,6 +131,17 @@ def story(s: Any) -> np.ndarray:
     return np.concatenate(parts)
 
 
+@pytest.mark.parametrize("after_s", [0.01, 0.5, 2.0])
+def test_an_abort_soon_after_homing_moves_nothing(after_s: float) -> None:
+    table = TableMotion(28800)
+    table.start(0.0, 500_000, 3200.0, 400.0)
+    table.abort(7.0)
+    home_s = table.home(15.0)
+    assert table.abort(home_s + after_s) == home_s + after_s
+    assert not table.moving(home_s + after_s)
+    assert table.commanded_deg(np.array([home_s + after_s + 1.0]))[0] == 0.0
+
+
 @pytest.mark.parametrize("effect", sorted(hidden_defaults()))
 def test_every_effect_can_be_hidden_and_its_size_counts(stand: Make, effect: str) -> None:
     bench = "triaxial-sim"

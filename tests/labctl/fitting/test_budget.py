@@ -100,9 +100,14 @@ def test_a_line_that_is_not_stated_is_listed_and_one_of_the_fit_makes_the_result
     assert budget_of("corrected_rate", "deg/s", [line("clock", 3.0), unknown]).expanded is None
 
 
-def test_a_known_error_that_nothing_corrects_adds_to_the_expanded_uncertainty() -> None:
-    lines = [line("clock", 3.0, uncorrected=-2.0), line("thermometer", 4.0, uncorrected=0.5)]
-    assert budget_of("corrected_rate", "deg/s", lines).expanded == pytest.approx(11.5, rel=1e-4)
+@pytest.mark.parametrize("known", [0.0, -2.0, 10.0, 100.0])
+def test_u_covers_as_often_where_a_known_error_is_not_corrected(known: float) -> None:
+    lines = [line("clock", 3.0, uncorrected=known), line("thermometer", 4.0, uncorrected=0.5)]
+    expanded = budget_of("corrected_rate", "deg/s", lines).expanded
+    assert expanded is not None
+    assert 10.0 <= expanded < 10.0 + abs(known + 0.5)
+    error = np.random.default_rng(11).normal(known + 0.5, 5.0, 400_000)
+    assert np.mean(np.abs(error) <= expanded) == pytest.approx(0.9545, abs=0.0012)
 
 
 def recording_of(make_points: Callable[..., Recording], grid: Any, **info: Any) -> Recording:

@@ -84,8 +84,8 @@ def test_it_grows_outside_and_says_so(make_points: Callable[..., Recording], gri
     assert inside.combined_dps is not None
     assert outside.coefficients_dps > 3 * inside.coefficients_dps
     assert outside.model_dps is outside.expanded_dps is None  # nothing was measured near there
-    assert is_inside(calibration, 0.0, 35.0)
-    assert not is_inside(calibration, 0.0, 80.0)
+    assert is_inside(calibration, [0.0], 35.0)
+    assert not is_inside(calibration, [0.0], 80.0)
     assert inside.expanded_dps == pytest.approx(2 * inside.combined_dps)
 
 

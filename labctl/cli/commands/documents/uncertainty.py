@@ -18,11 +18,12 @@ def uncertainty(
         int | None, typer.Option("--version", metavar="N", help="Calibration version; default: the newest version.")
     ] = None,
     rate_dps: Annotated[
-        float | None,
+        str | None,
         typer.Option(
             "--rate-dps",
-            metavar="DPS",
-            help="Rate, deg/s, about one axis after the other; default: half of the largest calibrated rate.",
+            metavar="DPS|X,Y,Z",
+            help="Rate, deg/s, about one axis after the other, or a rate vector about x, y and z, such as 10,0,-80; "
+            "default: half of the largest calibrated rate.",
         ),
     ] = None,
     temperature_c: Annotated[
@@ -49,7 +50,7 @@ def uncertainty(
 
     with one_clear_line(), open_readonly(database) as store:
         answer = uncertainty_of_unit(
-            store, serial, version, rate_dps, temperature_c, grid=as_json or figure is not None
+            store, serial, version, _rates(rate_dps), temperature_c, grid=as_json or figure is not None
         )
         if figure is not None:
             write_figure(answer, figure)
@@ -61,3 +62,15 @@ def uncertainty(
     print_uncertainty(answer)
     if figure is not None:
         console.print(f"contributions -> {figure}", markup=False)
+
+
+def _rates(text: str | None) -> list[float] | None:
+    """Return one rate or three from a text; raises BadInput."""
+    from labctl.errors import BadInput
+
+    try:
+        return None if text is None else [float(part) for part in text.split(",")]
+    except ValueError:
+        raise BadInput(
+            f"--rate-dps {text!r}: give one rate in deg/s, or three about x, y and z with commas, such as 10,0,-80"
+        ) from None

@@ -1,0 +1,259 @@
+"""Uncertainty of a corrected rate vector: the covariance of the three corrected rates at any rate and temperature.
+
+The estimate v of a true rate w is off by v - w = -(dE w + db) to first order, where dE and db are the errors of the
+coefficients; they come from the fit and from the standards of the bench. A clock that is off by c gives dE = c I; a
+mounting that is off by a small rotation f gives a column f x a of dE, across its axis a and never along it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import permutations
+
+import numpy as np
+
+from labctl.errors import BadInput, NotEnoughData
+from labctl.fitting.data.channels import BODY_AXES
+from labctl.fitting.models.fitted_model import FittedModel
+from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.uncertainty.budget import Budget, BudgetLine, budget_of
+from labctl.fitting.uncertainty.conditions import BenchConditions
+from labctl.fitting.uncertainty.evaluated_lines import coefficient_line, model_line, repeatability_line
+from labctl.fitting.uncertainty.sensitivity import correction_gain, error_at, response
+from labctl.fitting.uncertainty.standard_lines import Sensitivities, SourceLines, standard_lines
+from labctl.fitting.uncertainty.use import AxisEvidence
+
+#: Largest rate, deg/s, and temperature, deg C, that are taken for a gyro's.
+LARGEST = 1e5
+#: The line of rates about body axes that have no output: nothing corrects what they add.
+CROSS_RATES = "cross_rates"
+
+
+@dataclass(frozen=True)
+class RateVectorUncertainty:
+    """Uncertainty of the corrected rates of a unit at one rate vector; noise of single readings is not included."""
+
+    rates_dps: Mapping[str, float]  #: true rate about each body axis
+    temperature_c: float
+    outputs: tuple[str, ...]
+    sources: tuple[SourceLines, ...]  #: in the frame of the case
+    aligned_sources: tuple[SourceLines, ...]  #: up to a rotation of the frame: for a unit that is aligned in use
+
+    @cached_property
+    def budgets(self) -> dict[str, Budget]:
+        """Output -> budget of its corrected rate in the frame of the case."""
+        return {axis: _budget(self.sources, row) for row, axis in enumerate(self.outputs)}
+
+    @cached_property
+    def aligned_budgets(self) -> dict[str, Budget]:
+        """Output -> budget of its corrected rate up to a rotation of the frame."""
+        return {axis: _budget(self.aligned_sources, row) for row, axis in enumerate(self.outputs)}
+
+    @property
+    def unknown(self) -> dict[str, dict[str, str]]:
+        """Output -> line of type A that is unknown -> why."""
+        return {
+            axis: {line.source: line.why for line in budget.lines if line.kind == "A" and line.contribution is None}
+            for axis, budget in self.budgets.items()
+        }
+
+    @property
+    def covariance(self) -> Array:
+        """The covariance of the corrected rates, (n, n) (deg/s)^2 over the outputs; NaN where a part is unknown."""
+        return _covariance(self.sources)
+
+    @property
+    def aligned_covariance(self) -> Array:
+        """The same up to a rotation of the frame."""
+        return _covariance(self.aligned_sources)
+
+
+def rate_vector_uncertainty(
+    fitted: FittedModel,
+    rates_dps: Mapping[str, float],
+    temperature_c: float,
+    *,
+    evidence: Mapping[str, AxisEvidence],
+    name: str,
+    bench: BenchConditions | None = None,
+) -> RateVectorUncertainty:
+    """Return the uncertainty of the corrected rates at a true rate about each body axis, deg/s (0 where not named).
+
+    It holds for use on later days. `evidence` is what the calibration's recording shows by axis (`use_evidence`); an
+    output without it is uncertain by an unknown amount. `bench` states the reference standards; None: not known. `name`
+    identifies the calibration in messages. What a rate about an axis without output adds is known to nobody who reads
+    the other outputs: it counts in full.
+    Raises BadInput for a number that no gyro measures, and where the model needs more than rate and temperature;
+    NotEnoughData where the coefficients have no uncertainty.
+    """
+    _require_numbers(rates_dps, temperature_c)
+    require_law_of_rate_and_temperature(fitted, name)
+    place = _Place(fitted, {axis: float(rates_dps.get(axis, 0.0)) for axis in BODY_AXES}, temperature_c)
+    evaluated = place.evaluated(evidence)
+    sensitivities = place.sensitivities(bench)
+    stated = standard_lines(bench, sensitivities)
+    aligned = standard_lines(bench, replace(sensitivities, angle=place.mounting_angles(bench, aligned=True)))
+    return RateVectorUncertainty(
+        place.rates_dps, temperature_c, place.outputs, (*evaluated, *stated), (*evaluated, *aligned)
+    )
+
+
+def require_law_of_rate_and_temperature(fitted: FittedModel, name: str) -> None:
+    """Raise BadInput where a model needs more than these; NotEnoughData where its coefficients have no uncertainty."""
+    if fitted.model.needs:
+        raise BadInput(
+            f"{name}: its model also needs {', '.join(fitted.model.needs)};"
+            " an uncertainty at a rate and a temperature alone is not defined; use a version whose model does "
+            "not need them"
+        )
+    if any(np.isnan(f.covariance).any() and not fitted.model.held.without_u(a) for a, f in fitted.axes.items()):
+        raise NotEnoughData(
+            f"{name} has as many coefficients as data sets: no residual is left to estimate the uncertainty from; "
+            "measure more data sets"
+        )
+
+
+def _require_numbers(rates_dps: Mapping[str, float], temperature_c: float) -> None:
+    if strange := set(rates_dps) - set(BODY_AXES):
+        raise BadInput(
+            f"rate about {', '.join(sorted(strange))}: a unit has the body axes x, y and z; name one of them"
+        )
+    numbers = [(f"rate_dps about {axis}", rate, "deg/s") for axis, rate in rates_dps.items()]
+    for what, value, unit in [*numbers, ("temperature_c", temperature_c, "deg C")]:
+        if not abs(value) <= LARGEST:  # also false for NaN
+            raise BadInput(f"{what} = {value} {unit}: give a number between {-LARGEST:g} and {LARGEST:g} {unit}")
+
+
+@dataclass(frozen=True)
+class _Place:
+    """A model at one rate vector and temperature."""
+
+    fitted: FittedModel
+    rates_dps: Mapping[str, float]
+    temperature_c: float
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        return tuple(self.fitted.axes)
+
+    @cached_property
+    def response(self) -> Array:
+        """The slopes of the outputs along the rates about x, y and z, (n, 3)."""
+        return response(self.fitted, self.rates_dps, self.temperature_c)
+
+    @cached_property
+    def gain(self) -> Array:
+        """How errors of the outputs appear in the corrected rates, (n, n)."""
+        return correction_gain(self.fitted, self.response)
+
+    def evaluated(self, evidence: Mapping[str, AxisEvidence]) -> list[SourceLines]:
+        """Return the lines that come from the recording, and that of rates which the user does not know."""
+        fitted, warm, alone = self.fitted, self.temperature_c, np.eye(len(self.outputs))
+        related = _correlation(self.outputs, evidence)
+        coefficients = [
+            coefficient_line(fitted, error_at(axis, self.rates_dps), warm, evidence.get(axis), "deg/s")
+            for axis in self.outputs
+        ]
+        model = [model_line(fitted, axis, evidence.get(axis), self.rates_dps, warm) for axis in self.outputs]
+        later = [repeatability_line(fitted, evidence.get(axis)) for axis in self.outputs]
+        found = [
+            _propagated(coefficients, related, self.gain),
+            _propagated(model, related, alone),
+            _propagated(later, alone, alone),
+        ]
+        unread = [axis for axis in BODY_AXES if axis not in self.outputs and self.rates_dps[axis]]
+        return [*found, self._cross_rates(unread)] if unread else found
+
+    def _cross_rates(self, unread: Sequence[str]) -> SourceLines:
+        read = {axis: rate for axis, rate in self.rates_dps.items() if axis not in unread}
+        added = [
+            error_at(axis, self.rates_dps).value(self.fitted, self.temperature_c)
+            - error_at(axis, read).value(self.fitted, self.temperature_c)
+            for axis in self.outputs
+        ]
+        about = " and ".join(unread)
+        why = f"the unit has no output about {about}, so the correction cannot take it off"
+        lines = tuple(
+            BudgetLine(
+                CROSS_RATES, f"rate about {about}", "B", "normal", None, "deg/s", None, 0.0, uncorrected=float(error),
+                why=why,
+            )
+            for error in self.gain @ np.array(added)
+        )  # fmt: skip
+        return SourceLines(lines, np.zeros((len(lines), len(lines))))
+
+    def sensitivities(self, bench: BenchConditions | None) -> Sensitivities:
+        """Return how the corrected rates follow errors of the bench, apart from the sign."""
+        rates = np.array([[self.rates_dps[axis]] for axis in self.outputs])
+        slopes = [error_at(a, self.rates_dps).temperature_slope(self.fitted, self.temperature_c) for a in self.outputs]
+        return Sensitivities(
+            relative_rate=rates,
+            rate_dps=np.sign(rates),
+            temperature=self.gain @ np.array(slopes)[:, None],
+            angle=self.mounting_angles(bench, aligned=False),
+            angle_squared=rates[:, 0] / 2,  # along its own axis only the cosine is lost
+            level=self.gain @ np.ones((len(rates), 1)),
+        )
+
+    def mounting_angles(self, bench: BenchConditions | None, *, aligned: bool) -> Array:
+        """Return d corrected rate / d angle of each mounting towards each other axis, (n, 6) deg/s per radian.
+
+        With axis p up, a mounting that leans towards axis r turns the unit about r as well. Output r gets a part of the
+        rate about p in its misalignment; where r has no output, the others get its part by their own misalignment.
+        `aligned` is without what a rotation of the frame takes off: of two outputs the mean of both parts is left, and
+        of the part about an axis without output nothing. Several mountings with the same axis average.
+        """
+        found = []
+        for up, towards in permutations(BODY_AXES, 2):
+            each = np.zeros(len(self.outputs))
+            if towards not in self.outputs:
+                each += self.rates_dps[up] * self.response[:, BODY_AXES.index(towards)]
+            elif not aligned:
+                each[self.outputs.index(towards)] = self.rates_dps[up]
+            elif up in self.outputs:
+                each[self.outputs.index(towards)] = self.rates_dps[up] / 2
+                each[self.outputs.index(up)] = self.rates_dps[towards] / 2
+            found.append(each / math.sqrt(bench.mountings_with(up) if bench is not None else 1.0))
+        return np.column_stack(found)
+
+
+def _budget(sources: Sequence[SourceLines], row: int) -> Budget:
+    return budget_of("corrected_rate", "deg/s", [source.lines[row] for source in sources])
+
+
+def _covariance(sources: Sequence[SourceLines]) -> Array:
+    total = np.sum([source.covariance for source in sources], axis=0)
+    for row in range(len(total)):
+        if any(source.lines[row].kind == "A" and source.lines[row].contribution is None for source in sources):
+            total[row, :] = total[:, row] = np.nan
+    return np.asarray(total)
+
+
+def _correlation(outputs: Sequence[str], evidence: Mapping[str, AxisEvidence]) -> Array:
+    """Return the correlation of the outputs' errors, (n, n), by their residuals in the fit.
+
+    Outputs that were measured together have the same noise and drift in the same data sets, so that their coefficients
+    are correlated as these are.
+    """
+    found = np.eye(len(outputs))
+    for row, axis in enumerate(outputs):
+        if axis in evidence:
+            for other, value in evidence[axis].correlation.items():
+                if other in outputs:
+                    found[row, outputs.index(other)] = value
+    return found
+
+
+def _propagated(lines: Sequence[BudgetLine], correlation: Array, gain: Array) -> SourceLines:
+    """Return lines of the outputs' errors as they are in the corrected rates (GUM eq. 16)."""
+    u = np.array([np.nan if line.u is None else line.u for line in lines])
+    known = np.nan_to_num(u)
+    covariance = gain @ (np.outer(known, known) * correlation) @ gain.T
+    found = tuple(
+        line if line.u is None else replace(line, u=float(s), contribution=float(s))
+        for line, s in zip(lines, np.sqrt(np.maximum(np.diag(covariance), 0.0)), strict=True)
+    )
+    return SourceLines(found, covariance)

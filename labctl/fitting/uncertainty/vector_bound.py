@@ -1,0 +1,86 @@
+"""The largest uncertainty of a corrected rate over all rate vectors up to the calibrated rate, whatever their axis."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from itertools import product
+
+import numpy as np
+
+from labctl.fitting.data.channels import BODY_AXES
+from labctl.fitting.models.fitted_model import FittedModel
+from labctl.fitting.uncertainty.budget import Budget
+from labctl.fitting.uncertainty.combination import half_width
+from labctl.fitting.uncertainty.conditions import BenchConditions
+from labctl.fitting.uncertainty.rate_vector import RateVectorUncertainty, rate_vector_uncertainty
+from labctl.fitting.uncertainty.use import AxisEvidence
+from labctl.json_types.budget import CrossRatesJson, VectorBoundJson
+
+#: Directions of rate vectors: along the axes, the diagonals of the faces, and those of the cube.
+DIRECTIONS = tuple(
+    tuple(part / math.sqrt(sum(map(abs, direction))) for part in direction)
+    for direction in product((-1, 0, 1), repeat=3)
+    if any(direction)
+)
+
+
+def vector_bounds(
+    fitted: FittedModel,
+    reach_dps: float,
+    temperatures_c: Sequence[float],
+    *,
+    evidence: Mapping[str, AxisEvidence],
+    name: str,
+    bench: BenchConditions | None,
+) -> dict[str, VectorBoundJson]:
+    """Return output -> where its U is largest among rate vectors of `reach_dps`, deg/s, and at rest.
+
+    U grows along each direction, so that the sphere and its centre stand for the ball. Raises what
+    `rate_vector_uncertainty` raises.
+    """
+    vectors = [dict.fromkeys(BODY_AXES, 0.0)]
+    if reach_dps:
+        vectors += [dict(zip(BODY_AXES, (reach_dps * part for part in one), strict=True)) for one in DIRECTIONS]
+    found = [
+        rate_vector_uncertainty(fitted, rates, warm, evidence=evidence, name=name, bench=bench)
+        for warm in temperatures_c
+        for rates in vectors
+    ]
+    return {axis: _bound(axis, found, reach_dps) for axis in fitted.axes}
+
+
+def _bound(axis: str, found: Sequence[RateVectorUncertainty], reach_dps: float) -> VectorBoundJson:
+    unknown = next((each for each in found if each.budgets[axis].expanded is None), None)
+    place = unknown or max(found, key=lambda each: each.budgets[axis].expanded or 0.0)
+    aligned = [each.aligned_budgets[axis].expanded or 0.0 for each in found]
+    return {
+        "bound_dps": None if unknown else place.budgets[axis].expanded,
+        "aligned_bound_dps": None if unknown else max(aligned),
+        "reach_dps": reach_dps,
+        "rates_dps": dict(place.rates_dps),
+        "temperature_c": place.temperature_c,
+        "why": "; ".join(f"{part}: {why}" for part, why in place.unknown[axis].items()),
+    }
+
+
+def cross_rates(fitted: FittedModel, coefficients: Mapping[str, Budget]) -> CrossRatesJson | None:
+    """Return what a rate about axes without an output adds to a corrected rate, per deg/s in the worst direction.
+
+    `coefficients` are the budgets of one output. The figure covers with the probability of these budgets. None where
+    every body axis has an output.
+    """
+    unread = [other for other in BODY_AXES if other not in fitted.axes]
+    if not unread:
+        return None
+    known = [coefficients.get(f"misalignment_{other}") for other in unread]
+    missing = [other for other, budget in zip(unread, known, strict=True) if budget is None or budget.expanded is None]
+    if missing:
+        why = (
+            f"the misalignment towards {' and '.join(missing)} is not known: measure the unit with this axis up too, "
+            "and fit misalignment"
+        )
+        return {"about": unread, "per_dps": None, "why": why}
+    size = math.hypot(*(budget.value or 0.0 for budget in known if budget is not None))
+    u = float(np.max([budget.expanded for budget in known if budget is not None]))
+    return {"about": unread, "per_dps": half_width(u, size), "why": ""}
