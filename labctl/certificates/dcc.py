@@ -205,6 +205,7 @@ def _results(parent: ET.Element, given: Certificate) -> None:
             table, "Error of indication", [each.error_dps for each in points], "deg/s",
             expanded=[each.expanded_dps for each in points], k=[each.k for each in points], probability=probability,
         )  # fmt: skip
+    _any_axis(parent, given)
     _state(parent, "Errors as found, before adjustment", given.as_found)
     _state(parent, "Errors as left, after adjustment", given.as_left)
     made = _result(
@@ -217,6 +218,27 @@ def _results(parent: ET.Element, given: Certificate) -> None:
         name = f"Axis {each.axis}: {each.name}{where}"
         quantity(made, name, [each.value], each.unit, u=each.u)
     _budget(parent, given)
+
+
+def _any_axis(parent: ET.Element, given: Certificate) -> None:
+    known = [each for each in given.any_axis if each.expanded_dps is not None]
+    if not known:
+        return
+    made = _result(
+        parent,
+        "Largest expanded uncertainty of a corrected rate about any axis",
+        f"Rate vectors of any direction up to {max(each.reach_dps for each in known):.6g} °/s.",
+    )
+    for each in known:
+        for frame, value in (
+            ("in the frame of the case", each.expanded_dps),
+            ("up to a rotation of the frame", each.aligned_expanded_dps),
+        ):
+            if value is not None:
+                quantity(made, f"Output {each.output}, {frame}", [value], "deg/s")
+        if each.per_dps_across is not None:
+            name = f"Output {each.output}, error per deg/s about {' and '.join(each.across)}"
+            quantity(made, name, [each.per_dps_across], "1")
 
 
 def _budget(parent: ET.Element, given: Certificate) -> None:

@@ -18,6 +18,8 @@ SCHEMA = "labctl-certificate/1"
 TITLE = "Calibration certificate"
 #: Of ILAC-G8:09/2019: 4.2.1 simple acceptance; 4.2.2 a guard band as wide as the expanded uncertainty.
 DecisionRule = Literal["simple", "guard-band"]
+#: Rotations that a statement holds for: about any axis, or about the axis of each output with the others at rest.
+Use = Literal["any axis", "own axis"]
 
 
 class Part(BaseModel):
@@ -112,6 +114,18 @@ class ResultPoint(Part):
     k: float  #: coverage factor
 
 
+class AnyAxisResult(Part):
+    """Largest U of a corrected rate where the item turns about any axis, up to a rate; None: not known, and why."""
+
+    output: str
+    reach_dps: float
+    expanded_dps: float | None  #: in the frame of the case
+    aligned_expanded_dps: float | None  #: up to a rotation of the frame: for an item that is aligned in use
+    across: tuple[str, ...] = ()  #: axes without an output
+    per_dps_across: float | None = None  #: error per deg/s about them, with the coverage of U
+    why: str = ""
+
+
 class CoefficientResult(Part):
     """A coefficient of the model, by which the output is corrected."""
 
@@ -140,7 +154,7 @@ class StateOfItem(Part):
 
 
 class Conformity(Part):
-    """A statement of conformity with the rule that it was decided by."""
+    """A statement of conformity with the rule that it was decided by, and what it holds for."""
 
     specification: str
     limit_dps: float
@@ -150,6 +164,7 @@ class Conformity(Part):
     largest_error_dps: float
     expanded_dps: float
     passed: bool
+    about: Use | None = None  #: None: issued before it was stated, when it meant the axis of each output alone
     statement: str
 
 
@@ -204,6 +219,7 @@ class Certificate(Part):
     standards: tuple[StandardUsed, ...]
     uncertainty: Uncertainty
     results: tuple[ResultPoint, ...]
+    any_axis: tuple[AnyAxisResult, ...] = ()  #: none: issued before it was stated
     coefficients: tuple[CoefficientResult, ...]
     as_found: StateOfItem
     as_left: StateOfItem

@@ -8,7 +8,14 @@ from collections.abc import Mapping, Sequence
 from decimal import Decimal
 
 from instruments.laboratory import Contact
-from labctl.certificates.document import Certificate, CoefficientResult, ResultPoint, StandardUsed, StateOfItem
+from labctl.certificates.document import (
+    AnyAxisResult,
+    Certificate,
+    CoefficientResult,
+    ResultPoint,
+    StandardUsed,
+    StateOfItem,
+)
 from labctl.certificates.units import readable
 
 #: Digits of an uncertainty (GUM 7.2.6), and of a number without one.
@@ -59,6 +66,8 @@ def _pages(given: Certificate) -> dict[str, object]:
             for each in given.uncertainty.budget
         ],
         "results": _results(given.results),
+        "any_axis": [_any_axis(each) for each in given.any_axis],
+        "any_axis_text": _any_axis_text(given),
         "states": [
             _state("As found, before adjustment", given.as_found),
             _state("As left, after adjustment", given.as_left),
@@ -191,6 +200,29 @@ def _results(points: Sequence[ResultPoint]) -> list[Mapping[str, object]]:
         }
         for axis in dict.fromkeys(point.axis for point in points)
     ]
+
+
+def _any_axis(given: AnyAxisResult) -> list[str]:
+    across = f"about {' and '.join(given.across)}: {_expanded(given.per_dps_across)}" if given.across else MINUS
+    return [given.output, _expanded(given.expanded_dps), _expanded(given.aligned_expanded_dps), across]
+
+
+def _expanded(value: float | None) -> str:
+    """Return an expanded uncertainty with two digits, rounded up."""
+    return "not known" if value is None else rounded(0.0, value)[1]
+
+
+def _any_axis_text(given: Certificate) -> str:
+    if not given.any_axis:
+        return ""
+    reach = max(each.reach_dps for each in given.any_axis)
+    unknown = "; ".join(dict.fromkeys(each.why for each in given.any_axis if each.why))
+    return (
+        "U in the results is that of a rotation about the axis of one output, the others at rest. Where the item turns "
+        f"about any axis, at up to {_number(reach)} °/s, the angles of the mountings count as well: the largest U is "
+        "given below, in the frame of the case, and up to a rotation of this frame, for an item whose axes are aligned "
+        f"in use.{f' Not known: {unknown}.' if unknown else ''}"
+    )
 
 
 def _coefficient(given: CoefficientResult) -> list[str]:

@@ -30,7 +30,7 @@ ORDER: dict[str, Any] = {
     },
     "item": {"manufacturer": "KVH", "condition": "No visible damage.", "identification": "VW-G-17"},
     "method": {"name": "rate sweep on a rate table", "deviations": "One rate was left out."},
-    "conformity": {"specification": "VW-77, 3.2", "limit_dps": 3.0, "rule": "guard-band"},
+    "conformity": {"specification": "VW-77, 3.2", "limit_dps": 3.0, "about": "own axis", "rule": "guard-band"},
 }  # fmt: skip
 
 

@@ -59,11 +59,14 @@ def assembled(
         standards=tuple(_standard(each) for each in facts.standards),
         uncertainty=uncertainty,
         results=found.results.points,
+        any_axis=found.results.any_axis,
         coefficients=measured.coefficients(facts.calibration),
         as_found=before,
         as_left=left,
         adjustment=adjustment,
-        conformity=conformity(order.conformity, left, found.results.points) if order.conformity else None,
+        conformity=None if order.conformity is None else conformity(
+            order.conformity, left, found.results.points, found.results.any_axis, found.results.left_out
+        ),
         due=act.due_at.date() if order.state_due and act.due_at else None,
         external=order.external or NONE,
         authorised=Authorisation(name=act.by, at=act.at, reason=act.reason),

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from labctl.calibration import Calibration
 from labctl.certificates.document import (
+    AnyAxisResult,
     AxisError,
     CoefficientResult,
     Condition,
@@ -25,7 +26,7 @@ from labctl.fitting.uncertainty.combination import LEVEL
 from labctl.json_types.models import Coefficients
 from labctl.recording import Recording, RecordingInfo
 from labctl.services.calibrations.surface import errors_on_grid
-from labctl.services.calibrations.uncertainty import places_of, uncertainty_of
+from labctl.services.calibrations.uncertainty import over_any_axis, places_of, uncertainty_of
 from labctl.services.criticism.measurements import Measurements
 from labctl.services.criticism.verification.of_version import applied_errors
 from labctl.store import CalibrationRecord, RecordingRow, Store
@@ -50,6 +51,7 @@ class Results:
     uncertainty: Uncertainty | None = None  #: where U is largest; None: there is no result
     unknown: Mapping[tuple[str, str], int] = field(default_factory=dict)
     axes_without: frozenset[str] = frozenset()
+    any_axis: tuple[AnyAxisResult, ...] = ()
 
     def missing(self) -> Iterator[tuple[str, str]]:
         """Yield the parts of U that are not known, where an axis has no result without them."""
@@ -114,7 +116,20 @@ def results(store: Store, row: CalibrationRecord, calibration: Calibration) -> R
     points = tuple(point for point, _ in found)
     largest = max(found, key=lambda each: each[0].expanded_dps, default=None)
     without = frozenset(calibration.axes) - {point.axis for point in points}
-    return Results(points, None if largest is None else _largest(*largest), unknown, without)
+    return Results(points, None if largest is None else _largest(*largest), unknown, without, _any_axis(calibration))
+
+
+def _any_axis(calibration: Calibration) -> tuple[AnyAxisResult, ...]:
+    """Return the largest U of each output where the item turns about any axis."""
+    return tuple(
+        AnyAxisResult(
+            output=output, reach_dps=found.reach_dps, expanded_dps=found.bound_dps,
+            aligned_expanded_dps=found.aligned_bound_dps,
+            across=() if found.cross_rates is None else tuple(found.cross_rates.about),
+            per_dps_across=None if found.cross_rates is None else found.cross_rates.per_dps, why=found.why,
+        )
+        for output, found in over_any_axis(calibration).items()
+    )  # fmt: skip
 
 
 def _largest(point: ResultPoint, budget: Budget) -> Uncertainty:

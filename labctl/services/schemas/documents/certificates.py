@@ -7,7 +7,7 @@ from datetime import date, datetime
 from pydantic import Field
 
 from instruments.laboratory import LINE, Laboratory
-from labctl.certificates.document import Customer, DecisionRule
+from labctl.certificates.document import Customer, DecisionRule, Use
 from labctl.services.schemas.base import Request, ResponseModel
 
 TEXT = 2000
@@ -46,6 +46,11 @@ class OrderedConformity(Request):
 
     specification: str = Field(min_length=1, pattern=LINE)
     limit_dps: float = Field(gt=0, allow_inf_nan=False, description="Largest permitted error of a corrected rate.")
+    about: Use = Field(
+        default="any axis",
+        description="Rotations that the statement holds for. any axis: rate vectors of any direction up to the "
+        "calibrated rate; own axis: rotation about the axis of each output, the others at rest.",
+    )
     rule: DecisionRule = Field(
         description="simple: pass up to the limit; guard-band: pass up to the limit less the expanded uncertainty."
     )
