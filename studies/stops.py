@@ -135,10 +135,9 @@ def ask(service: Service, way: str, campaign: int) -> float | None:
 
 
 def _ask_by_signal(service: Service, _campaign: int) -> bool:
-    try:
-        os.kill(service.pids["supervisor"], signal.SIGTERM)
-    except ProcessLookupError:
+    if service.process.poll() is not None:  # a shell says that there is no such process
         return True
+    os.kill(service.pids["supervisor"], signal.SIGTERM)
     until_s = time.monotonic() + SAID_S
     while time.monotonic() < until_s:
         if service.say_not_stopped():

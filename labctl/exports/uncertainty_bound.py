@@ -1,29 +1,49 @@
-"""What a file of a calibration says of its uncertainty: the largest U over the calibrated range, by axis."""
+"""What a file of a calibration says of its uncertainty: the largest U over the calibrated range, by output."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
 from labctl.calibration import Calibration
-from labctl.json_types.budget import UncertaintyJson
+from labctl.json_types.budget import UncertaintyJson, VectorBoundJson
 
 
 def bounds_dps(calibration: Calibration) -> dict[str, float | None]:
-    """Return axis -> the largest expanded uncertainty over the calibrated range, deg/s; None: unknown."""
+    """Return axis -> the largest expanded uncertainty over the calibrated range, deg/s; None: unknown.
+
+    It is that of a rotation about the axis itself, the others at rest.
+    """
     found = _of(calibration)
     return {axis: None if found is None else found["axes"][axis]["bound_dps"] for axis in calibration.axes}
 
 
+def any_axis_bounds_dps(calibration: Calibration) -> dict[str, float | None]:
+    """Return axis -> the largest expanded uncertainty where the unit turns about any axis, deg/s; None: unknown.
+
+    It holds in the frame of the case.
+    """
+    return {axis: None if one is None else one["bound_dps"] for axis, one in _vectors(calibration).items()}
+
+
+def _vectors(calibration: Calibration) -> dict[str, VectorBoundJson | None]:
+    found = _of(calibration)
+    return {axis: None if found is None else found["axes"][axis].get("vector") for axis in calibration.axes}
+
+
 def bound_lines(calibration: Calibration) -> list[str]:
-    """Return the lines of a comment: U of each axis, and the standards that are not in it."""
+    """Return the lines of a comment: U of each axis, alone and turned about any axis, and standards not in it."""
     found, bounds = _of(calibration), bounds_dps(calibration)
-    known = ", ".join(f"{axis} {_at_least(bound):g} deg/s" for axis, bound in bounds.items() if bound is not None)
-    unknown = ", ".join(axis for axis, bound in bounds.items() if bound is None)
+    known = _listed(bounds)
     lines = []
     if known:
-        lines.append(f"Expanded uncertainty U (95.45 %) of a corrected rate on later days, at most: {known}.")
-    if unknown:
-        lines.append(f"Uncertainty of a corrected rate: unknown for {unknown}.")
+        lines.append(
+            "Expanded uncertainty U (95.45 %) of a corrected rate on later days, about its own axis alone, at most: "
+            f"{known}."
+        )
+    if unknown := [axis for axis, bound in bounds.items() if bound is None]:
+        lines.append(f"Uncertainty of a corrected rate: unknown for {', '.join(unknown)}.")
+    lines += _any_axis_lines(calibration)
     if known and found is not None and found["not_stated"]:
         lines.append(
             f"Uncertainties that the bench does not state, and that U does not contain: "
@@ -32,10 +52,45 @@ def bound_lines(calibration: Calibration) -> list[str]:
     return lines
 
 
+def _any_axis_lines(calibration: Calibration) -> list[str]:
+    vectors, bounds = _vectors(calibration), any_axis_bounds_dps(calibration)
+    lines = []
+    if known := _listed(bounds):
+        reach = max(one["reach_dps"] for one in vectors.values() if one is not None)
+        aligned = _listed({axis: one and one["aligned_bound_dps"] for axis, one in vectors.items()})
+        lines.append(
+            f"U turned about any axis at up to {reach:.4g} deg/s, in the frame of the case, at most: {known}; up to a "
+            f"rotation of the frame: {aligned}."
+        )
+    if unknown := [axis for axis, bound in bounds.items() if bound is None]:
+        lines.append(f"U turned about any axis: unknown for {', '.join(unknown)}.")
+    for axis in calibration.axes:
+        found = _of(calibration)
+        cross = None if found is None else found["axes"][axis].get("cross_rates")
+        if cross is not None and cross["per_dps"] is not None:
+            about = " and ".join(cross["about"])
+            lines.append(f"A rate about {about} adds up to {_at_least(cross['per_dps']):g} of it to {axis}.")
+    return lines
+
+
+def _listed(bounds: Mapping[str, float | None]) -> str:
+    return ", ".join(f"{axis} {_at_least(bound):g} deg/s" for axis, bound in bounds.items() if bound is not None)
+
+
 def bound_constant(name: str, calibration: Calibration) -> str:
-    """Return the C constant `<name>_u_dps`, deg/s by axis; NAN where it is unknown."""
-    numbers = ["NAN" if bound is None else f"{_at_least(bound):g}" for bound in bounds_dps(calibration).values()]
-    return f"static const double {name}_u_dps[{len(numbers)}] = {{{', '.join(numbers)}}};\n"
+    """Return the C constants of U, deg/s by axis; NAN where it is unknown.
+
+    `<name>_u_dps` is that of a rotation about the axis itself, `<name>_u_any_axis_dps` about any axis.
+    """
+    given = {"u": bounds_dps(calibration), "u_any_axis": any_axis_bounds_dps(calibration)}
+    return "".join(
+        f"static const double {name}_{what}_dps[{len(bounds)}] = {{{', '.join(map(_c_number, bounds.values()))}}};\n"
+        for what, bounds in given.items()
+    )
+
+
+def _c_number(bound: float | None) -> str:
+    return "NAN" if bound is None else f"{_at_least(bound):g}"
 
 
 def _of(calibration: Calibration) -> UncertaintyJson | None:

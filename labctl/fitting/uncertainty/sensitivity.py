@@ -97,7 +97,8 @@ def correction_gain(fitted: FittedModel, response_of_outputs: Array) -> Array:
     axes = tuple(fitted.axes)
     if fitted.model.argument != "rate":
         return np.eye(len(axes))
-    return np.asarray(np.linalg.inv(response_of_outputs[:, [BODY_AXES.index(axis) for axis in axes]]))
+    own = response_of_outputs[:, [BODY_AXES.index(axis) for axis in axes]]
+    return np.asarray(np.linalg.inv(own), dtype=np.float64)
 
 
 def coefficients_of(axis: str) -> dict[str, tuple[str, LawFunction]]:

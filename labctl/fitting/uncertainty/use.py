@@ -109,7 +109,9 @@ def _correlation(residual_dps: Mapping[str, Array]) -> dict[str, dict[str, float
         known = np.isfinite(residual_dps[one]) & np.isfinite(residual_dps[other])
         pair = np.array([residual_dps[one][known], residual_dps[other][known]])
         if np.all(np.ptp(pair, axis=1) > 0):
-            found[one][other] = float(np.corrcoef(pair)[0, 1])
+            centred = pair - pair.mean(axis=1, keepdims=True)
+            product, squares = centred[0] @ centred[1], (centred**2).sum(axis=1)
+            found[one][other] = float(product / np.sqrt(squares[0] * squares[1]))
     return found
 
 

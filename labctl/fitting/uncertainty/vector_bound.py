@@ -6,8 +6,6 @@ import math
 from collections.abc import Mapping, Sequence
 from itertools import product
 
-import numpy as np
-
 from labctl.fitting.data.channels import BODY_AXES
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.uncertainty.budget import Budget
@@ -39,9 +37,10 @@ def vector_bounds(
     U grows along each direction, so that the sphere and its centre stand for the ball. Raises what
     `rate_vector_uncertainty` raises.
     """
-    vectors = [dict.fromkeys(BODY_AXES, 0.0)]
-    if reach_dps:
-        vectors += [dict(zip(BODY_AXES, (reach_dps * part for part in one), strict=True)) for one in DIRECTIONS]
+    directions = ((0.0, 0.0, 0.0), *DIRECTIONS) if reach_dps else ((0.0, 0.0, 0.0),)
+    vectors: list[Mapping[str, float]] = [
+        {axis: reach_dps * part for axis, part in zip(BODY_AXES, one, strict=True)} for one in directions
+    ]
     found = [
         rate_vector_uncertainty(fitted, rates, warm, evidence=evidence, name=name, bench=bench)
         for warm in temperatures_c
@@ -73,14 +72,13 @@ def cross_rates(fitted: FittedModel, coefficients: Mapping[str, Budget]) -> Cros
     unread = [other for other in BODY_AXES if other not in fitted.axes]
     if not unread:
         return None
-    known = [coefficients.get(f"misalignment_{other}") for other in unread]
-    missing = [other for other, budget in zip(unread, known, strict=True) if budget is None or budget.expanded is None]
-    if missing:
+    known = {other: coefficients.get(f"misalignment_{other}") for other in unread}
+    expanded = {other: budget.expanded for other, budget in known.items() if budget is not None and budget.expanded}
+    if missing := [other for other in unread if other not in expanded]:
         why = (
             f"the misalignment towards {' and '.join(missing)} is not known: measure the unit with this axis up too, "
             "and fit misalignment"
         )
         return {"about": unread, "per_dps": None, "why": why}
-    size = math.hypot(*(budget.value or 0.0 for budget in known if budget is not None))
-    u = float(np.max([budget.expanded for budget in known if budget is not None]))
-    return {"about": unread, "per_dps": half_width(u, size), "why": ""}
+    size = math.hypot(*(budget.value or 0.0 for budget in known.values() if budget is not None))
+    return {"about": unread, "per_dps": half_width(max(expanded.values()), size), "why": ""}

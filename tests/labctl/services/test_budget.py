@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -89,7 +90,10 @@ def test_exported_files_state_the_bound(client: TestClient) -> None:
     line = next(line for line in header.splitlines() if "_u_dps[" in line)
     stated = float(line.partition("{")[2].partition("}")[0])
     assert bound <= stated <= 1.1 * bound
-    assert f"Expanded uncertainty U (95.45 %) of a corrected rate on later days, at most: z {stated:g} deg/s." in header
+    said = "Expanded uncertainty U (95.45 %) of a corrected rate on later days, about its own axis alone, at most"
+    assert f"{said}: z {stated:g} deg/s." in header
+    assert "U turned about any axis: unknown for z." in header  # it was turned about z alone
+    assert re.search(r"_u_any_axis_dps\[1\] = \{NAN\};", header)
 
 
 def test_the_figure_draws_every_contribution_as_served(client: TestClient) -> None:
