@@ -148,7 +148,10 @@ class Bench:
         if way == "signal":
             if not self.serves:
                 raise NoAnswer
-            os.kill(self.supervisor.pid, signal.SIGTERM)  # one that ended since then is not reaped yet
+            try:
+                os.kill(self.supervisor.pid, signal.SIGTERM)
+            except ProcessLookupError as error:
+                raise NoAnswer from error
             return None
         if way == "page":
             url = f"{self.url}/api/campaigns/{max(self.campaign, 1)}/abort"

@@ -140,7 +140,7 @@ def _ask_by_signal(service: Service, _campaign: int) -> bool:
     os.kill(service.pids["supervisor"], signal.SIGTERM)
     until_s = time.monotonic() + SAID_S
     while time.monotonic() < until_s:
-        if service.say_not_stopped():
+        if service.say_not_stopped() or service.process.poll() == -signal.SIGKILL:  # the shell says "Killed"
             return True
         time.sleep(0.1)
     return False

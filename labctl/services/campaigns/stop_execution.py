@@ -52,8 +52,7 @@ class StopExecution:
         if job is not None and stop.campaign not in {None, job.row.id}:
             return NotHere(_another(job, stop), stands=False)
         if job is None:
-            if stop.campaign is None:
-                self._latch.remember(stop)
+            self._latch.remember(stop)  # also that of a campaign that has ended: a start asked for before it waits here
             return IdleStop(lambda: self._idle(stop))
         self.requested = stop = replace(stop, campaign=job.row.id)
         job.control.abort(stop.reason)

@@ -36,11 +36,12 @@ def runner(store: Store) -> Iterator[BenchRunner]:
 class StoppedBefore:
     """A lock with a stop before it: a caller gets the lock when the stop was carried out."""
 
-    def __init__(self, runner: BenchRunner) -> None:
-        self._runner, self._lock = runner, runner._guard
+    def __init__(self, runner: BenchRunner, campaign: int | None) -> None:
+        self._runner, self._lock, self._campaign = runner, runner._guard, campaign
 
     def __enter__(self) -> None:
-        stopping = self._runner.stops.request(StopRequest.new("Ada", "command line", "a hand in the bench (Ada)"))
+        asked = StopRequest.new("Ada", "command line", "a hand in the bench (Ada)", self._campaign)
+        stopping = self._runner.stops.request(asked)
         assert stopping.is_over(WAIT_S)
         self._lock.acquire()
 
@@ -62,15 +63,16 @@ def resume(runner: BenchRunner) -> object:
     return runner.resume(1, ResumeRequest(by="Bob"))
 
 
+@pytest.mark.parametrize("campaign", [None, 1])  # 1 has ended: its page still shows the button
 @pytest.mark.parametrize("move", [start, resume])
 def test_what_was_asked_before_a_stop_does_not_take_it_back(
-    runner: BenchRunner, store: Store, move: Callable[[BenchRunner], object]
+    runner: BenchRunner, store: Store, move: Callable[[BenchRunner], object], campaign: int | None
 ) -> None:
     start(runner)
     runner.stops.request(StopRequest.new("Eve", "key", "earlier", 1))
     finish(runner)
     lock = runner._guard
-    runner._guard = StoppedBefore(runner)  # type: ignore[assignment]
+    runner._guard = StoppedBefore(runner, campaign)  # type: ignore[assignment]
     with pytest.raises(BenchBusy, match=r"was stopped \(a hand in the bench \(Ada\)\) after this was asked for"):
         move(runner)
     runner._guard = lock
