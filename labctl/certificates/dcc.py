@@ -211,11 +211,13 @@ def _results(parent: ET.Element, given: Certificate) -> None:
     made = _result(
         parent,
         "Coefficients of the correction",
-        "Of the error model that the method names; standard uncertainties are those of the fit alone.",
+        "Of the error model that the method names; standard uncertainties contain the standards of the bench, or are "
+        "those of the fit alone where the name says so.",
     )
     for each in given.coefficients:
         where = "" if each.temperature_c is None else f" at {each.temperature_c:g} °C"
-        name = f"Axis {each.axis}: {each.name}{where}"
+        alone = "" if each.has_standards or each.u is None else ", u of the fit alone"
+        name = f"Axis {each.axis}: {each.name}{where}{alone}"
         quantity(made, name, [each.value], each.unit, u=each.u)
     _budget(parent, given)
 

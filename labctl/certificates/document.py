@@ -133,8 +133,9 @@ class CoefficientResult(Part):
     name: str
     temperature_c: float | None  #: of a node of a temperature table
     value: float
-    u: float | None  #: standard uncertainty of the fit alone; None: not known
+    u: float | None  #: standard uncertainty; None: not known
     unit: str
+    has_standards: bool = False  #: whether u contains the standards of the bench; else it is that of the fit alone
 
 
 class AxisError(Part):

@@ -28,6 +28,8 @@ PLACES = {
     "other": "at another place",
 }
 MINUS = "−"
+#: Marks a standard uncertainty without the standards of the bench.
+FIT_ALONE = " *"
 
 
 def readable_certificate(given: Certificate) -> bytes:
@@ -228,7 +230,8 @@ def _any_axis_text(given: Certificate) -> str:
 def _coefficient(given: CoefficientResult) -> list[str]:
     value, u = rounded(given.value, given.u or 0.0)
     warm = "" if given.temperature_c is None else _number(given.temperature_c)
-    return [given.axis, given.name.replace("_", " "), warm, value, u, readable(given.unit)]
+    of_fit = "" if given.has_standards or u == "–" else FIT_ALONE
+    return [given.axis, given.name.replace("_", " "), warm, value, u + of_fit, readable(given.unit)]
 
 
 def _state(title: str, given: StateOfItem) -> Mapping[str, object]:

@@ -9,6 +9,7 @@ import numpy as np
 from labctl.fitting.data.covered import Covered
 from labctl.fitting.data.earth import turning_size_dps, up_rate_dps
 from labctl.fitting.data.fit_data import FitData, fit_data_of
+from labctl.fitting.data.mountings import mountings_of
 from labctl.fitting.data.noise_floor import AxisNoise
 from labctl.fitting.data.temperature.channel import is_chambers
 from labctl.fitting.data.temperature.history import TemperatureHistory
@@ -80,10 +81,10 @@ def fit_preset(data: FitData, preset: Preset) -> FitResult:
         valid_rates_dps(fitted, data),
         {axis: _noise_json(floor.axes[axis], solution) for axis, solution in found.solutions.items()},
         _environment(data, found.turning),
-        _mountings(data),
         residual,
         left_out_dps=_left_out_dps(fitted, data),
         joint=joint_findings(data, model, preset, found),
+        mountings=mountings_of(data.channels),
     )
 
 
@@ -120,14 +121,6 @@ def _noise_json(noise: AxisNoise, solution: Solution) -> AxisNoiseJson:
         "per_rate": drift.per_rate,
         "covariance_scale": None if np.isnan(solution.scale) else solution.scale,
     }
-
-
-def _mountings(data: FitData) -> dict[str, float]:
-    """Return position -> the share of its data sets in what is known of slopes over the rate: squares of the rate."""
-    squares = data.channels.table_rate_dps() ** 2
-    shares = {position: float(squares[rows].sum()) for position, rows in data.channels.positions()}
-    whole = sum(shares.values())
-    return {position: share / whole for position, share in shares.items() if share > 0}
 
 
 def _environment(data: FitData, turning: Mapping[str, Array]) -> FitEnvironment:

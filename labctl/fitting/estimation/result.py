@@ -35,11 +35,11 @@ class FitResult:
     rate_dps: tuple[float | None, float | None]  #: range of the true rates over all axes, deg/s; None: no limit
     noise: Mapping[str, AxisNoiseJson] = field(default_factory=dict)  #: axis -> white noise and drift, as JSON
     environment: FitEnvironment = field(default_factory=FitEnvironment)
-    mountings: Mapping[str, float] = field(default_factory=dict)  #: position -> its share in the slopes over the rate
     residual_dps: Mapping[str, Array] = field(default_factory=dict)  #: axis -> (m,) corrected minus true rate, deg/s
     poses: PosesJson | None = None  #: what a calibration by hand says beside its coefficients
     left_out_dps: Mapping[str, float] = field(default_factory=dict)  #: effect that is not exported -> its RMS, deg/s
     joint: JointJson | None = None  #: what several recordings say together; None for a single one
+    mountings: Mapping[str, float] = field(default_factory=dict)  #: position -> its share in the slopes over the rate
 
     def exported(self) -> tuple[FittedModel, list[LeftOut]]:
         """Return the part of the model that belongs to the unit, and what was left out, with its size."""

@@ -84,8 +84,8 @@ def rate_vector_uncertainty(
 
     It holds for use on later days. `evidence` is what the calibration's recording shows by axis (`use_evidence`); an
     output without it is uncertain by an unknown amount. `bench` states the reference standards; None: not known. `name`
-    identifies the calibration in messages. What a rate about an axis without output adds is known to nobody who reads
-    the other outputs: it counts in full.
+    identifies the calibration in messages. What a rate about an axis without output adds is not known from the other
+    outputs, so it counts in full.
     Raises BadInput for a number that no gyro measures, and where the model needs more than rate and temperature;
     NotEnoughData where the coefficients have no uncertainty.
     """

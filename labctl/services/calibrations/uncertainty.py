@@ -16,6 +16,7 @@ from labctl.fitting.uncertainty import (
     COVERAGE,
     AxisEvidence,
     BenchConditions,
+    Budget,
     RateUncertainty,
     RateVectorUncertainty,
     coefficient_budgets,
@@ -157,6 +158,12 @@ def uncertainty_grid(calibration: Calibration) -> UncertaintyGrid:
 def uncertainty_of(calibration: Calibration, rate_dps: float, temperature_c: float) -> dict[str, RateUncertainty]:
     """Return axis -> the uncertainty of a calibration's corrected rate. Raises BadInput, NotEnoughData."""
     return _Known.of(calibration).at(rate_dps, temperature_c)
+
+
+def coefficients_at(calibration: Calibration, temperature_c: float) -> dict[str, dict[str, Budget]]:
+    """Return axis -> coefficient -> its budget at a temperature. Raises BadInput, NotEnoughData."""
+    known = _Known.of(calibration)
+    return coefficient_budgets(known.fitted, temperature_c, evidence=known.evidence, name=known.name, bench=known.bench)
 
 
 def places_of(calibration: Calibration) -> tuple[list[float], list[float]]:

@@ -20,18 +20,21 @@ from labctl.certificates.document import (
     StateOfItem,
     Uncertainty,
 )
+from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.uncertainty.budget import Budget
 from labctl.fitting.uncertainty.combination import LEVEL
 from labctl.json_types.models import Coefficients
 from labctl.recording import Recording, RecordingInfo
 from labctl.services.calibrations.surface import errors_on_grid
-from labctl.services.calibrations.uncertainty import over_any_axis, places_of, uncertainty_of
+from labctl.services.calibrations.uncertainty import coefficients_at, over_any_axis, places_of, uncertainty_of
 from labctl.services.criticism.measurements import Measurements
 from labctl.services.criticism.verification.of_version import applied_errors
 from labctl.store import CalibrationRecord, RecordingRow, Store
 
 Array = NDArray[np.float64]
+#: A coefficient is the quantity of a budget where both have this value, relative; the budget's is a derivative.
+SAME_VALUE = 1e-6
 #: Columns of a recording that are conditions, as a certificate names them, and their units.
 CONDITIONS: Mapping[str, tuple[str, str]] = {
     "chamber_c": ("Temperature of the chamber air", "°C"),
@@ -149,8 +152,14 @@ def _largest(point: ResultPoint, budget: Budget) -> Uncertainty:
 
 
 def coefficients(calibration: Calibration) -> tuple[CoefficientResult, ...]:
-    """Return each coefficient with its standard uncertainty by the fit; of a temperature table at each of its nodes."""
+    """Return each coefficient with its standard uncertainty; of a temperature table at each of its nodes.
+
+    It is that of the coefficient's budget, with the standards of the bench, for the bias at one temperature, the scale
+    factor and the misalignments; of every other coefficient that of the fit alone.
+    """
     tables: Mapping[str, Coefficients] = calibration.document["coefficients"]
+    reference_c = calibration.fitted.model.reference.temperature_c
+    budgets = _Budgets(calibration)
     found: list[CoefficientResult] = []
     for axis, table in tables.items():
         nodes = table.get("temperature_c")
@@ -161,14 +170,34 @@ def coefficients(calibration: Calibration) -> tuple[CoefficientResult, ...]:
             values, u = entry["value"], entry["u"]
             listed = values if isinstance(values, list) else [values]
             u_listed = u if isinstance(u, list) else [u]
-            found += [
-                CoefficientResult(
-                    axis=axis, name=name, temperature_c=where, value=value, unit=entry["unit"],
-                    u=one,
-                )
-                for where, value, one in zip(at, listed, u_listed, strict=True)
-            ]  # fmt: skip
+            for where, value, of_fit in zip(at, listed, u_listed, strict=True):
+                whole = budgets.u_of(axis, name, value, reference_c if where is None else where)
+                found.append(
+                    CoefficientResult(
+                        axis=axis, name=name, temperature_c=where, value=value, unit=entry["unit"],
+                        u=of_fit if whole is None else whole, has_standards=whole is not None,
+                    )
+                )  # fmt: skip
     return tuple(found)
+
+
+class _Budgets:
+    """Budgets of a calibration's coefficients, at each temperature computed once."""
+
+    def __init__(self, calibration: Calibration) -> None:
+        self._calibration = calibration
+        self._at: dict[float, dict[str, dict[str, Budget]]] = {}
+
+    def u_of(self, axis: str, name: str, value: float, temperature_c: float) -> float | None:
+        """Return the combined standard uncertainty of a coefficient; None where no budget is of this quantity."""
+        if temperature_c not in self._at:
+            try:
+                self._at[temperature_c] = coefficients_at(self._calibration, temperature_c)
+            except (BadInput, NotEnoughData):  # its model needs more, or its fit has no uncertainty
+                self._at[temperature_c] = {}
+        budget = self._at[temperature_c].get(axis, {}).get(name)
+        same = budget is not None and np.isclose(budget.value or 0.0, value, rtol=SAME_VALUE, atol=SAME_VALUE**2)
+        return budget.combined if budget is not None and same else None
 
 
 def uncorrected(measured: Measurements, axes: tuple[str, ...]) -> StateOfItem:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -21,8 +22,10 @@ from labctl.fitting.characteristics.scale_factor import (
     straight_line,
 )
 from labctl.fitting.data.fit_data import FitData
+from labctl.fitting.data.mountings import mountings_of
 from labctl.fitting.data.temperature.levels import level_means
 from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.uncertainty import BenchConditions, conditions_of
 
 #: Figures at one temperature are at the level nearest to this, deg C.
 USUAL_C = 25.0
@@ -52,6 +55,7 @@ class _Columns:
     position: NDArray[np.str_]
     run: NDArray[np.int64]
     table_dps: Array
+    bench: BenchConditions  #: the stated standards
 
     @property
     def usual(self) -> int:
@@ -90,7 +94,7 @@ def _columns(data: FitData) -> _Columns:
     position = np.asarray(data.channels["position"]).astype(np.str_)
     return _Columns(
         data, level, np.asarray(level_means(data.temperature_c, level)), position, np.asarray(run, dtype=np.int64),
-        data.channels.table_rate_dps(),
+        data.channels.table_rate_dps(), conditions_of(data.info, {}, mountings=mountings_of(data.channels)),
     )  # fmt: skip
 
 
@@ -101,7 +105,7 @@ def _of_rates(seen: _Columns, axis: str) -> Iterator[Figure]:
     line = seen.line(axis, here)
     if line is None:
         return
-    yield Figure("scale_factor", axis, line.scale_factor, here)
+    yield Figure("scale_factor", axis, _with(line.scale_factor, line.scale_factor.value * seen.bench.rate_u()), here)
     yield Figure("bias", axis, line.bias_dps, here)
     rate = seen.data.true_rate_dps(axis)[here]
     if different_rates(seen.table_dps[here]) > LEAST_RATES:
@@ -192,7 +196,7 @@ def _alignment(seen: _Columns) -> Iterator[Figure]:
                 return
             k[i, j] = line.scale_factor.value
             known &= line.scale_factor.u is not None
-            u[i, j] = line.scale_factor.u or 0.0
+            u[i, j] = math.hypot(line.scale_factor.u or 0.0, 0.0 if i == j else seen.bench.mounting_u_rad(about))
     try:
         found = alignment_of(k, u if known else None)
     except ValueError:  # an axis has its sign reversed: no rotation takes it there
@@ -201,6 +205,11 @@ def _alignment(seen: _Columns) -> Iterator[Figure]:
         yield Figure("misalignment", axis, estimate, used)
     for pair, estimate in zip(PAIRS, found.orthogonality_deg, strict=True):
         yield Figure("orthogonality", pair, estimate, used)
+
+
+def _with(estimate: Estimate, u: float) -> Estimate:
+    """Return an estimate with a further contribution to its standard uncertainty."""
+    return Estimate(estimate.value, None if estimate.u is None else math.hypot(estimate.u, u))
 
 
 def _times(estimate: Estimate, factor: float) -> Estimate:

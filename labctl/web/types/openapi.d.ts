@@ -268,8 +268,8 @@ export interface paths {
         };
         /**
          * Uncertainty of a corrected rate
-         * @description GUM components of a corrected rate at one rate and temperature, and whether that point lies in the
-         *     calibrated range.
+         * @description GUM components of a corrected rate, or of a corrected rate vector, at one temperature, and whether that place
+         *     lies in the calibrated range.
          */
         get: operations["uncertainty_api_units__serial__calibrations__version__uncertainty_get"];
         put?: never;
@@ -1519,6 +1519,46 @@ export interface components {
             stepper_lines: components["schemas"]["AngleLine"][];
         };
         /**
+         * AnyAxisUncertainty
+         * @description Largest U of one output over all rate vectors up to the calibrated rate, about any axis.
+         */
+        AnyAxisUncertainty: {
+            /**
+             * Bound Dps
+             * @description U in the frame of the case, deg/s; null: unknown somewhere.
+             */
+            bound_dps: number | null;
+            /**
+             * Aligned Bound Dps
+             * @description U up to a rotation of the frame, deg/s.
+             */
+            aligned_bound_dps: number | null;
+            /**
+             * Reach Dps
+             * @description Largest magnitude of the rate vectors, deg/s.
+             */
+            reach_dps: number;
+            /**
+             * Rates Dps
+             * @description Rate vector where U is largest, or unknown, deg/s.
+             */
+            rates_dps: {
+                [key: string]: number;
+            };
+            /**
+             * Temperature C
+             * @description Temperature there, deg C.
+             */
+            temperature_c: number;
+            /**
+             * Why
+             * @description Why it is unknown; empty where it is known.
+             */
+            why: string;
+            /** @description null: every body axis has an output. */
+            cross_rates: components["schemas"]["CrossRates"] | null;
+        };
+        /**
          * AppliedDraft
          * @description A version applied to the recording of a draft as it is, nothing refitted. Errors: corrected minus true rate.
          */
@@ -2216,7 +2256,7 @@ export interface components {
             k: number | null;
             /**
              * Expanded
-             * @description Expanded uncertainty: k times `combined`, plus the magnitude of known errors that are not corrected.
+             * @description Expanded uncertainty: k times `combined`, widened so that it covers with the same probability where known errors are not corrected.
              */
             expanded: number | null;
             /**
@@ -3331,6 +3371,27 @@ export interface components {
             applied: components["schemas"]["VerificationResponse"] | null;
             /** @description The data of each picture of where and how the model fails. */
             views: components["schemas"]["Views"];
+        };
+        /**
+         * CrossRates
+         * @description What rates about axes without an output add to a corrected rate: nothing can correct it.
+         */
+        CrossRates: {
+            /**
+             * About
+             * @description Body axes without an output.
+             */
+            about: string[];
+            /**
+             * Per Dps
+             * @description Error of the corrected rate per deg/s about these axes, in the worst direction, with the coverage of U; null: unknown.
+             */
+            per_dps: number | null;
+            /**
+             * Why
+             * @description Why it is unknown; empty where it is known.
+             */
+            why: string;
         };
         /**
          * Customer
@@ -5359,6 +5420,13 @@ export interface components {
              */
             limit_dps: number;
             /**
+             * About
+             * @description Rotations that the statement holds for. any axis: rate vectors of any direction up to the calibrated rate; own axis: rotation about the axis of each output, the others at rest.
+             * @default any axis
+             * @enum {string}
+             */
+            about?: "any axis" | "own axis";
+            /**
              * Rule
              * @description simple: pass up to the limit; guard-band: pass up to the limit less the expanded uncertainty.
              * @enum {string}
@@ -7115,7 +7183,10 @@ export interface components {
             serial: string;
             /** Version */
             version: number;
-            /** Rate Dps */
+            /**
+             * Rate Dps
+             * @description The rate, deg/s; of a rate vector its magnitude.
+             */
             rate_dps: number;
             /** Temperature C */
             temperature_c: number;
@@ -7153,6 +7224,15 @@ export interface components {
                 [key: string]: {
                     [key: string]: components["schemas"]["BudgetResponse"];
                 };
+            };
+            /** @description null where one rate was given: about one axis after the other, the others at rest. */
+            vector: components["schemas"]["VectorUncertainty"] | null;
+            /**
+             * Any Axis
+             * @description For each output: its largest U where the unit turns about any axis. Empty where the version does not state it: fit it again.
+             */
+            any_axis: {
+                [key: string]: components["schemas"]["AnyAxisUncertainty"];
             };
             /**
              * Not Stated
@@ -7248,6 +7328,48 @@ export interface components {
                 number | null,
                 number | null
             ];
+        };
+        /**
+         * VectorUncertainty
+         * @description Uncertainty of the corrected rates at one rate vector; matrices have one row and column for each output.
+         */
+        VectorUncertainty: {
+            /**
+             * Rates Dps
+             * @description True rate about each body axis, deg/s.
+             */
+            rates_dps: {
+                [key: string]: number;
+            };
+            /**
+             * Outputs
+             * @description Outputs in the order of the rows and columns.
+             */
+            outputs: string[];
+            /**
+             * Covariance Dps2
+             * @description Covariance of the corrected rates in the frame of the case, (deg/s)^2; null: a contribution is unknown.
+             */
+            covariance_dps2: (number | null)[][];
+            /**
+             * Expanded Dps
+             * @description For each output: expanded uncertainty U in the frame of the case, deg/s; null: unknown.
+             */
+            expanded_dps: {
+                [key: string]: number | null;
+            };
+            /**
+             * Aligned Covariance Dps2
+             * @description Covariance up to a rotation of the frame, (deg/s)^2: for a unit whose axes are aligned in use, so that the common angle of the mountings does not count.
+             */
+            aligned_covariance_dps2: (number | null)[][];
+            /**
+             * Aligned Expanded Dps
+             * @description For each output: U up to a rotation of the frame, deg/s; null: unknown.
+             */
+            aligned_expanded_dps: {
+                [key: string]: number | null;
+            };
         };
         /**
          * VerificationResponse
@@ -7966,8 +8088,8 @@ export interface operations {
     uncertainty_api_units__serial__calibrations__version__uncertainty_get: {
         parameters: {
             query: {
-                /** @description True rate for which the uncertainty is computed, about one axis after the other, deg/s. */
-                rate_dps: number;
+                /** @description True rate for which the uncertainty is computed, deg/s: given once, about one axis after the other, the others at rest; given three times, the rate vector about x, y and z. */
+                rate_dps: number[];
                 /** @description Temperature by the gyro's thermometer, deg C. */
                 temperature_c: number;
                 /** @description Also compute the uncertainty on a small grid over the calibrated range. */

@@ -34,8 +34,15 @@ export function uncertaintyInUse(serial, signal) {
       setChildren(element, busyIndicator("Working out the uncertainty"));
       try {
         const place = placeOf(version.validity);
-        const answer = await get(PATH, { path, query: { ...place, grid: true }, signal });
-        if (own === latest) setChildren(element, over(answer), parts(answer, place, path, signal), pictures(answer));
+        const answer = await get(PATH, { path, query: { ...place, rate_dps: [place.rate_dps], grid: true }, signal });
+        if (own === latest)
+          setChildren(
+            element,
+            over(answer),
+            aboutAnyAxis(answer),
+            parts(answer, place, path, signal),
+            pictures(answer),
+          );
       } catch (error) {
         // a model that needs more than a rate and a temperature, or without data to be uncertain by
         if (!isAbort(error) && own === latest)
@@ -80,7 +87,7 @@ function over({ grid, coverage_factor }) {
     h(
       "p",
       { class: "muted small" },
-      `Expanded uncertainty of a corrected rate on a later day, after another power-on, in deg/s (k = ${coverage_factor}, about 95 %). The noise of a single reading is not included.`,
+      `Expanded uncertainty of a corrected rate about the axis of each output, the others at rest, on a later day, after another power-on, in deg/s (k = ${coverage_factor}, about 95 %). The noise of a single reading is not included.`,
     ),
     table(
       [
@@ -97,6 +104,45 @@ function over({ grid, coverage_factor }) {
       { dense: true, label: "Uncertainty in use" },
     ),
     reasons(rows.flatMap((row) => row.cells)),
+  );
+}
+
+/**
+ * The largest uncertainty where the unit turns about any axis: a row for each output.
+ * @param {Uncertainty} answer
+ */
+function aboutAnyAxis({ any_axis }) {
+  const rows = Object.entries(any_axis ?? {});
+  if (!rows.length) return null;
+  const whys = [...new Set(rows.flatMap(([, one]) => [one.why, one.cross_rates?.why ?? ""]))].filter(Boolean);
+  /** @param {number | null} value */
+  const figure = (value) => (value === null ? unknown() : shown(value));
+  return h(
+    "div",
+    { class: "stack" },
+    h("h3", {}, "Turned about any axis"),
+    h(
+      "p",
+      { class: "muted small" },
+      `Largest expanded uncertainty, in deg/s, for rate vectors of any direction up to ${number(rows[0][1].reach_dps, 4)} deg/s. The angles of the mountings count in the frame of the case; up to a rotation of this frame, for a unit whose axes are aligned in use, only their differences count.`,
+    ),
+    table(
+      [
+        { title: "Output", cell: ([axis]) => axis },
+        { title: "Frame of the case", number: true, cell: ([, one]) => figure(one.bound_dps) },
+        { title: "Up to a rotation", number: true, cell: ([, one]) => figure(one.aligned_bound_dps) },
+        rows.some(([, one]) => one.cross_rates)
+          ? {
+              title: "Per deg/s about axes without output",
+              number: true,
+              cell: ([, one]) => figure(one.cross_rates?.per_dps ?? null),
+            }
+          : null,
+      ],
+      rows,
+      { dense: true, label: "Uncertainty about any axis" },
+    ),
+    whys.length ? notice("warn", h("p", {}, h("strong", {}, "Unknown: "), whys.join("; "))) : null,
   );
 }
 
@@ -185,7 +231,7 @@ function parts(first, place, path, signal) {
     const own = ++latest;
     updateQuery({ rate: rate.value, temperature: warm.value });
     try {
-      const asked = { rate_dps: Number(rate.value), temperature_c: Number(warm.value) };
+      const asked = { rate_dps: [Number(rate.value)], temperature_c: Number(warm.value) };
       const answer = await get(PATH, { path, query: asked, signal });
       if (own === latest) setChildren(result, atPlace(answer), budgetLines(answer));
     } catch (error) {
