@@ -72,6 +72,14 @@ class Calibration:
         return str(self.document["hash"])
 
     @property
+    def calibration_hash(self) -> str:
+        """SHA-256 of the calibration without its certification, by which certificates and exported files name it.
+
+        A certification does not change the calibration, but it is in the file and so in `hash`.
+        """
+        return self.hash if self.certification is None else self.certification.calibration_hash
+
+    @property
     def axes(self) -> tuple[str, ...]:
         """The axes that are corrected, in order."""
         with _reading("axes"):

@@ -201,7 +201,7 @@ def _head(name: str, calibration: Calibration) -> str:
         serial=_in_comment(calibration.serial),
         version=calibration.version,
         model=_in_comment(calibration.fitted.model.name),
-        hash=calibration.hash,
+        hash=calibration.calibration_hash,
         low=_number(low),
         high=_number(high),
         temperatures=f"from {low:g} to {high:g} deg C" if has_thermometer else "at any temperature (none was measured)",
@@ -213,7 +213,7 @@ def _head(name: str, calibration: Calibration) -> str:
         slowest=_number(slowest),
         fastest=_number(fastest),
         nominal=nominal,
-        guard=f"LABCTL_{name}_V{calibration.version}_{calibration.hash[:GUARD_DIGITS]}_H",
+        guard=f"LABCTL_{name}_V{calibration.version}_{calibration.calibration_hash[:GUARD_DIGITS]}_H",
         name=name,
         axes=len(calibration.axes),
         uncertainty="".join(f" * {_in_comment(line)}\n" for line in bound_lines(calibration))

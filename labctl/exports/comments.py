@@ -23,7 +23,7 @@ def head_lines(
     unit, model = plain(calibration.serial), plain(calibration.fitted.model.name)
     lines = [
         f"Gyro {unit}, calibration version {calibration.version}: model {model}",
-        f"Hash of the calibration: {calibration.hash}",
+        f"Hash of the calibration: {calibration.calibration_hash}",
         f"Calibrated from {low:g} to {high:g} deg C and from {slow:g} to {fast:g} deg/s.",
         f"Carries: {carries}.",
     ]

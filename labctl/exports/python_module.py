@@ -50,7 +50,7 @@ def write(calibration: Calibration) -> Written:
     content = {
         "serial": calibration.serial,
         "version": calibration.version,
-        "hash": calibration.hash,
+        "hash": calibration.calibration_hash,
         "model": calibration.fitted.model.name,
         "axes": list(calibration.axes),
         "temperature_c": [_limit(low), _limit(high)],

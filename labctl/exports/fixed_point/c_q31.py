@@ -130,8 +130,8 @@ def _source(calibration: Calibration, fixed: FixedPoint, force: FixedForce | Non
     shift = fixed.shift
     return SOURCE.format(
         head="\n * ".join(line.replace("*/", "* /").replace("\\", "/") for line in head),
-        name=name, axes=axes, terms=terms, nodes=nodes, shift=shift, hash=calibration.hash,
-        guard=f"LABCTL_{name}_Q31_V{calibration.version}_{calibration.hash[:GUARD_DIGITS]}_H",
+        name=name, axes=axes, terms=terms, nodes=nodes, shift=shift, hash=calibration.calibration_hash,
+        guard=f"LABCTL_{name}_Q31_V{calibration.version}_{calibration.calibration_hash[:GUARD_DIGITS]}_H",
         full_scale=fixed.full_scale_dps, table=_table(fixed.tables.tolist()),
         low=fixed.low_q16, high=fixed.high_q16, coldest=fixed.inside_q16[0], warmest=fixed.inside_q16[1],
         slowest=fixed.outputs_q31[0], fastest=fixed.outputs_q31[1], reciprocal=fixed.reciprocal,

@@ -120,7 +120,7 @@ def _report(
     conditions = ET.SubElement(made, "conditions")
     ET.SubElement(conditions, "temperature", {"unit": "deg C"}).text = f"{low:g} to {high:g}"
     ET.SubElement(made, "acceptanceCriteria")
-    listed = ET.SubElement(made, "table", {"comment": f"labctl calibration {calibration.hash}"})
+    listed = ET.SubElement(made, "table", {"comment": f"labctl calibration {calibration.calibration_hash}"})
     for name, words in (("type", TYPES), ("unit", UNITS), ("header", HEADER)):
         ET.SubElement(listed, name).text = ",".join(words)
     ET.SubElement(listed, "data").text = "\n".join(_rows(calibration.axes, table, index))

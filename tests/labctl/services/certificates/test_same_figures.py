@@ -18,6 +18,7 @@ from labctl.certificates.readable import readable_certificate
 from labctl.exports import export_calibration
 from labctl.recording import to_points
 from labctl.services.calibrations.fitting import fit_unit
+from labctl.services.calibrations.served import calibration_file
 from labctl.services.calibrations.uncertainty import uncertainty_answer
 from labctl.services.certificates.issue import issue
 from labctl.services.datasheet.sheet import datasheet
@@ -59,6 +60,15 @@ def documents(store: Store) -> dict[str, Any]:
         "answer": uncertainty_answer(calibration, [50.0], reference_c).model_dump(mode="json"),
         "sheet": datasheet(store, SERIAL).model_dump(mode="json"),
     }
+
+
+@pytest.mark.parametrize("name", ["c", "python", "px4"])
+def test_one_hash_names_the_calibration(store: Store, documents: dict[str, Any], name: str) -> None:
+    """A file that is served carries the certification, and a hash over that too; certificate and header name one."""
+    content = calibration_file(store, SERIAL, 1, "json").content
+    written = calibration_file(store, SERIAL, 1, name).content.decode()
+    assert documents["json"]["calibration"]["hash"] in written
+    assert json.loads(content)["hash"] not in written
 
 
 def largest(documents: dict[str, Any], frame: str) -> float:
