@@ -1,7 +1,8 @@
 """What the processes of a service see of their supervisor: whether it stands still, and what it was asked meanwhile.
 
 A process that was stopped (SIGSTOP, a debugger, a frozen cgroup) hears no signal: a request to end waits in the kernel
-until it goes on. The other processes see that request there, and carry it out in its place.
+until it goes on. The other processes see that request there, and carry it out in its place. A request that came with
+the stop waits no more: the kernel has entered its handler, which blocks the signal, before the process stood still.
 """
 
 from __future__ import annotations
@@ -29,9 +30,10 @@ def unheard_end(pid: int) -> bool:
     """Return whether a process that stands still was asked to end by a signal that it could not hear yet."""
     if not is_stopped(pid):
         return False
-    status = _status(pid)
-    waiting = int(status.get("ShdPnd", "0"), 16) | int(status.get("SigPnd", "0"), 16)
-    return any(waiting & (1 << (number - 1)) for number in ENDING)
+    status, asked = _status(pid), 0
+    for waiting_or_in_handler in ("ShdPnd", "SigPnd", "SigBlk"):  # the supervisor itself blocks none of these signals
+        asked |= int(status.get(waiting_or_in_handler, "0"), 16)
+    return any(asked & (1 << (number - 1)) for number in ENDING)
 
 
 class SupervisorWatch:

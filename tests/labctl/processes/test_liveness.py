@@ -88,3 +88,29 @@ def test_a_request_to_end_is_seen_that_a_process_cannot_hear(
     os.kill(sleeper.pid, signal.SIGCONT)
     sleeper.wait()
     assert (known.lives, known.stands_still, unheard_end(sleeper.pid)) == (False, False, False)
+
+
+HANDLES = """
+import signal, sys
+for number in map(int, sys.argv[1:]):
+    signal.signal(number, lambda *_: None)
+print("ready", flush=True)
+while True:
+    sum(range(1000))
+"""
+
+
+@pytest.mark.parametrize("number", ENDING)
+def test_a_request_in_the_instant_of_the_stop_is_seen_too(number: signal.Signals) -> None:
+    """The kernel enters the handler and then stops the process: no signal waits, but the handler has not run."""
+    command = [sys.executable, "-c", HANDLES, *(str(int(each)) for each in ENDING)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE) as busy:
+        try:
+            assert busy.stdout is not None
+            busy.stdout.readline()
+            assert not unheard_end(busy.pid)
+            os.kill(busy.pid, signal.SIGSTOP)
+            os.kill(busy.pid, number)
+            eventually(lambda: unheard_end(busy.pid))
+        finally:
+            busy.kill()
