@@ -92,7 +92,10 @@ def test_the_figures_of_the_page_are_those_of_the_service(
     expect(parts.locator("tbody tr").last.locator("td").nth(1)).to_have_text(f"{two_digits(one['expanded_dps'])}")
     assert [float(row[1]) for row in cells(parts)] == [two_digits(one[name]) for name in names]
     assert cells(parts)[2][2] == one["repeatability_source"] == "data sheet"
-    expect(card).not_to_contain_text("nknown")
+    expect(parts).not_to_contain_text("nknown")
+    any_axis = card.get_by_role("region", name="Uncertainty about any axis")
+    assert [row[1:] for row in cells(any_axis)] == [["unknown", "unknown", "unknown"]]  # it was turned about z alone
+    expect(card).to_contain_text("the unit was not turned about")
     expect(card).not_to_contain_text("outside")
 
     page.reload()  # the place is in the address

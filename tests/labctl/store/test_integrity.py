@@ -130,7 +130,11 @@ def test_a_block_that_was_cut_short_under_a_new_checksum_is_found(location: str)
             "recording 2 (points): its table of data sets is missing",
         ),
         ("UPDATE sample_blocks SET n = n - 1 WHERE id = 1", "readings", "recording 1 data set 1 block 0"),
-        ("UPDATE calibrations SET document = replace(document, '\"z\"', '\"y\"')", "calibrations", "edited or damaged"),
+        (
+            "UPDATE calibrations SET document = replace(document, '\"fog\"', '\"mems\"')",
+            "calibrations",
+            "edited or damaged",
+        ),
         ("UPDATE calibrations SET hash = substr(hash, 2) || '0'", "calibrations", "the stored calibration was changed"),
         ("UPDATE certifications SET version = 7", "file", "row 1 of certifications refers to a row of calibrations"),
         ("UPDATE audit SET actor = 'nobody' WHERE id = 3", "audit", "row 3: its content"),

@@ -35,6 +35,12 @@ const FIELDS = [
   { name: "specification", label: "Conformity to the specification", hint: "Empty: no statement.", required: false },
   { name: "limit_dps", label: "Limit of the error in the specification, deg/s", required: false },
   {
+    name: "own_axis",
+    label: "The item turns about the axis of one output at a time",
+    type: "checkbox",
+    required: false,
+  },
+  {
     name: "guard_band",
     label: "With a guard band as wide as the uncertainty",
     type: "checkbox",
@@ -119,6 +125,7 @@ function orderOf(given) {
           conformity: {
             specification: given.specification,
             limit_dps: Number(given.limit_dps),
+            about: given.own_axis ? /** @type {const} */ ("own axis") : /** @type {const} */ ("any axis"),
             rule: given.guard_band ? /** @type {const} */ ("guard-band") : /** @type {const} */ ("simple"),
           },
         }
