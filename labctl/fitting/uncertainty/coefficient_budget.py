@@ -62,17 +62,16 @@ def _sensitivities(
     One error of the time base is the same at all rates, so it is in the scale factor in full; a tilt of a mounting is a
     misalignment, and in a scale factor by the misalignments of the unit and by its cosine.
     """
-    nothing = {"relative_rate": 0.0, "rate_dps": 0.0, "angle": 0.0, "angle_squared": 0.0, "level": 0.0}
     if name == "bias":
-        return Sensitivities.of_one(**nothing | {"temperature": temperature, "level": 1.0})
+        return Sensitivities.of_one(temperature=temperature, level=1.0)
     gain = 1.0 + values.get("scale_factor", 0.0)
     if name != "scale_factor":
         mounted = bench.mountings_with(name.removeprefix("misalignment_")) if bench is not None else 1.0
-        own = {"relative_rate": values[name], "temperature": temperature, "angle": gain / math.sqrt(mounted)}
-        return Sensitivities.of_one(**nothing | own)
+        angle = gain / math.sqrt(mounted)
+        return Sensitivities.of_one(relative_rate=values[name], temperature=temperature, angle=angle)
     across = math.hypot(*(value for other, value in values.items() if other.startswith("misalignment")))
     fastest = bench.max_rate_dps if bench is not None else None
     return Sensitivities.of_one(
         relative_rate=gain, rate_dps=1.0 / fastest if fastest else 0.0, temperature=temperature, angle=across,
-        angle_squared=gain / 2, level=0.0,
+        angle_squared=gain / 2,
     )  # fmt: skip

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import date
@@ -40,20 +39,6 @@ class BenchConditions:
         """
         shares = [share for position, share in self.mountings.items() if position.lstrip("-") == axis]
         return sum(shares) ** 2 / sum(share**2 for share in shares) if shares else 1.0
-
-    def mounting_u_rad(self, axis: str) -> float:
-        """Return the standard uncertainty of where the unit turned about with an axis up, in each of two directions.
-
-        Of the stated angles of fixture and table top, the mean over the mountings with this axis; 0 where none is
-        stated.
-        """
-        stated = (each.standard_u for quantity in ("fixture_angle", "tilt") for each in self.of(quantity))
-        return math.radians(math.hypot(*stated)) / math.sqrt(self.mountings_with(axis))
-
-    def rate_u(self) -> float:
-        """Return the relative standard uncertainty of the reference rate that all rates share; 0 where none is."""
-        ppm = (each for quantity in ("clock", "table_rate") for each in self.of(quantity) if each.unit_name == "ppm")
-        return 1e-6 * math.hypot(*(each.standard_u for each in ppm))
 
     def to_json(self) -> BenchConditionsJson:
         """Return this as JSON."""

@@ -51,8 +51,8 @@ def model_line(
     Its degrees of freedom are taken as infinite: the estimate has a floor that covers its own scatter.
     """
     own, across = rates_dps.get(axis, 0.0), {name: rate for name, rate in rates_dps.items() if name != axis}
-    u = evidence.model_error.at_vector(own, across, temperature_c) if evidence else None
-    why = evidence.model_error.unknown_at_vector(own, across, temperature_c) if evidence else _lacking(fitted)
+    u = evidence.model_error.at(own, temperature_c, across) if evidence else None
+    why = evidence.model_error.unknown_at(own, temperature_c, across) if evidence else _lacking(fitted)
     return BudgetLine("model", "held-out data sets", "A", "normal", u, "deg/s", 1.0, u, why=why or BY_HELD_OUT)
 
 

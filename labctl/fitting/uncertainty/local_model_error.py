@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.uncertainty.grid import LEAST_SPAN_K
 
 #: Width of the neighbourhood, as a share of the range of rates and of temperatures (standard deviation of the weight).
 NEAR_SHARE = 0.12
@@ -25,6 +27,10 @@ LEAST_SHARE = 0.25
 MOST_KEPT, TEMPERATURES = 2000, 10
 
 
+#: Rates about other body axes where the unit turns about one alone.
+NO_RATES: Mapping[str, float] = MappingProxyType({})
+
+
 @dataclass(frozen=True)
 class LocalModelError:
     """Data sets of one axis, (m,) each: where they were, the variance left there, and that of the readings' noise."""
@@ -33,24 +39,16 @@ class LocalModelError:
     temperature_c: Array
     left_var: Array  #: (deg/s)^2, NaN where it is not known
     white_var: Array  #: (deg/s)^2
-    across_dps: Mapping[str, Array] = field(default_factory=dict)  #: rates about the other body axes that were turned
+    across_dps: Mapping[str, Array] | None = None  #: rates about other body axes that were turned; None: not stored
 
-    def at(self, rate_dps: float, temperature_c: float) -> float | None:
+    def at(self, rate_dps: float, temperature_c: float, across_dps: Mapping[str, float] = NO_RATES) -> float | None:
         """Return the standard error of the model there, deg/s, drift of the campaign included; None if unknown.
 
-        The rates about the other axes are not asked for: data sets at any of them count.
+        `across_dps` are rates about other body axes. A single-axis table turns about one body axis after the other, so
+        what the model leaves at each of these rates is added: beside that of the axis itself, for which data sets at
+        any rate about the others count, what a rate about another axis leaves beyond that of rest.
         """
-        if self.unknown_at(rate_dps, temperature_c) is not None:
-            return None
-        return float(np.sqrt(self._variance(self._away(rate_dps, temperature_c))))
-
-    def at_vector(self, rate_dps: float, across_dps: Mapping[str, float], temperature_c: float) -> float | None:
-        """Return the standard error at a rate about the axis itself and rates about others, deg/s; None if unknown.
-
-        A single-axis table turns about one body axis after the other, so what the model leaves at each of these rates
-        is added: beside that of the axis itself, what a rate about another axis leaves beyond that of rest.
-        """
-        if self.unknown_at_vector(rate_dps, across_dps, temperature_c) is not None:
+        if self.unknown_at(rate_dps, temperature_c, across_dps) is not None:
             return None
         own = self._variance(self._away(rate_dps, temperature_c))
         turned = {axis: rate for axis, rate in across_dps.items() if rate}
@@ -80,7 +78,8 @@ class LocalModelError:
         known = np.flatnonzero(np.isfinite(self.left_var))
         if len(self.left_var) <= MOST_KEPT or len(known) == 0:
             return self
-        rates = np.stack([self.rate_dps, *self.across_dps.values()])
+        across = self.across_dps or {}
+        rates = np.stack([self.rate_dps, *across.values()])
         about = np.argmax(np.abs(rates), axis=0)
         groups = [
             group
@@ -95,37 +94,48 @@ class LocalModelError:
 
         return LocalModelError(
             mean(self.rate_dps), mean(self.temperature_c), mean(self.left_var), mean(self.white_var),
-            {axis: mean(each) for axis, each in self.across_dps.items()},
+            {axis: mean(each) for axis, each in across.items()},
         )  # fmt: skip
 
-    def unknown_at(self, rate_dps: float, temperature_c: float) -> str | None:
+    def unknown_at(
+        self, rate_dps: float, temperature_c: float, across_dps: Mapping[str, float] = NO_RATES
+    ) -> str | None:
         """Return why the error there is unknown, in words; None where it is known."""
         away = self._away(rate_dps, temperature_c)
         if len(away) == 0:
             return "no data set could be left out of the fit: the model needs all data sets"
-        return _unknown(away)
-
-    def unknown_at_vector(self, rate_dps: float, across_dps: Mapping[str, float], temperature_c: float) -> str | None:
-        """Return why the error at a rate vector is unknown, in words; None where it is known."""
-        if (why := self.unknown_at(rate_dps, temperature_c)) is not None:
+        if (why := _unknown(away)) is not None:
             return why
         for axis, rate in across_dps.items():
-            if rate and not np.any(self.across_dps.get(axis, np.zeros(1))):
-                return f"the unit was not turned about {axis}"
-            if rate and (why := _unknown(self._away_across(axis, rate, temperature_c))) is not None:
-                return f"about {axis}, {why}"
+            if rate and (why := self._unknown_across(axis, rate, temperature_c)) is not None:
+                return why
         return None
+
+    def _unknown_across(self, axis: str, rate_dps: float, temperature_c: float) -> str | None:
+        """Return why the error at a rate about another body axis is unknown; None where it is known."""
+        if self.across_dps is None:
+            return (
+                "the version was made by an older version of labctl, which did not store about which axes the unit was "
+                "turned: fit it again"
+            )
+        if axis not in self.across_dps:
+            return f"the unit was not turned about {axis}"
+        why = _unknown(self._away_across(axis, rate_dps, temperature_c))
+        return None if why is None else f"about {axis}, {why}"
 
     def _away(self, rate_dps: float, temperature_c: float) -> Array:
         """Return how far a place is from each data set whose variance is known, in widths of the neighbourhood."""
-        away = np.hypot(_scaled(self.rate_dps, rate_dps), _scaled(self.temperature_c, temperature_c))
-        return np.asarray(away[np.isfinite(self.left_var)])
+        return self._distance([_scaled(self.rate_dps, rate_dps)], temperature_c)
 
     def _away_across(self, axis: str, rate_dps: float, temperature_c: float) -> Array:
         """Return the same for a rate about another body axis alone."""
-        along = [_scaled(rates, rate_dps if name == axis else 0.0) for name, rates in self.across_dps.items()]
-        along += [_scaled(self.rate_dps, 0.0), _scaled(self.temperature_c, temperature_c)]
-        return np.asarray(np.linalg.norm(along, axis=0)[np.isfinite(self.left_var)])
+        across = self.across_dps or {}
+        along = [_scaled(rates, rate_dps if name == axis else 0.0) for name, rates in across.items()]
+        return self._distance([_scaled(self.rate_dps, 0.0), *along], temperature_c)
+
+    def _distance(self, rates: list[Array], temperature_c: float) -> Array:
+        warm = _scaled(self.temperature_c, temperature_c, LEAST_SPAN_K / 2)
+        return np.asarray(np.linalg.norm([*rates, warm], axis=0)[np.isfinite(self.left_var)])
 
 
 def _unknown(away: Array) -> str | None:
@@ -155,9 +165,12 @@ def _effective_number(weight: Array) -> float:
     return float(weight.sum() ** 2 / (weight**2).sum())
 
 
-def _scaled(values: Array, at: float) -> Array:
-    """Return distances from a place in widths of the neighbourhood, (m,); 0 along what was not varied."""
-    width = NEAR_SHARE * float(np.ptp(values))
+def _scaled(values: Array, at: float, least_width: float = 0.0) -> Array:
+    """Return distances from a place in widths of the neighbourhood, (m,); 0 along what was not varied.
+
+    The width is a share of the range of the values, or `least_width` where that is more.
+    """
+    width = max(NEAR_SHARE * float(np.ptp(values)), least_width)
     if width == 0:
         return np.zeros(len(values))
     return np.asarray((values - at) / width)

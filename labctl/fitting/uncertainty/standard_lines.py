@@ -46,9 +46,15 @@ class Sensitivities:
 
     @staticmethod
     def of_one(
-        *, relative_rate: float, rate_dps: float, temperature: float, angle: float, angle_squared: float, level: float
+        *,
+        relative_rate: float = 0.0,
+        rate_dps: float = 0.0,
+        temperature: float = 0.0,
+        angle: float = 0.0,
+        angle_squared: float = 0.0,
+        level: float = 0.0,
     ) -> Sensitivities:
-        """Return those of a single result."""
+        """Return those of a single result, 0 where not named."""
         own = [np.full((1, 1), each) for each in (relative_rate, rate_dps, temperature, angle, level)]
         return Sensitivities(own[0], own[1], own[2], own[3], own[4], np.array([angle_squared]))
 
@@ -91,6 +97,11 @@ def standard_lines(bench: BenchConditions | None, s: Sensitivities) -> list[Sour
         return [_of_all(_unknown("standards", NOT_KEPT), n)]
     stated = [_of_standard(each, bench, s) for each in bench.standards if _matters(each.quantity, bench)]
     return [*stated, *(_of_all(line, n) for line in _missing(bench))]
+
+
+def standards_u(bench: BenchConditions, s: Sensitivities) -> float:
+    """Return the standard uncertainty of a single result by all standards that the bench states, in its unit."""
+    return math.sqrt(sum(float(source.covariance[0, 0]) for source in standard_lines(bench, s)))
 
 
 def _of_all(line: BudgetLine, n: int) -> SourceLines:

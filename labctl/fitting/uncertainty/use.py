@@ -45,7 +45,7 @@ class AxisEvidence:
             "repeatability_freedom": self.repeatability.freedom if self.repeatability else None,
             "repeatability_source": self.repeatability.source if self.repeatability else "none",
         }
-        if local.across_dps:
+        if local.across_dps is not None:
             found["across_dps"] = {axis: rates.tolist() for axis, rates in local.across_dps.items()}
         if self.correlation:
             found["correlation"] = dict(self.correlation)
@@ -56,7 +56,8 @@ class AxisEvidence:
         """Return what `to_json` described."""
         columns = (record["rate_dps"], record["temperature_c"], record["left_var"], record["white_var"])
         rate, warm, left, white = (np.asarray(column, dtype=np.float64) for column in columns)
-        across = {axis: np.asarray(rates, dtype=np.float64) for axis, rates in record.get("across_dps", {}).items()}
+        kept = record.get("across_dps")
+        across = None if kept is None else {axis: np.asarray(each, dtype=np.float64) for axis, each in kept.items()}
         local = LocalModelError(rate, warm, left, white, across)
         u_dps, correlation = record["repeatability_dps"], record.get("correlation", {})
         if u_dps is None:
@@ -109,9 +110,7 @@ def _correlation(residual_dps: Mapping[str, Array]) -> dict[str, dict[str, float
         known = np.isfinite(residual_dps[one]) & np.isfinite(residual_dps[other])
         pair = np.array([residual_dps[one][known], residual_dps[other][known]])
         if np.all(np.ptp(pair, axis=1) > 0):
-            centred = pair - pair.mean(axis=1, keepdims=True)
-            product, squares = centred[0] @ centred[1], (centred**2).sum(axis=1)
-            found[one][other] = float(product / np.sqrt(squares[0] * squares[1]))
+            found[one][other] = float(np.atleast_2d(np.corrcoef(pair))[0, 1])
     return found
 
 

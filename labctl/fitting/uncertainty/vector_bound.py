@@ -15,11 +15,14 @@ from labctl.fitting.uncertainty.rate_vector import RateVectorUncertainty, rate_v
 from labctl.fitting.uncertainty.use import AxisEvidence
 from labctl.json_types.budget import CrossRatesJson, VectorBoundJson
 
-#: Directions of rate vectors: along the axes, the diagonals of the faces, and those of the cube.
-DIRECTIONS = tuple(
-    tuple(part / math.sqrt(sum(map(abs, direction))) for part in direction)
-    for direction in product((-1, 0, 1), repeat=3)
-    if any(direction)
+#: Signs of rate vectors: along the axes, the diagonals of the faces, and those of the cube.
+_SIGNS = [signs for signs in product((-1, 0, 1), repeat=3) if any(signs)]
+#: Places of the ball of radius 1: rest, those directions on the sphere, and half-way along the axes, as the own-axis
+#: grid has them.
+PLACES = (
+    (0.0, 0.0, 0.0),
+    *(tuple(sign / math.hypot(*signs) for sign in signs) for signs in _SIGNS),
+    *(tuple(sign / 2 for sign in signs) for signs in _SIGNS if sum(map(abs, signs)) == 1),
 )
 
 
@@ -32,14 +35,14 @@ def vector_bounds(
     name: str,
     bench: BenchConditions | None,
 ) -> dict[str, VectorBoundJson]:
-    """Return output -> where its U is largest among rate vectors of `reach_dps`, deg/s, and at rest.
+    """Return output -> where its U is largest among rate vectors up to `reach_dps`, deg/s.
 
-    U grows along each direction, so that the sphere and its centre stand for the ball. Raises what
-    `rate_vector_uncertainty` raises.
+    What the mountings and the coefficients add grows along each direction; what the model leaves need not, so that the
+    axes, along which it was measured, are also looked at half-way. Raises what `rate_vector_uncertainty` raises.
     """
-    directions = ((0.0, 0.0, 0.0), *DIRECTIONS) if reach_dps else ((0.0, 0.0, 0.0),)
     vectors: list[Mapping[str, float]] = [
-        {axis: reach_dps * part for axis, part in zip(BODY_AXES, one, strict=True)} for one in directions
+        {axis: reach_dps * part for axis, part in zip(BODY_AXES, place, strict=True)}
+        for place in (PLACES if reach_dps else PLACES[:1])
     ]
     found = [
         rate_vector_uncertainty(fitted, rates, warm, evidence=evidence, name=name, bench=bench)

@@ -26,6 +26,7 @@ from labctl.fitting.data.mountings import mountings_of
 from labctl.fitting.data.temperature.levels import level_means
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.uncertainty import BenchConditions, conditions_of
+from labctl.fitting.uncertainty.standard_lines import Sensitivities, standards_u
 
 #: Figures at one temperature are at the level nearest to this, deg C.
 USUAL_C = 25.0
@@ -105,7 +106,8 @@ def _of_rates(seen: _Columns, axis: str) -> Iterator[Figure]:
     line = seen.line(axis, here)
     if line is None:
         return
-    yield Figure("scale_factor", axis, _with(line.scale_factor, line.scale_factor.value * seen.bench.rate_u()), here)
+    standards = standards_u(seen.bench, Sensitivities.of_one(relative_rate=line.scale_factor.value))
+    yield Figure("scale_factor", axis, _with(line.scale_factor, standards), here)
     yield Figure("bias", axis, line.bias_dps, here)
     rate = seen.data.true_rate_dps(axis)[here]
     if different_rates(seen.table_dps[here]) > LEAST_RATES:
@@ -190,13 +192,15 @@ def _alignment(seen: _Columns) -> Iterator[Figure]:
     for j, about in enumerate(AXES):
         rows = seen.own(about) & (seen.level == seen.usual)
         used |= rows
+        angle = 1.0 / math.sqrt(seen.bench.mountings_with(about))
+        leaning = standards_u(seen.bench, Sensitivities.of_one(angle=angle))
         for i, axis in enumerate(AXES):
             line = seen.line_about(axis, about, rows)
             if line is None:
                 return
             k[i, j] = line.scale_factor.value
             known &= line.scale_factor.u is not None
-            u[i, j] = math.hypot(line.scale_factor.u or 0.0, 0.0 if i == j else seen.bench.mounting_u_rad(about))
+            u[i, j] = math.hypot(line.scale_factor.u or 0.0, 0.0 if i == j else leaning)
     try:
         found = alignment_of(k, u if known else None)
     except ValueError:  # an axis has its sign reversed: no rotation takes it there

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from datetime import UTC, datetime
 from functools import cache
-from typing import Any
 
 import numpy as np
 import pytest
@@ -22,6 +21,7 @@ from labctl.fitting.uncertainty import (
     rate_uncertainty,
     rate_vector_uncertainty,
 )
+from labctl.fitting.uncertainty.document import Covered, uncertainty_json
 from labctl.fitting.uncertainty.vector_bound import cross_rates, vector_bounds
 from labctl.recording import Recording, RecordingInfo, Standard
 from studies.rate_vector_coverage import scores
@@ -38,13 +38,15 @@ def ideal() -> Recording:
     return measured()
 
 
-def measured(positions: tuple[str, ...] = THREE, outputs: tuple[str, ...] = AXES, **unit: Any) -> Recording:
+IDEAL = Unit(np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 4)))
+
+
+def measured(positions: tuple[str, ...] = THREE, outputs: tuple[str, ...] = AXES, unit: Unit = IDEAL) -> Recording:
     """Return a recording of one unit by an ideal bench that states its fixture."""
     rng = np.random.default_rng(4)
     plan = Plan("", positions, (-100.0, -50.0, 0.0, 50.0, 100.0), (0.0, 15.0, 30.0, 45.0))
     ideal = Statement(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    made = unit.get("unit") or Unit(np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 4)))
-    columns = campaign(made, Bench.of(rng, ideal, positions), plan, Noise(), 0.0, rng)
+    columns = campaign(unit, Bench.of(rng, ideal, positions), plan, Noise(), 0.0, rng)
     columns["temperature_c"] = columns.pop("chamber_c")
     info = RecordingInfo(
         serial="VECTOR", axes=outputs, kind="points", started_at=datetime(2026, 1, 5, tzinfo=UTC), max_rate_dps=100,
@@ -153,6 +155,18 @@ def test_about_an_axis_that_was_never_turned_nothing_is_promised() -> None:
     assert "the unit was not turned about" in bounds["z"]["why"]
 
 
+def test_a_version_that_did_not_store_the_mountings_says_to_fit_again() -> None:
+    result, evidence, bench = known_of_ideal()
+    records = {axis: one.to_json() for axis, one in evidence.items()}
+    for record in records.values():
+        del record["across_dps"]
+    older = {axis: AxisEvidence.from_json(record) for axis, record in records.items()}
+    found = rate_vector_uncertainty(result.fitted, W, 20.0, evidence=older, name="unit", bench=bench)
+    assert all("older version" in found.unknown[axis]["model"] for axis in AXES)
+    alone = rate_vector_uncertainty(result.fitted, {"x": 9.0}, 20.0, evidence=older, name="unit", bench=bench)
+    assert alone.budgets["x"].expanded is not None
+
+
 def test_the_bound_is_the_largest_of_the_ball() -> None:
     result, evidence, bench = known_of_ideal()
     bounds = vector_bounds(result.fitted, 100.0, [0.0, 45.0], evidence=evidence, name="unit", bench=bench)
@@ -163,7 +177,18 @@ def test_the_bound_is_the_largest_of_the_ball() -> None:
         w = dict(zip(AXES, rate, strict=True))
         found = rate_vector_uncertainty(result.fitted, w, 20.0, evidence=evidence, name="unit", bench=bench)
         for axis, budget in found.budgets.items():
-            assert (budget.expanded or 0.0) <= 1.02 * (bounds[axis]["bound_dps"] or 0.0)
+            assert (budget.expanded or np.inf) <= 1.02 * (bounds[axis]["bound_dps"] or 0.0)
+
+
+def test_the_bound_about_any_axis_is_at_least_that_about_one() -> None:
+    result, evidence, bench = known_of_ideal()
+    stated = uncertainty_json(result.fitted, Covered((-100.0, 100.0), (0.0, 45.0)), evidence, bench)
+    assert stated is not None
+    for axis in AXES:
+        alone, about_any = stated["axes"][axis]["bound_dps"], stated["axes"][axis]["vector"]["bound_dps"]
+        assert alone is not None
+        assert about_any is not None
+        assert 0 < alone <= about_any
 
 
 @pytest.mark.parametrize("rates", [{"q": 1.0}, {"x": float("nan")}, {"z": 1e9}])
