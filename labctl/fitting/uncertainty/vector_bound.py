@@ -38,7 +38,7 @@ def vector_bounds(
     """Return output -> where its U is largest among rate vectors up to `reach_dps`, deg/s.
 
     What the mountings and the coefficients add grows along each direction; what the model leaves need not, so that the
-    axes, along which it was measured, are also looked at half-way. Raises what `rate_vector_uncertainty` raises.
+    axes, along which it was measured, are also compared half-way. Raises what `rate_vector_uncertainty` raises.
     """
     vectors: list[Mapping[str, float]] = [
         {axis: reach_dps * part for axis, part in zip(BODY_AXES, place, strict=True)}
