@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -14,9 +15,10 @@ from instruments.clock import Clock, SystemClock
 from labctl.calibration import Calibration, read_calibration
 from labctl.certification import LeftOutWarning, warn
 from labctl.errors import BadInput
+from labctl.fitting.data.channels import BODY_AXES
 from labctl.fitting.data.temperature.channel import STAND_IN_C
 from labctl.fitting.data.temperature.history import TemperatureHistory
-from labctl.fitting.models.correction import correction
+from labctl.fitting.models.correction import Correct, correct_across, correction
 from labctl.fitting.models.memory import RunningMemory, course, split_memory
 
 __all__ = [
@@ -91,6 +93,7 @@ class Compensator:
         self._offset = np.array([unit.offset for unit in units])
         self._scale = np.array([unit.scale for unit in units])
         rest, self._memory = split_memory(calibration.fitted, self.axes)
+        self._model = rest
         self._correct = correction(rest, self.axes)
         self._running = RunningMemory(self._memory) if self._memory else None
         #: What specific force adds; None: the calibration knows of nothing.
@@ -146,13 +149,16 @@ class Compensator:
         *,
         history: TemperatureHistory | None = None,
         specific_force_g: ArrayLike | None = None,
+        cross_rates_dps: Mapping[str, ArrayLike] | None = None,
     ) -> Compensated:
         """Correct rates, (n, axes) deg/s, or (n,) for one axis, at temperatures (n,), (n, axes) or one for all.
 
         None for the temperature where the calibration was made without a thermometer. `channels` hold what the model
         `needs` besides, (n,) each; `history`, of a recording, what the temperatures were between the samples too;
-        `specific_force_g` is (3,) or (n, 3). Raises BadInput where a channel is missing, for a shape that does not fit,
-        for times that go back, or outside the calibrated range when that is refused.
+        `specific_force_g` is (3,) or (n, 3). `cross_rates_dps` are the rates about body axes for which the unit has no
+        output, axis -> (n,) or one for all, deg/s, where another instrument measures them; without them the unit is
+        corrected as if it did not turn about these axes. Raises BadInput where a channel is missing, for a shape that
+        does not fit, for times that go back, or outside the calibrated range when that is refused.
         """
         known = channels or {}
         for name in self.needs:
@@ -176,18 +182,20 @@ class Compensator:
                 else self._memory.of_history(history, known)
             )
             beside = remembered if beside is None else remembered + beside
-        return self._beside(beside, raw, warm, known, given.shape, has_force=specific_force_g is not None)
+        correct = self._correct if cross_rates_dps is None else self._correct_across(cross_rates_dps, len(raw))
+        return self._beside(beside, raw, warm, known, given.shape, correct, has_force=specific_force_g is not None)
 
     def _beside(
         self, beside: Array | None, raw: Array, warm: Array, known: Mapping[str, Array], shape: tuple[int, ...],
-        *, has_force: bool,
+        correct: Correct, *, has_force: bool,
     ) -> Compensated:  # fmt: skip
         """Correct outputs (n, axes) of which an error that no rate changes, (n, axes) deg/s, is known; None: none."""
         left_out = None if has_force else self._left_out_dps
         if beside is None:
-            found = self._held(raw, warm, known)
+            found = self._held(raw, warm, known, correct)
             return Compensated(found.rate_dps.reshape(shape), found.outside, left_out)
-        found = self._held(np.where(np.isnan(beside), np.nan, raw) if self._is_direct else raw - beside, warm, known)
+        less = np.where(np.isnan(beside), np.nan, raw) if self._is_direct else raw - beside
+        found = self._held(less, warm, known, correct)
         rate = found.rate_dps - beside if self._is_direct else found.rate_dps
         return Compensated(rate.reshape(shape), found.outside, left_out)
 
@@ -196,7 +204,26 @@ class Compensator:
             return None
         return self.force_sensitivity.error_dps(self.force_sensitivity.forces(specific_force_g, n))
 
-    def _held(self, raw: Array, warm: Array, known: Mapping[str, Array]) -> Compensated:
+    def _correct_across(self, cross_rates_dps: Mapping[str, ArrayLike], n: int) -> Correct:
+        """Return the correction at known rates about axes without an output; raises BadInput for any other axis."""
+        beside = [axis for axis in BODY_AXES if axis not in self.axes]
+        for axis in cross_rates_dps:
+            if axis not in beside:
+                raise BadInput(
+                    f"cross_rates_dps of axis {axis!r}: {self.calibration.serial} has outputs {', '.join(self.axes)}; "
+                    f"give rates about {' and '.join(beside) or 'no axis'} only"
+                )
+        across = {axis: np.asarray(rates, dtype=np.float64) for axis, rates in cross_rates_dps.items()}
+        for axis, rates in across.items():
+            if rates.shape not in {(), (n,)}:
+                raise BadInput(
+                    f"cross_rates_dps of axis {axis!r} has shape {rates.shape}; give one rate, or one for each of the "
+                    f"{n} samples"
+                )
+        across = {axis: np.broadcast_to(rates, (n,)) for axis, rates in across.items()}
+        return partial(correct_across, self._model, self.axes, across)
+
+    def _held(self, raw: Array, warm: Array, known: Mapping[str, Array], correct: Correct) -> Compensated:
         """Correct outputs (n, axes) by what does not remember, at the edge of the range where they are outside."""
         lowest, highest = (float(np.min(warm)), float(np.max(warm))) if warm.size else (self._low_c, self._high_c)
         least, most = (float(np.min(raw)), float(np.max(raw))) if raw.size else (0.0, 0.0)
@@ -207,8 +234,8 @@ class Compensator:
             flags = self._judge(raw, warm)
             warm = np.clip(warm, self._low_c, self._high_c)
             held = np.clip(raw, self._slow, self._fast)
-            return Compensated(self._correct(held, warm, known) + (raw - held), flags)
-        return Compensated(self._correct(raw, warm, known), flags)
+            return Compensated(correct(held, warm, known) + (raw - held), flags)
+        return Compensated(correct(raw, warm, known), flags)
 
     @property
     def needs_temperature(self) -> bool:
@@ -278,6 +305,6 @@ class Compensator:
         beside = self._running.error_dps(t_s, temperature_c)[None, :]
         found = self._beside(
             beside if by_force is None else beside + by_force, raw, np.array([temperature_c]),
-            {"t_s": np.array([t_s])}, raw.shape, has_force=specific_force_g is not None,
+            {"t_s": np.array([t_s])}, raw.shape, self._correct, has_force=specific_force_g is not None,
         )  # fmt: skip
         return found.rate_dps[0], bool(found.outside[0])

@@ -10,6 +10,7 @@ STUDIES = (
     "use_coverage",
     "budget_coverage",
     "rate_vector_coverage",
+    "single_outputs",
     "hand_turns",
     "poses",
     "joint_recordings",

@@ -40,6 +40,8 @@ from labctl.recording import Recording
 LEAST_SPARE = 6
 #: The drift counts as larger than the data sheet says where the least that it may be is this many times as large.
 LARGE_DRIFT = 1.5
+#: No model is adequate that leaves more than this many times the noise floor, whatever the evidence for any one cause.
+MOST_OVER_FLOOR = 3.0
 
 
 @dataclass(frozen=True)
@@ -139,6 +141,7 @@ def criticise(
     seen = data.through(response_of_terms(forward.terms))
     comparison = compare_models(beside_held(seen, forward), forward, catalogue)
     verdict, initial, final = search_stepwise(comparison, catalogue)
+    verdict = _without_large_residual(verdict, base)
     found = Criticism(verdict, data, fit_data, base, None, comparison, final)
     if not full or found.beside_missing is None:
         return found
@@ -169,6 +172,16 @@ def best_shapes(
     seen = data.through(response_of_terms(forward.terms))
     comparison = compare_models(beside_held(seen, forward), forward, catalogue)
     return {c.id: refined_term(comparison, c) for c in comparison.candidates if not c.smooth and c.term is not None}
+
+
+def _without_large_residual(verdict: Verdict, base: FitResult | None) -> Verdict:
+    """Return the verdict, or "unexplained" in place of an adequate model whose residual is far above the floor."""
+    if verdict.form != "adequate" or base is None:
+        return verdict
+    left, floor = base.error.rms_dps, base.error.noise_floor_dps
+    if left is None or not floor or left <= MOST_OVER_FLOOR * floor:
+        return verdict
+    return replace(verdict, form="unexplained", further=())
 
 
 def _forward(data: FitData, model: ErrorModel, base: FitResult | None) -> ErrorModel:

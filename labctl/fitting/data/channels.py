@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,8 @@ from labctl.recording import Recording
 from labctl.recording.columns import RECORDING, WITHIN_S
 
 BODY_AXES = ("x", "y", "z")
+#: What a law sees: the true rate (forward), or the output in its place (direct).
+Argument = Literal["rate", "output"]
 #: A wave, "cos" or "sin", and how often it comes per turn of the table.
 Carrier = tuple[str, int]
 #: Duration of a data set, s, where the recording does not give it.

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.errors import BadInput, NotEnoughData
-from labctl.fitting.data.channels import Channels, channels_of
+from labctl.fitting.data.channels import Argument, Channels, channels_of
 from labctl.fitting.data.covered import Covered, covered_by_means, covered_by_readings
 from labctl.fitting.data.earth import up_rate_dps
 from labctl.fitting.data.mean_noise import white_var_of
@@ -77,6 +77,17 @@ class FitData:
     def true_rate_dps(self, axis: str) -> Array:
         """Return the true rate along an axis, (m,) deg/s."""
         return self.channels.rate_dps(axis)
+
+    @property
+    def across_dps(self) -> dict[str, Array]:
+        """True rates about the body axes that have no output, axis -> (m,) deg/s: known here, not where it is used."""
+        return {axis: rates for axis, rates in self.channels.rates.items() if axis not in self.outputs}
+
+    def seen_by(self, argument: Argument) -> Channels:
+        """Return the channels with the rates that a law sees: the true ones, or the outputs in place of theirs."""
+        if argument == "rate":
+            return self.channels
+        return self.channels.with_rates({**self.across_dps, **self.outputs})
 
     def take(self, rows: NDArray[np.bool_]) -> FitData:
         """Return the context of some data sets, by mask (m,)."""

@@ -46,7 +46,7 @@ def axis_design(
 
     A column with a law is its tangent at the coefficients `at`, name -> (nodes,), or where it starts.
     """
-    channels = data.channels if model.argument == "rate" else data.channels.with_rates(data.outputs)
+    channels = data.seen_by(model.argument)
     steady = model.steady
     basis = model.temperature.basis(data.channels.temperature_c(axis))
     nodes = basis.shape[1]

@@ -175,11 +175,14 @@ def _axis_fit(design: AxisDesign, solution: Solution) -> AxisFit:
 def residuals(fitted: FittedModel, data: FitData, nuisance: Mapping[str, Nuisance] | None = None) -> dict[str, Array]:
     """Return corrected minus true rate, axis -> (m,) deg/s; `nuisance` is what was fitted beside the model.
 
-    No correction undoes a delay or a bandwidth, so the true rate is what comes through them.
+    The table's rates about axes without an output are known, and enter the correction: what one output alone cannot
+    correct is no error of the model (`RateVectorUncertainty` states it). No correction undoes a delay or a bandwidth,
+    so the true rate is what comes through them.
     """
     outputs = {a: v - nuisance[a].error_dps(data, a) if nuisance else v for a, v in data.outputs.items()}
-    corrected = without_response(fitted).compensate(outputs, data.channels)
     seen = {axis: data.through(response_of(fitted.axes[axis])) for axis in outputs}
+    across_dps = next(iter(seen.values())).across_dps
+    corrected = without_response(fitted).compensate(outputs, data.channels, across_dps)
     return {axis: corrected[axis] - seen[axis].true_rate_dps(axis) for axis in outputs}
 
 

@@ -94,7 +94,7 @@ def _left_out_dps(fitted: FittedModel, data: FitData) -> dict[str, float]:
     for term in fitted.model.terms:
         if not is_exported(term):
             rest = without(fitted, term.effect)
-            channels = data.channels if fitted.model.argument == "rate" else data.channels.with_rates(data.outputs)
+            channels = data.seen_by(fitted.model.argument)
             parts = {axis: fitted.error_dps(channels, axis) - rest.error_dps(channels, axis) for axis in data.outputs}
             found[term.effect] = rms(parts) or 0.0
     return found

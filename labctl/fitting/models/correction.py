@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 
 import numpy as np
 
@@ -14,6 +15,24 @@ from labctl.fitting.models.sine_form import sine_form_of
 from labctl.fitting.numeric.arrays import Array
 
 Correct = Callable[[Array, Array, Mapping[str, Array]], Array]
+
+
+def correct_across(
+    fitted: FittedModel, axes: tuple[str, ...], across_dps: Mapping[str, Array],
+    raw: Array, temperature_c: Array, channels: Mapping[str, Array],
+) -> Array:  # fmt: skip
+    """Apply any model to rates (n, axes) at temperatures (n,) or (n, axes), deg/s: no form is faster than exact.
+
+    `across_dps` are true rates about axes without an output, axis -> (n,) deg/s; one that is absent is at rest.
+    """
+    n = len(raw)
+    warm = np.broadcast_to(temperature_c, (n,)) if temperature_c.ndim < 2 else temperature_c.mean(axis=1)
+    columns: dict[str, Array] = {"temperature_c": warm, **channels}
+    if temperature_c.ndim == 2:
+        columns |= {f"temperature_{axis}_c": temperature_c[:, i] for i, axis in enumerate(axes)}
+    outputs = {axis: raw[:, i] for i, axis in enumerate(axes)}
+    corrected = fitted.compensate(outputs, Channels(columns, outputs), across_dps)
+    return np.column_stack([corrected[axis] for axis in axes])
 
 
 def correction(fitted: FittedModel, axes: tuple[str, ...]) -> Correct:
@@ -29,14 +48,4 @@ def correction(fitted: FittedModel, axes: tuple[str, ...]) -> Correct:
     if sine is not None:
         return lambda raw, warm, _: sine.correct(raw, warm)
 
-    def general(raw: Array, temperature_c: Array, channels: Mapping[str, Array]) -> Array:
-        n = len(raw)
-        warm = np.broadcast_to(temperature_c, (n,)) if temperature_c.ndim < 2 else temperature_c.mean(axis=1)
-        columns: dict[str, Array] = {"temperature_c": warm, **channels}
-        if temperature_c.ndim == 2:
-            columns |= {f"temperature_{axis}_c": temperature_c[:, i] for i, axis in enumerate(axes)}
-        outputs = {axis: raw[:, i] for i, axis in enumerate(axes)}
-        corrected = fitted.compensate(outputs, Channels(columns, outputs))
-        return np.column_stack([corrected[axis] for axis in axes])
-
-    return general
+    return partial(correct_across, fitted, axes, {})

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
-from typing import Literal
 
 import numpy as np
 
-from labctl.fitting.data.channels import Channels
+from labctl.fitting.data.channels import Argument, Channels
 from labctl.fitting.effects import Column, Reference, Term, kind_of
 from labctl.fitting.models.held import Held
 from labctl.fitting.models.temperature import Constant, TemperatureBasis, basis_from_dict
@@ -16,7 +15,6 @@ from labctl.fitting.numeric.arrays import Array
 from labctl.json_types.models import ErrorModelJson, TermJson
 from labctl.recording.columns import RECORDING
 
-Argument = Literal["rate", "output"]
 #: Effects of these origins belong to the unit and are exported with its calibration.
 EXPORTED_ORIGINS = frozenset({"sensor", "package"})
 

@@ -64,19 +64,23 @@ class FittedModel:
                 error += column.error_dps(coefficients[column.name])
         return error
 
-    def compensate(self, outputs: Mapping[str, Array], channels: Channels) -> dict[str, Array]:
+    def compensate(
+        self, outputs: Mapping[str, Array], channels: Channels, across_dps: Mapping[str, Array] | None = None
+    ) -> dict[str, Array]:
         """Return the true rate along each recorded axis, axis -> (n,) deg/s, from outputs axis -> (n,) deg/s.
 
         A direct law is subtracted (Ojeda et al. 2000, eq. 13); a forward law is solved for the rate (`invert`).
-        Raises NotConverged where it has no solution.
+        `across_dps` are true rates about axes without an output, axis -> (n,) deg/s, where they are known; an axis that
+        is neither counts as at rest. Raises NotConverged where there is no solution.
         """
+        across = across_dps or {}
         if self.model.argument == "output":
-            seen = channels.with_rates(outputs)
+            seen = channels.with_rates({**across, **outputs})
             return {axis: outputs[axis] - self.error_dps(seen, axis) for axis in outputs}
         known = {axis: self._coefficients(channels, axis) for axis in outputs}
         return invert(
             outputs,
-            lambda rates, axis: self._error_with(known[axis], channels.with_rates(rates), axis),
+            lambda rates, axis: self._error_with(known[axis], channels.with_rates({**across, **rates}), axis),
             self.model.name,
         )
 

@@ -239,8 +239,15 @@ def _first(found: Criticism) -> str:
         case "ambiguous":
             return _ambiguous(verdict, words)
         case "unexplained":
-            channel = verdict.depends_on[0] if verdict.depends_on else "an unknown channel"
-            return f"The residual depends on {channel} in a way that no effect of the catalogue describes."
+            if not verdict.depends_on:
+                return (
+                    "The residual is larger than the noise floor, and depends on no recorded channel: record more "
+                    "channels (supply voltage, humidity, time since power-on), or repeat data sets to see whether it "
+                    "repeats."
+                )
+            return (
+                f"The residual depends on {verdict.depends_on[0]} in a way that no effect of the catalogue describes."
+            )
         case _:
             return f"Too little data for a verdict: {verdict.reason}."
 

@@ -9,11 +9,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from labctl.errors import BadInput
-from labctl.fitting.data.channels import Channels
+from labctl.fitting.data.channels import Argument, Channels
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.effects import Reference, kind_of
 from labctl.fitting.estimation.requirements import require_channels
-from labctl.fitting.models.error_model import Argument, ErrorModel
+from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.held import Held, HeldCoefficient
 from labctl.fitting.models.presets import Preset, holding
 from labctl.fitting.models.temperature import LagrangeTable
@@ -68,7 +68,7 @@ def _resolved(data: FitData, model: ErrorModel, fixed: Fixed) -> Held:
             f"{fixed.name}: its coefficients belong to a law of the {fixed.argument}, but model {model.name} is a law "
             f"of the {model.argument}, in which they mean something else; fit another model, or give other coefficients"
         )
-    channels = data.channels if model.argument == "rate" else data.channels.with_rates(data.outputs)
+    channels = data.seen_by(model.argument)
     axes: dict[str, dict[str, HeldCoefficient]] = {}
     for axis, given in fixed.axes.items():
         if axis in data.outputs:

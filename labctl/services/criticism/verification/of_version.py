@@ -85,7 +85,9 @@ def applied_errors(
     compensator = Compensator(calibration)
     raw = np.column_stack([data.outputs[axis] for axis in calibration.axes])
     warm = np.column_stack([data.channels.temperature_c(axis) for axis in calibration.axes])
-    found = compensator.compensate(raw, warm, _channels(compensator, data), history=data.channels.history)
+    found = compensator.compensate(
+        raw, warm, _channels(compensator, data), history=data.channels.history, cross_rates_dps=data.across_dps or None
+    )
     errors = {axis: found.rate_dps[:, i] - data.true_rate_dps(axis) for i, axis in enumerate(calibration.axes)}
     return errors, found.outside
 
