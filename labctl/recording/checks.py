@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from labctl.errors import BadRecording
 from labctl.recording.coefficient_forms import check_coefficients
-from labctl.recording.columns import BY_NAME, ENVIRONMENT_NEEDED, needed
+from labctl.recording.columns import BY_NAME, ENVIRONMENT_NEEDED, VERIFICATION, needed
 from labctl.recording.data_set_limits import refuse_large_numbers, refuse_too_many_data_sets
 from labctl.recording.info import RecordingInfo
 from labctl.recording.motions.constant_rate import rate_change
@@ -54,6 +54,7 @@ def checked(path: Path, info: RecordingInfo, columns: dict[str, Column]) -> dict
     _datasets(path, np.asarray(columns["dataset"], dtype=np.int64), points=info.kind == "points")
     if info.kind == "samples" and info.motion == "rates":
         _one_rate(path, columns)
+    _one_mark(path, columns)
     if info.motion == "turns":
         check_turns(path, info, columns)
     return _defaults(path, info, columns)
@@ -168,6 +169,23 @@ def _one_rate(path: Path, columns: dict[str, Column]) -> None:
             f"{change.dataset}, which began at {change.before_dps:g} deg/s; a data set has one rate: give the "
             "readings at another rate a separate data set number, or mark them with valid = 0"
         )
+
+
+def _one_mark(path: Path, columns: dict[str, Column]) -> None:
+    """Raise BadRecording for a mark other than 0 and 1, or one that changes within a data set."""
+    if VERIFICATION not in columns:
+        return
+    marks, dataset = np.asarray(columns[VERIFICATION]), np.asarray(columns["dataset"])
+    wrong = (marks != 0) & (marks != 1)
+    changes = np.concatenate([[False], (marks[1:] != marks[:-1]) & (dataset[1:] == dataset[:-1])])
+    if not (wrong | changes).any():
+        return
+    row = int(np.argmax(wrong | changes))
+    said = "is not 0 or 1" if wrong[row] else f"differs from {marks[row - 1]} in the row before, of the same data set"
+    raise BadRecording(
+        f"{path}: column {VERIFICATION!r}, row {row + 1}: {marks[row]} {said}; give every row of a data set 1 if it "
+        "was measured to verify a calibration, else 0"
+    )
 
 
 def _defaults(path: Path, info: RecordingInfo, columns: dict[str, Column]) -> dict[str, Column]:

@@ -27,6 +27,8 @@ class Column:
 
 #: Columns of several recordings as one: which recording a row is of, its time within it, and its data set there.
 RECORDING, WITHIN_S, OWN_DATASET = "recording", "recording_t_s", "recording_dataset"
+#: Column of the data sets that no fit takes in.
+VERIFICATION = "verification"
 
 _BOTH = frozenset({"samples", "points"})
 _ON_TABLE: frozenset[Motion] = frozenset({"rates", "profile"})
@@ -38,6 +40,7 @@ COLUMNS = (
     Column("position", "text", "", "body axis along the table axis, with its sign"),
     Column("run", "integer", "", "powered session"),
     Column("mounting", "integer", "", "number of the mounting: increases each time the unit is mounted again"),
+    Column("verification", "integer", "", "1: measured to verify a calibration, and never fitted"),
     Column("power_s", "number", "s", "time since the unit was last switched on"),
     Column("table_rate_dps", "number", "deg/s", "true rate of the table", _BOTH, _ON_TABLE),
     Column("computed_rate_dps", "number", "deg/s", "commanded rate of the table"),
@@ -93,7 +96,7 @@ POSITIONED: frozenset[Motion] = frozenset({"rates", "turns", "profile"})
 
 def holds_flags(name: str) -> bool:
     """Whether a column of a recording holds true and false, as 1 and 0."""
-    return name == "valid"
+    return name in {"valid", VERIFICATION}
 
 
 def needed(info: RecordingInfo) -> list[str]:

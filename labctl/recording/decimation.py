@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.recording import Recording
-from labctl.recording.columns import OWN_DATASET, RECORDING
+from labctl.recording.columns import OWN_DATASET, RECORDING, VERIFICATION
 from labctl.recording.points import dataset_starts
 
 #: Faster readings are averaged down to this many per second.
@@ -49,7 +49,7 @@ def decimate(recording: Recording) -> Recording:
         unit = recording.info.output.get(axis)
         if unit is not None:
             numbers[f"gyro_{axis}"] = unit.offset + unit.scale * numbers[f"gyro_{axis}"]
-    for name in ("run", "mounting", RECORDING, OWN_DATASET):
+    for name in ("run", "mounting", VERIFICATION, RECORDING, OWN_DATASET):
         if name in numbers:
             texts[name] = np.rint(numbers.pop(name)).astype(np.int64)
     return Recording(recording.info, {"dataset": dataset, **numbers, **texts}, recording.environment)

@@ -15,7 +15,9 @@ from labctl.recording.recording import Columns, Recording
 from labctl.recording.spread import LEAST_FOR_SPECTRUM, white_std
 
 #: Columns that one data set has one value of: its first reading's.
-FIRST = ("dataset", "position", "run", "mounting", "table_angle_deg", "recording", "recording_dataset")
+FIRST = (
+    "dataset", "position", "run", "mounting", "verification", "table_angle_deg", "recording", "recording_dataset",
+)  # fmt: skip
 #: A data set longer than this, through which the temperature moves by more than that, is no one point: it is taken in
 #: pieces of about a minute, as long as the data sets of the published schedules.
 LONG_S = 600.0

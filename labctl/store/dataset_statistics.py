@@ -8,11 +8,23 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.recording.columns import VERIFICATION
 from labctl.recording.spread import LEAST_FOR_SPECTRUM, white_std
 
 #: Columns that are no measured channel, so have no mean of their own.
 NOT_CHANNELS = frozenset(
-    {"dataset", "t_s", "position", "run", "mounting", "table_rate_dps", "table_angle_deg", "power_s", "valid"}
+    {
+        "dataset",
+        "t_s",
+        "position",
+        "run",
+        "mounting",
+        "table_rate_dps",
+        "table_angle_deg",
+        "power_s",
+        "valid",
+        VERIFICATION,
+    }
 )
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from labctl.recording import Recording, dataset_starts
+from labctl.recording.columns import VERIFICATION
 from labctl.recording.recording import Columns
 from labctl.store import sample_codec
 from labctl.store.dataset_statistics import means_rows
@@ -129,6 +130,7 @@ def _head(recording: int, number: int, part: Columns, n: int) -> Row:
         "gate_until_s": float(part["t_s"][-1]) if "t_s" in part else None,
         "power_on_s": None if power is None else float(part["t_s"][0] - power[0]),
         "n": n,
+        "verification": bool(part[VERIFICATION][0]) if VERIFICATION in part else False,
     }
 
 

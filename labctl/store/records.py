@@ -67,6 +67,7 @@ class DataSetRow:
     n: int
     lost: int
     damaged: int
+    verification: bool  #: measured to verify a calibration, and never fitted
 
 
 @dataclass(frozen=True)

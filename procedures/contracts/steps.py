@@ -97,6 +97,7 @@ class Acquire(StepBase):
     mounting: int
     settle_s: float
     duration_s: float
+    verification: bool = False  #: measured to verify a calibration, and never fitted
 
 
 class Turn(StepBase):

@@ -58,7 +58,7 @@ class Plan(BaseModel):
     @property
     def schedule_hash(self) -> str:
         """SHA-256 over what is done in which order: equal on two benches that run the same steps."""
-        steps = [step.model_dump(exclude=_BENCH_FIGURES) for step in self.steps]
+        steps = [step.model_dump(exclude=_BENCH_FIGURES | _unset(step)) for step in self.steps]
         text = json.dumps(steps, sort_keys=True, separators=(",", ":"))
         return hashlib.sha256(text.encode()).hexdigest()
 
@@ -128,6 +128,11 @@ class Plan(BaseModel):
         return _powered(tuple(step for n, step in enumerate(self.steps[:index]) if n not in skipped))
 
 
+def _unset(step: Step) -> set[str]:
+    """Return the names that plans of before a later version do not have, where the step does not use them."""
+    return {"verification"} if isinstance(step, Acquire) and not step.verification else set()
+
+
 def _powered(steps: tuple[Step, ...]) -> int:
     for step in reversed(steps):
         if isinstance(step, PowerOn):
@@ -156,6 +161,8 @@ def _refuse_endless(recipe: Recipe) -> None:
         asked += len(recipe.positions) * len(recipe.inverted.temperatures_c) * len(recipe.inverted.rates_dps)
     if recipe.power_cycle is not None:
         asked += recipe.power_cycle.count * len(recipe.power_cycle.rates_dps)
+    if (verify := recipe.verification) is not None:
+        asked += len(verify.positions or recipe.positions) * verify.temperatures * verify.rates
     if recipe.turns is not None:
         asked = DATA_SETS_OF_TURN * len(recipe.positions) * len(recipe.turns.turns_deg) * recipe.turns.repeats
     if asked > MOST_DATASETS:

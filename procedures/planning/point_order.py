@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from procedures.recipe.recipe import Recipe
 
@@ -24,11 +25,36 @@ class MountingBlock:
     position: str
     levels: tuple[Level, ...]
     same_session: bool = False  #: turned without being switched off, whatever the recipe says of other mountings
+    verification: bool = False  #: mounted and switched on anew, and never fitted
 
 
 def order_points(recipe: Recipe) -> list[MountingBlock]:
     """Return the mountings of a recipe in order, with everything measured in each."""
     return [_with_rates(recipe, block, number) for number, block in enumerate(_blocks(recipe))]
+
+
+def verification_blocks(recipe: Recipe) -> list[MountingBlock]:
+    """Return the mountings in which a calibration is verified, in order, at rates and temperatures of their own."""
+    rules = recipe.verification
+    if rules is None:
+        return []
+    blocks = []
+    for number, position in enumerate(rules.positions or recipe.positions):
+        lot = np.random.default_rng([rules.seed, number])
+        levels = tuple(
+            Level(
+                temperature_c, tuple(_drawn(recipe.rates_dps, rules.rates, lot)[lot.permutation(rules.rates)].tolist())
+            )
+            for temperature_c in _drawn(recipe.temperatures_c, rules.temperatures, lot).tolist()
+        )
+        blocks.append(MountingBlock(position, levels, verification=True))
+    return blocks
+
+
+def _drawn(listed: tuple[float, ...], number: int, lot: np.random.Generator) -> NDArray[np.float64]:
+    """Return values (number,), one at random in each of as many equal parts of the listed range, to 0.01."""
+    edges = np.linspace(min(listed), max(listed), number + 1)
+    return np.round(lot.uniform(edges[:-1], edges[1:]), 2)
 
 
 def upside_down(position: str) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from procedures.contracts.steps import (
     Acquire,
@@ -18,7 +19,7 @@ from procedures.contracts.steps import (
     Step,
 )
 from procedures.planning.limits import BenchLimits
-from procedures.planning.point_order import Level, MountingBlock, order_points
+from procedures.planning.point_order import Level, MountingBlock, order_points, verification_blocks
 from procedures.planning.turn_steps import turn_steps
 from procedures.recipe.recipe import Recipe
 
@@ -57,15 +58,27 @@ class _StepWriter:
         self.steps.append(Home(expected_s=HOMING_S))
         self.measure_clock()
         for block in order_points(self.recipe):
-            self.mount(block)
-            for level in block.levels:
-                self.move_chamber(level.temperature_c)
-                self.soak(level.temperature_c)
-                self.check_home(level)
-                self.acquire(level)
-                self.check_home(level)
+            self.measure(block)
         self.power_cycles()
+        for block in verification_blocks(self.recipe):
+            levels = tuple(Level(each.temperature_c, self.runnable(each.rates_dps)) for each in block.levels)
+            self.measure(replace(block, levels=levels))
         self.steps.append(SafeState())
+
+    def runnable(self, drawn_dps: tuple[float, ...]) -> tuple[float, ...]:
+        """Return drawn rates as the table can run them: the nearest it has, or rest."""
+        allowed = self.recipe.guards.max_rate_error_fraction
+        return tuple(0.0 if self.limits.rate_complaint(rate, allowed) else rate for rate in drawn_dps)
+
+    def measure(self, block: MountingBlock) -> None:
+        """Mount the units, and run the rates of each temperature."""
+        self.mount(block)
+        for level in block.levels:
+            self.move_chamber(level.temperature_c)
+            self.soak(level.temperature_c)
+            self.check_home(level)
+            self.acquire(level, verification=block.verification)
+            self.check_home(level)
 
     def measure_clock(self) -> None:
         """Measure the step clock at the largest rate of the recipe, where the table does that."""
@@ -86,7 +99,8 @@ class _StepWriter:
         """Turn the units: chamber to where it can be opened, off if the recipe says so, turn, on."""
         if (handling_c := self.recipe.mounting.handling_c) is not None:
             self.move_chamber(handling_c)
-        repower = self.run == 0 or (self.recipe.mounting.repower_each and not block.same_session)
+        each = self.recipe.mounting.repower_each or block.verification
+        repower = self.run == 0 or (each and not block.same_session)
         if self.run and repower:
             self.steps.append(PowerOff(run=self.run))
         self.position = block.position
@@ -132,7 +146,7 @@ class _StepWriter:
             )
         )
 
-    def acquire(self, level: Level) -> None:
+    def acquire(self, level: Level, *, verification: bool = False) -> None:
         for rate_dps in level.rates_dps:
             self.datasets += 1
             real_dps = self.limits.real_rate_dps(rate_dps)
@@ -149,6 +163,7 @@ class _StepWriter:
                     settle_s=self.recipe.acquire.settle_s,
                     duration_s=duration_s,
                     expected_s=self.recipe.acquire.settle_s + duration_s + ramps_s,
+                    verification=verification,
                 )
             )
 

@@ -28,6 +28,7 @@ from procedures.recipe.rules import (
     ResumeRules,
     SoakRules,
     Table,
+    Verification,
     Whole,
 )
 from procedures.recipe.turns import TurnRules
@@ -39,7 +40,7 @@ LONGEST_KEY = 80
 #: What a recipe of turns by hand has no use for: no table and no chamber is driven.
 _OF_RATES = (
     "temperatures_c", "rates_dps", "order", "temperature_order", "rate_order", "repeats", "soak", "acquire",
-    "replicates", "inverted", "power_cycle", "profiles",
+    "replicates", "inverted", "power_cycle", "profiles", "verification",
 )  # fmt: skip
 
 
@@ -69,6 +70,7 @@ class Recipe(Table):
     replicates: Replicates = Replicates()
     inverted: Inverted | None = None
     power_cycle: PowerCycle | None = None
+    verification: Verification | None = None  #: absent: nothing is measured beside what is fitted
     mounting: Mounting = Mounting()
     profiles: tuple[Profile, ...] = ()  #: courses of the rate, run at the start of each level; simulated only
     guards: GuardRules = GuardRules()

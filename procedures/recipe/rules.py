@@ -76,6 +76,19 @@ class PowerCycle(Table):
     rates_dps: tuple[Number, ...] = Field(min_length=1)
 
 
+class Verification(Table):
+    """Points that are measured after all others, and never fitted: what a calibration promises is judged there.
+
+    Each position is mounted anew, in a new powered session. Temperatures and rates are drawn from the seed, one in
+    each of as many equal parts of the recipe's ranges, so that they lie between those that are fitted.
+    """
+
+    temperatures: Whole = Field(default=1, ge=1, le=50)  #: in each mounting
+    rates: Whole = Field(default=5, ge=2, le=200)  #: at each temperature
+    positions: tuple[Position, ...] = ()  #: absent: those of the recipe
+    seed: Whole = Field(default=1, ge=0)
+
+
 class Mounting(Table):
     """How a unit is turned."""
 

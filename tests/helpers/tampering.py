@@ -53,6 +53,12 @@ def _warmer(connection: sa.Connection) -> None:
     connection.execute(sa.update(e).values(temperature_c=e.c.temperature_c + 5, chamber_c=e.c.chamber_c + 5))
 
 
+def _mark(connection: sa.Connection) -> None:
+    """Mark a data set, so that no fit takes it in."""
+    d = t.data_sets.c
+    connection.execute(sa.update(t.data_sets).where(d.recording_id == 1, d.number == 3).values(verification=True))
+
+
 def _data_set(connection: sa.Connection) -> None:
     for table in (t.data_set_means, t.sample_blocks, t.block_digests, t.data_sets):
         connection.execute(sa.delete(table).where(table.c.recording_id == 1, table.c.number == 2))
@@ -107,6 +113,7 @@ EDITS: dict[str, tuple[Edit, str, str]] = {
     "rates": (_rates, "recording", "recording 1: table rates changed"),
     "temperatures": (_warmer, "recording", "recording 1: temperatures of the readings changed"),
     "data set": (_data_set, "recording", "recording 1: data sets changed"),
+    "mark of a data set": (_mark, "recording", "recording 1: verification marks changed"),
     "events": (_events, "campaign", "campaign 1: events changed"),
     "state of campaign": (_campaign_state, "campaign", "campaign 1: state changed"),
     "state of data set": (_data_set_state, "recording", "recording 1: state of data sets changed"),

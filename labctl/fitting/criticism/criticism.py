@@ -35,6 +35,7 @@ from labctl.json_types.criticism import NotTestable
 from labctl.json_types.views import Views
 from labctl.progress import report_stage
 from labctl.recording import Recording
+from labctl.recording.verification import fitted_part
 
 #: Data sets beyond the base's coefficients that a verdict needs.
 LEAST_SPARE = 6
@@ -133,7 +134,7 @@ def criticise(
     fit_data = fitted.data if fitted is not None else fit_data_of(points or recording)
     base = fitted.base if fitted is not None else None
     report_stage("reducing the recording")
-    recording = with_temperature(recording)
+    recording = with_temperature(fitted_part(recording))
     data = replace(reduce_recording(recording), static=static_record(recording, 0.0 if full else LONG_S))
     forward = _forward(fit_data, model, base)
     if (short := _too_little(data, forward)) is not None:
@@ -166,7 +167,7 @@ def best_shapes(
 
     `points` are the recording's means. Raises NotEnoughData where the model cannot be fitted.
     """
-    recording = with_temperature(recording)
+    recording = with_temperature(fitted_part(recording))
     data = replace(reduce_recording(recording), static=static_record(recording))
     forward = _forward(fit_data_of(points), model, None)
     seen = data.through(response_of_terms(forward.terms))

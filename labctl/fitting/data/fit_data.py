@@ -21,6 +21,7 @@ from labctl.fitting.data.temperature.levels import folds, temperature_levels
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.drift_noise import Scatter
 from labctl.recording import Recording, RecordingInfo, to_points
+from labctl.recording.verification import fitted_part
 
 
 @dataclass(frozen=True)
@@ -152,7 +153,8 @@ def refuse_poses(info: RecordingInfo) -> None:
 def fit_data_of(recording: Recording, covered: Covered | None = None) -> FitData:
     """Return what a fit of this recording works on.
 
-    `covered` is the range of the readings behind a recording of means, where it is known.
+    `covered` is the range of the readings behind a recording of means, where it is known. What was measured to verify a
+    calibration is left out.
 
     Raises BadInput for coefficients, NotEnoughData when empty or where nothing says how warm the unit was.
     """
@@ -162,6 +164,7 @@ def fit_data_of(recording: Recording, covered: Covered | None = None) -> FitData
             "recording of readings or means"
         )
     refuse_poses(recording.info)
+    recording = fitted_part(recording)
     points = to_points(recording)
     if len(points) == 0:
         raise NotEnoughData(

@@ -17,6 +17,7 @@ from labctl.fitting.data.covered import Covered
 from labctl.fitting.data.temperature.channel import with_temperature
 from labctl.recording import Recording, RecordingInfo, Standard, to_points
 from labctl.recording.columns import OWN_DATASET, RECORDING, WITHIN_S
+from labctl.recording.verification import fitted_part
 
 #: Numbers that go on counting from recording to recording.
 COUNTED = ("dataset", "run", "mounting")
@@ -42,13 +43,15 @@ def joined_recording(parts: Mapping[int, Recording]) -> Recording:
     """Return recordings, number -> recording, as one, in order of their starts; a single one as it is.
 
     Readings stay readings where all of them have readings, else they become means. A channel that one of them lacks is
-    left out. Raises BadInput for recordings that do not go together, NotEnoughData where one has no thermometer.
+    left out, and so is what was measured to verify a calibration.
+
+    Raises BadInput for recordings that do not go together, NotEnoughData where one has no thermometer.
     """
     if len(parts) == 1:
         return next(iter(parts.values()))
     order = sorted(parts, key=lambda number: (parts[number].info.started_at, number))
     _require_alike(order, parts)
-    whole = {number: with_temperature(parts[number]) for number in order}
+    whole = {number: with_temperature(fitted_part(parts[number])) for number in order}
     if any(recording.info.kind != "samples" for recording in whole.values()):
         whole = {number: to_points(recording) for number, recording in whole.items()}
     first = whole[order[0]].info

@@ -65,6 +65,7 @@ def data_sets(store: Store, recording: int) -> DataSetsResponse:
         n=[row.n for row in rows],
         lost=[row.lost for row in rows],
         damaged=[row.damaged for row in rows],
+        verification=[row.verification for row in rows],
         chamber_setpoint_c=[row.chamber_setpoint_c for row in rows],
         channels=channels,
     )

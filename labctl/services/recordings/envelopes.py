@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.recording.columns import VERIFICATION
 from labctl.services.cache import FileCache
 from labctl.store import Store
 
@@ -19,7 +20,7 @@ LEAST_BINS, READINGS_A_BIN, MOST_BINS = 64, 128, 4096
 #: A file has some 24 bytes a bin, and a recording up to a dozen files.
 ENVELOPES = FileCache("envelopes", ".npz", most=200)
 #: Columns that are no measured channel over time.
-NO_COURSE = frozenset({"dataset", "t_s", "run", "mounting", "valid"})
+NO_COURSE = frozenset({"dataset", "t_s", "run", "mounting", VERIFICATION, "valid"})
 
 Array = NDArray[np.float64]
 

@@ -40,7 +40,11 @@ class VerificationResponse(ResponseModel):
     version: int
     recording: int
     recorded_unit: str = Field(description="Serial number of the unit that was recorded.")
-    seen: bool = Field(description="Whether the version was fitted to this recording.")
+    seen: bool = Field(description="Whether the version was fitted to these data sets.")
+    part: Literal["verification", "all"] = Field(
+        description="verification: the data sets of the recording that were measured to verify, and are never fitted; "
+        "all: the recording has none, so every data set."
+    )
     datasets: int
     rms_dps: float = Field(description="Root mean square of the error over data sets and axes, deg/s.")
     max_dps: float

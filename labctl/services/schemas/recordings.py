@@ -170,6 +170,7 @@ class DataSetsResponse(ResponseModel):
     n: list[int]
     lost: list[int]
     damaged: list[int]
+    verification: list[bool] = Field(description="Whether it was measured to verify a calibration: never fitted.")
     chamber_setpoint_c: list[float | None]
     channels: dict[str, ChannelColumns]
 

@@ -17,6 +17,7 @@ from instruments.protocols.arrick_c4_settings import StepperSettings
 from instruments.simulation import open_simulation
 from labctl.errors import BadInput
 from labctl.recording import Recording, RecordingInfo
+from labctl.recording.columns import VERIFICATION
 from labctl.services.benches.standards import standards_of
 from procedures.contracts.steps import Acquire, Mount, MoveChamber, PowerOff, PowerOn
 from procedures.planning.plan import Plan
@@ -162,6 +163,8 @@ class _Walk:
             "supply_v": sample.supply_v,
             "humidity_pct": self._world.humidity_pct(times),
         }
+        if self._plan.recipe.verification is not None:
+            part[VERIFICATION] = np.full(n, int(step.verification), dtype=np.int64)
         part |= {f"gyro_{axis}": sample.rate_dps[:, i] for i, axis in enumerate(self._settings.axes)}
         self._parts.append(part)
 

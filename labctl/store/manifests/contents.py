@@ -28,6 +28,7 @@ class Part:
     columns: str
     order: str = ""
     only: Callable[[], sa.ColumnElement[bool]] = sa.true
+    since: str = ""  #: schema that added it: a record that was sealed before had no such rows
 
     def query(self, record: int | str) -> sa.Select[*tuple[object, ...]]:
         """Return the query of its rows, as they are stored, in an order that does not depend on the database."""
@@ -104,6 +105,10 @@ RECORDING = Kind(
         Part(
             "table rates", _T.data_sets, "recording_id", "number table_rate_dps asked_dps table_angle_deg encoder",
             "number",
+        ),
+        Part(
+            "verification marks", _T.data_sets, "recording_id", "number verification", "number",
+            lambda: _T.data_sets.c.verification, since="0018",
         ),
         Part("set temperatures", _T.data_sets, "recording_id", "number chamber_setpoint_c", "number"),
         Part("means", _T.data_set_means, "recording_id", _MEANS, "number channel", _not_of_temperature),

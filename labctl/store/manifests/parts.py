@@ -8,7 +8,7 @@ import sqlalchemy as sa
 
 from labctl.json_types import JsonObject
 from labctl.store import sample_codec
-from labctl.store.manifests.contents import Kind
+from labctl.store.manifests.contents import KINDS, Kind
 from labctl.store.manifests.digests import GROUPS, RowsDigest, block_digests, digest_of_rows
 from labctl.store.schema import tables
 
@@ -39,11 +39,18 @@ class BlockParts:
         return {BLOCK_PARTS[group]: made.digest().as_json() for group, made in self._made.items()}
 
 
-def parts_of(connection: sa.Connection, kind: Kind, record: str, *, blocks: bool = True) -> Parts:
-    """Return the digest of every part of a record; those of blocks, unless left out, by what is kept of them."""
+def parts_of(
+    connection: sa.Connection, kind: Kind, record: str, *, blocks: bool = True, schema: str | None = None
+) -> Parts:
+    """Return the digest of every part of a record; those of blocks, unless left out, by what is kept of them.
+
+    `schema` is that of the database, where a migration has not come to the newest yet.
+    """
     key = kind.key_of(record)
     found: dict[str, JsonObject] = {}
     for part in kind.parts:
+        if schema is not None and part.since > schema:
+            continue
         rows: Iterable[sa.Row[*tuple[object, ...]]] = connection.execute(
             part.query(key).execution_options(yield_per=AT_ONCE)
         )
@@ -77,6 +84,16 @@ def _digests_of_block(connection: sa.Connection, recording: int, number: int, se
     return block_digests(sample_codec.unpack(sample_codec.Block(*connection.execute(query).one())))
 
 
+#: Parts that a later schema added, and what each is of a record that was sealed before.
+_LATER = frozenset(part.name for kind in KINDS.values() for part in kind.parts if part.since)
+_NOTHING: JsonObject = digest_of_rows(()).as_json()
+
+
 def differing(sealed: Parts, now: Parts) -> list[str]:
-    """Return the names of the parts that are not what they were; parts that only one of both has are not compared."""
-    return [name for name, digest in sealed.items() if name in now and dict(now[name]) != dict(digest)]
+    """Return the names of the parts that are not what they were.
+
+    Of a part that a later schema added a record that was sealed before had nothing; other parts that only one of both
+    has are not compared.
+    """
+    before = dict.fromkeys(_LATER & set(now), _NOTHING) | dict(sealed)
+    return [name for name, digest in before.items() if name in now and dict(now[name]) != dict(digest)]

@@ -34,7 +34,7 @@ from labctl.store.schema import tables
 from labctl.store.sealing.seals import changing, of_campaign, prepared_recordings, sealed_at
 from procedures.contracts.campaign_state import ENDED, CampaignState
 from procedures.contracts.journal import NOT_SAFE, DataSetHeader, DataSetState, EnvironmentSample, Event, TableAngles
-from procedures.contracts.steps import StepResult
+from procedures.contracts.steps import Acquire, StepResult
 from procedures.execution.signals import defer_signals
 
 #: Built once: a statement that is built anew for every second of a campaign costs more than writing it.
@@ -174,6 +174,7 @@ class StoreJournal:
                         "turn_deg": header.turn_deg,
                         "turn_u_deg": header.turn_u_deg,
                         "planned": header.planned,
+                        "verification": isinstance(s, Acquire) and s.verification,
                     }
                     for recording in (self._recordings[gyro] for gyro in header.gyros)
                 ],

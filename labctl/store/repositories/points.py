@@ -8,6 +8,7 @@ import numpy as np
 import sqlalchemy as sa
 from numpy.typing import NDArray
 
+from labctl.recording.columns import VERIFICATION
 from labctl.store.schema import tables
 
 
@@ -17,7 +18,7 @@ def points_columns(connection: sa.Connection, recording: int) -> dict[str, NDArr
     heads = connection.execute(
         sa.select(
             d.number, d.position, d.run, d.mounting, d.table_rate_dps, d.table_angle_deg, d.chamber_setpoint_c,
-            d.gate_from_s, d.gate_until_s, d.power_on_s, d.n,
+            d.gate_from_s, d.gate_until_s, d.power_on_s, d.n, d.verification,
         )
         .where(d.recording_id == recording, d.state == "complete", d.n > 0)
         .order_by(d.number)
@@ -30,6 +31,8 @@ def points_columns(connection: sa.Connection, recording: int) -> dict[str, NDArr
     columns["position"] = np.array([row[1] for row in heads], dtype=np.str_)
     columns["run"] = np.array([row[2] for row in heads], dtype=np.int64)
     columns["mounting"] = np.array([row[3] for row in heads], dtype=np.int64)
+    if any(row[11] for row in heads):
+        columns[VERIFICATION] = np.array([bool(row[11]) for row in heads], dtype=np.int64)
     columns["table_rate_dps"] = _floats(heads, 4)
     known = {
         "table_angle_deg": _floats(heads, 5),

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from labctl.errors import LabctlError, NotFound
 from labctl.json_types import JsonObject
 from labctl.recording import Recording, RecordingInfo, refuse_too_many_data_sets
+from labctl.recording.columns import VERIFICATION
 from labctl.store.connection.database import Database
 from labctl.store.import_parts import WHOLE_TABLE, import_parts
 from labctl.store.records import DataSetRow, MeanRow, RecordingRow
@@ -169,12 +170,16 @@ class Recordings:
             )
             rows = [dict(head) for head in heads.mappings()]
             channels = channels_of(connection, recording)
+        is_marked = any(head["verification"] for head in rows)
         for together in _by_readings(rows):
             with self._database.reading() as connection:
                 blocks = blocks_of_sets(connection, recording, [int(head["number"]) for head in together])
             for head in together:
                 number = int(head["number"])
-                yield number, in_units(blocks.pop(number, []), cast(DataSetHead, head), channels)
+                columns = in_units(blocks.pop(number, []), cast(DataSetHead, head), channels)
+                if is_marked and VERIFICATION not in columns:
+                    columns[VERIFICATION] = np.zeros(len(columns["dataset"]), dtype=np.int64)
+                yield number, columns
 
     def data_sets(self, recording: int) -> list[DataSetRow]:
         """Return every data set of a recording, also those that were not completed, in order."""
@@ -182,7 +187,7 @@ class Recordings:
         query = sa.select(
             d.number, d.state, d.reason, d.position, d.run, d.mounting, d.table_rate_dps, d.table_angle_deg,
             d.chamber_setpoint_c, d.gate_from_s.label("t_from_s"),
-            d.gate_until_s.label("t_until_s"), d.n, d.lost, d.damaged,
+            d.gate_until_s.label("t_until_s"), d.n, d.lost, d.damaged, d.verification,
         )  # fmt: skip
         with self._database.reading() as connection:
             rows = connection.execute(query.where(d.recording_id == recording, _whole(recording)).order_by(d.number))

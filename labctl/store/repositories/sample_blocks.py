@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from typing_extensions import TypedDict
 
 from labctl.json_types.recordings import RawChannelJson
+from labctl.recording.columns import VERIFICATION
 from labctl.store import sample_codec
 from labctl.store.import_parts import block_row
 from labctl.store.manifests.digests import block_digests
@@ -71,6 +72,7 @@ class DataSetHead(TypedDict):
     turn_deg: float | None
     turn_u_deg: float | None
     encoder: EncoderAngles | None
+    verification: bool
 
 
 def blocks_of(connection: sa.Connection, recording: int, number: int) -> list[dict[str, NDArray[np.generic]]]:
@@ -131,6 +133,8 @@ def scaled(
         "mounting": np.full(n, head["mounting"], dtype=np.int64),
         "table_rate_dps": np.full(n, head["table_rate_dps"]),
     }
+    if head["verification"]:
+        columns[VERIFICATION] = np.ones(n, dtype=np.int64)
     if (encoder := head["encoder"]) is not None:
         columns["table_angle_deg"] = encoder["angle_from_deg"] + encoder["rate_dps"] * (t_s - head["gate_from_s"])
         columns["computed_rate_dps"] = np.full(n, encoder["computed_dps"])

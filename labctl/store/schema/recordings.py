@@ -48,6 +48,8 @@ data_sets = sa.Table(
     sa.Column("turn_u_deg", sa.Float),
     #: angles by the table's encoder and the rate that follows, as EncoderAngles; absent for a table without one
     sa.Column("encoder", sa.JSON(none_as_null=True)),
+    #: whether it was measured to verify a calibration, and is never fitted
+    sa.Column("verification", sa.Boolean, nullable=False, default=False, server_default=sa.false()),
     sa.Column("planned", sa.Integer),  #: its number in the plan: one that is redone has the same again
 )
 

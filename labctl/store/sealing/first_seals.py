@@ -20,6 +20,10 @@ from labctl.store.sealing.seals import seal
 AT_ONCE = 64
 
 
+#: The schema that the migration which calls `seal_all` makes.
+SCHEMA = "0017"
+
+
 def seal_all(connection: sa.Connection) -> None:
     """Seal every record that is at rest, a block at a time, in the transaction of `connection`."""
     at = SystemClock().utc()
@@ -42,9 +46,12 @@ def _seal_kind(connection: sa.Connection, kind: Kind, at: datetime, reason: str)
 
 def _parts(connection: sa.Connection, kind: Kind, record: str) -> Parts:
     try:
-        return parts_of(connection, kind, record)
+        return parts_of(connection, kind, record, schema=SCHEMA)
     except StoreError as error:  # a block that is damaged already prevents no migration; the check reports it
-        return {**parts_of(connection, kind, record, blocks=False), "readings": {"unreadable": str(error)}}
+        return {
+            **parts_of(connection, kind, record, blocks=False, schema=SCHEMA),
+            "readings": {"unreadable": str(error)},
+        }
 
 
 def _digest_blocks(connection: sa.Connection) -> None:

@@ -13,6 +13,7 @@ from labctl.fitting.criticism.reduction.reduced_recording import ReducedRecordin
 from labctl.fitting.criticism.reduction.samples import reduce_samples
 from labctl.fitting.data.temperature.channel import with_temperature
 from labctl.recording import Recording
+from labctl.recording.verification import fitted_part
 
 __all__ = ["LEAST_INDEPENDENT_SHARE", "OUTLIER", "STEP_LINES", "ReducedRecording", "reduce_recording"]
 
@@ -20,9 +21,9 @@ __all__ = ["LEAST_INDEPENDENT_SHARE", "OUTLIER", "STEP_LINES", "ReducedRecording
 def reduce_recording(recording: Recording, *, outliers: bool = True) -> ReducedRecording:
     """Return a recording reduced; points and turns have their means only. Without `outliers` every reading counts.
 
-    Raises NotEnoughData where the recording has no temperature.
+    What was measured to verify a calibration is left out. Raises NotEnoughData where the recording has no temperature.
     """
-    recording = with_temperature(recording)
+    recording = with_temperature(fitted_part(recording))
     if recording.info.motion == "profile" and "t_s" in recording.columns:
         return reduce_profile(recording)
     if recording.info.kind == "points" or recording.info.motion == "turns":

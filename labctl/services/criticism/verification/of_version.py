@@ -13,6 +13,7 @@ from labctl.compensator import Compensator
 from labctl.errors import BadInput
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.recording import Recording
+from labctl.recording.verification import verification_part
 from labctl.services.criticism.measurements import Measurements
 from labctl.services.criticism.verification.of_poses import errors_in_poses
 from labctl.services.criticism.versions import version_of
@@ -39,16 +40,19 @@ def verify_unit(
 def verify(store: Store, row: CalibrationRecord, measured: Measurements) -> VerificationResponse:
     """Apply a version to the means of a recording, as its consumer applies it to readings.
 
-    In poses to the readings: what gravity is off by after each turn, over how long the turn took.
+    Where a part of the recording was measured to verify, to that part. In poses to the readings: what gravity is off by
+    after each turn, over how long the turn took.
 
     Raises BadInput where the recording lacks an axis or a channel of the model, NotEnoughData.
     """
     document, _ = store.calibrations.document(row.serial, row.version)
     calibration = read_calibration(document)
+    aside = None
     if motion_of(measured.row) == "poses":
         pooled, errors, outside = errors_in_poses(calibration, source_of(store, measured.row))
     else:
-        errors, outside = applied_errors(calibration, measured.points)
+        aside = verification_part(measured.points)
+        errors, outside = applied_errors(calibration, measured.points if aside is None else aside)
         pooled = np.concatenate(list(errors.values()))
     rms, expected = _rms(pooled), expected_dps(row)
     return VerificationResponse(
@@ -56,7 +60,8 @@ def verify(store: Store, row: CalibrationRecord, measured: Measurements) -> Veri
         version=row.version,
         recording=measured.row.id,
         recorded_unit=measured.row.serial,
-        seen=measured.row.id in row.recordings,
+        seen=aside is None and measured.row.id in row.recordings,
+        part="all" if aside is None else "verification",
         datasets=len(outside),
         rms_dps=rms,
         max_dps=float(np.max(np.abs(pooled))),

@@ -28,6 +28,8 @@ from labctl.services.schemas.calibrations import FitRequest
 from labctl.services.schemas.campaigns import ResumeRequest
 from labctl.store import DraftEvent, Store, check, copy_database, open_store
 from labctl.store.connection.database import Database
+from labctl.store.manifests.digests import digest_of_rows
+from labctl.store.manifests.parts import differing
 from labctl.store.schema import tables
 from procedures.contracts.campaign_state import CampaignState
 from procedures.contracts.control import Control
@@ -149,6 +151,14 @@ def test_calibrations_certifications_certificates_and_keys_are_sealed(location: 
     assert acts(location, "certificate") == [("sealed", "issued")]
     assert acts(location, "key") == [("sealed", "made"), ("sealed", "revoked")]
     assert acts(location, "calibration") == [("sealed", "fit")]
+
+
+def test_a_record_that_was_sealed_before_a_part_existed_had_nothing_of_it() -> None:
+    nothing = digest_of_rows(()).as_json()
+    marks, head = {"rows": 1, "digest": "ab"}, {"head": {"rows": 1, "digest": "cd"}}
+    assert differing(head, {**head, "verification marks": nothing}) == []
+    assert differing(head, {**head, "verification marks": marks}) == ["verification marks"]
+    assert differing({**head, "verification marks": marks}, {**head, "verification marks": marks}) == []
 
 
 def test_a_transaction_that_fails_leaves_no_manifest(location: str) -> None:
