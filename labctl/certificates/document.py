@@ -22,6 +22,10 @@ DecisionRule = Literal["simple", "guard-band"]
 Use = Literal["any axis", "own axis"]
 
 
+#: What a statement rests on: data sets that were measured to verify, or those that were fitted.
+Evidence = Literal["verification", "fitted"]
+
+
 class Part(BaseModel):
     """A part of the certificate; it is written once and not changed."""
 
@@ -154,6 +158,20 @@ class StateOfItem(Part):
     axes: tuple[AxisError, ...]
 
 
+class ConformityResult(Part):
+    """The decision at one rate vector and temperature that was measured to verify."""
+
+    output: str
+    rates_dps: tuple[float, float, float]  #: true rate about x, y and z
+    temperature_c: float | None  #: None: the calibration knows no temperature
+    error_dps: float  #: of the corrected rate
+    expanded_dps: float
+    k: float
+    acceptance_dps: float
+    passed: bool
+    risk: float  #: probability that the error is beyond the limit (JCGM 106:2012, 9.3), without prior knowledge of it
+
+
 class Conformity(Part):
     """A statement of conformity with the rule that it was decided by, and what it holds for."""
 
@@ -166,6 +184,9 @@ class Conformity(Part):
     expanded_dps: float
     passed: bool
     about: Use | None = None  #: None: issued before it was stated, when it meant the axis of each output alone
+    evidence: Evidence = "fitted"
+    datasets: int | None = None  #: that it rests on; None: issued before it was stated
+    results: tuple[ConformityResult, ...] = ()  #: of a verification part
     statement: str
 
 

@@ -12,6 +12,7 @@ from labctl.certificates.document import (
     AnyAxisResult,
     Certificate,
     CoefficientResult,
+    ConformityResult,
     ResultPoint,
     StandardUsed,
     StateOfItem,
@@ -239,9 +240,20 @@ def _state(title: str, given: StateOfItem) -> Mapping[str, object]:
     return {"title": title, "basis": given.basis, "datasets": given.datasets, "rows": rows}
 
 
-def _conformity(given: Certificate) -> Mapping[str, str] | None:
+def _conformity(given: Certificate) -> Mapping[str, object] | None:
     found = given.conformity
     if found is None:
         return None
-    return {"specification": found.specification, "statement": found.statement,
-            "outcome": "PASS" if found.passed else "FAIL"}  # fmt: skip
+    return {"specification": found.specification, "statement": found.statement, "outcome": _outcome(found.passed),
+            "results": [_verified(each) for each in found.results]}  # fmt: skip
+
+
+def _outcome(passed: bool) -> str:
+    return "PASS" if passed else "FAIL"
+
+
+def _verified(given: ConformityResult) -> list[str]:
+    error, expanded = rounded(given.error_dps, given.expanded_dps)
+    warm = "–" if given.temperature_c is None else _number(given.temperature_c)
+    rates = [_number(rate) for rate in given.rates_dps]
+    return [given.output, warm, *rates, error, expanded, f"{100.0 * given.risk:.2g} %", _outcome(given.passed)]

@@ -56,6 +56,13 @@ class Plan(BaseModel):
         return sum(isinstance(step, Acquire) for step in self.steps) + DATA_SETS_OF_TURN * turns
 
     @property
+    def verification_steps(self) -> tuple[Step, ...]:
+        """The steps that verify, from their first mounting on; none where the recipe has no verification part."""
+        mountings = {step.mounting for step in self.steps if isinstance(step, Acquire) and step.verification}
+        first = next((n for n, s in enumerate(self.steps) if isinstance(s, Mount) and s.mounting in mountings), None)
+        return () if first is None else self.steps[first:]
+
+    @property
     def schedule_hash(self) -> str:
         """SHA-256 over what is done in which order: equal on two benches that run the same steps."""
         steps = [step.model_dump(exclude=_BENCH_FIGURES | _unset(step)) for step in self.steps]

@@ -22,6 +22,12 @@ def print_plan(answer: PlanResponse) -> None:
     """Print a plan's figures for a person."""
     console.print(f"[bold]{answer.recipe}[/] on {answer.bench}")
     console.print(f"  {answer.datasets} data sets in {answer.steps} steps, about {hours(answer.expected_s)}")
+    if answer.verification_datasets:
+        share = 100.0 * answer.verification_s / max(answer.expected_s, 1e-9)
+        console.print(
+            f"  {answer.verification_datasets} of them verify and are never fitted, about "
+            f"{hours(answer.verification_s)} ({share:.0f} %)"
+        )
     for left_out in answer.clipped:
         console.print(f"  left out: {left_out}", style="yellow", markup=False)
     if answer.attendance is not None:

@@ -160,6 +160,19 @@ def uncertainty_of(calibration: Calibration, rate_dps: float, temperature_c: flo
     return _Known.of(calibration).at(rate_dps, temperature_c)
 
 
+def budgets_at(
+    calibration: Calibration, rate_dps: float | Mapping[str, float], temperature_c: float
+) -> dict[str, Budget]:
+    """Return output -> budget of its corrected rate: about its own axis, or at a rate about each body axis.
+
+    Raises BadInput, NotEnoughData.
+    """
+    known = _Known.of(calibration)
+    if isinstance(rate_dps, Mapping):
+        return known.at_vector(rate_dps, temperature_c).budgets
+    return {axis: found.budget for axis, found in known.at(rate_dps, temperature_c).items()}
+
+
 def coefficients_at(calibration: Calibration, temperature_c: float) -> dict[str, dict[str, Budget]]:
     """Return axis -> coefficient -> its budget at a temperature. Raises BadInput, NotEnoughData."""
     known = _Known.of(calibration)

@@ -23,6 +23,7 @@ from labctl.errors import BadInput, NotEnoughData
 from labctl.services.certificates import measured
 from labctl.services.certificates.address import address_of
 from labctl.services.certificates.conformity import conformity
+from labctl.services.certificates.evidence import errors_of
 from labctl.services.certificates.facts import Facts
 from labctl.services.certificates.found import Found
 from labctl.services.certificates.missing import MissingFacts
@@ -65,7 +66,8 @@ def assembled(
         as_left=left,
         adjustment=adjustment,
         conformity=None if order.conformity is None else conformity(
-            order.conformity, left, found.results.points, found.results.any_axis, found.results.left_out
+            order.conformity, errors_of(measurements, facts.calibration, left, order.conformity.about),
+            found.results.points, found.results.any_axis, found.results.left_out,
         ),
         due=act.due_at.date() if order.state_due and act.due_at else None,
         external=order.external or NONE,

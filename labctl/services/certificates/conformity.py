@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
-from labctl.certificates.document import AnyAxisResult, Conformity, ResultPoint, StateOfItem
+import math
+
+from labctl.certificates.document import AnyAxisResult, Conformity, ConformityResult, ResultPoint
 from labctl.errors import BadInput
+from labctl.services.certificates.evidence import Errors, VerifiedError
 from labctl.services.schemas.documents.certificates import OrderedConformity
 
 #: Largest probability of a false acceptance at the limit (ILAC-G8, table 1), normal distribution.
 RISKS = {"simple": "up to 50 % at the limit", "guard-band": "up to 2.5 % at the limit"}
 RULES = {"simple": "simple acceptance, no guard band (w = 0)", "guard-band": "guard band w = U"}
+#: What the errors are of, in the sentence that compares them with the limit.
+OF_FITTED = "over the {n} data sets that the calibration was fitted to"
+OF_VERIFICATION = (
+    "over {n} data sets that were measured to verify, at {rates} and {temperatures}, mounted and switched on anew, and "
+    "that the calibration was not fitted to"
+)
 
 
 class NoAcceptance(BadInput):
@@ -21,19 +30,21 @@ class NoDecision(BadInput):
 
 def conformity(
     ordered: OrderedConformity,
-    left: StateOfItem,
+    errors: Errors,
     results: tuple[ResultPoint, ...],
     any_axis: tuple[AnyAxisResult, ...],
     left_out: tuple[str, ...],
 ) -> Conformity:
-    """Return the statement on the largest error of a corrected rate over all data sets, which the fit has seen.
+    """Return the statement on the largest error of a corrected rate, at the places where it was verified one by one.
 
-    `left_out` are the sentences on places of the range where U is not known. Raises NoDecision, NoAcceptance.
+    It holds for all of the range, so its guard band is the largest U there. `left_out` are the sentences on places of
+    the range where U is not known. Raises NoDecision, NoAcceptance.
     """
-    largest = max(axis.max_dps for axis in left.axes)
     expanded, where = _about_any(ordered, any_axis) if ordered.about == "any axis" else _about_own(results)
     if left_out:
         raise NoDecision(f"conformity to {ordered.specification}: {' '.join(left_out)} {_MEASURE}")
+    decided = tuple(_decided(ordered, each) for each in errors.verified)
+    expanded = max(expanded, *(each.expanded_dps for each in decided), 0.0)
     band = expanded if ordered.rule == "guard-band" else 0.0
     acceptance = ordered.limit_dps - band
     if acceptance <= 0:
@@ -42,22 +53,74 @@ def conformity(
             f"limit, {ordered.limit_dps:g} deg/s; measure with a smaller uncertainty, or agree with the customer on "
             f"{_otherwise(ordered)}"
         )
-    passed = largest <= acceptance
+    passed = errors.largest_dps <= acceptance
     statement = (
         f"{'PASS' if passed else 'FAIL'}: {where}{_temperatures(results)}, the largest error of the corrected rate, "
-        f"{largest:.3g} °/s over the data sets that the calibration was fitted to, "
+        f"{errors.largest_dps:.3g} °/s {_of(errors)}, "
         f"{'does not exceed' if passed else 'exceeds'} the acceptance limit of {acceptance:.3g} °/s = "
         f"{ordered.limit_dps:g} °/s − {band:.3g} °/s. Decision rule: {RULES[ordered.rule]}, U = {expanded:.3g} °/s "
-        f"(ILAC-G8:09/2019); risk of a false acceptance {RISKS[ordered.rule]}."
+        f"(ILAC-G8:09/2019); risk of a false acceptance {RISKS[ordered.rule]}{_risk(decided)}."
     )
     return Conformity(
         specification=ordered.specification, limit_dps=ordered.limit_dps, rule=ordered.rule, guard_band_dps=band,
-        acceptance_dps=acceptance, largest_error_dps=largest, expanded_dps=expanded, passed=passed, about=ordered.about,
-        statement=statement,
+        acceptance_dps=acceptance, largest_error_dps=errors.largest_dps, expanded_dps=expanded, passed=passed,
+        about=ordered.about, evidence=errors.evidence, datasets=errors.datasets, results=decided, statement=statement,
     )  # fmt: skip
 
 
 _MEASURE = "Measure more data sets there, fit again, and certify that version; or leave the statement out of the order"
+
+
+def specific_risk(error_dps: float, u_dps: float, limit_dps: float) -> float:
+    """Return the probability that an error is beyond +-limit, measured with a standard uncertainty, deg/s.
+
+    By JCGM 106:2012, 9.3.2, for a normal distribution and no prior knowledge of the error.
+    """
+    if u_dps == 0.0:
+        return float(abs(error_dps) > limit_dps)
+    above, below = (limit_dps - error_dps) / u_dps, (-limit_dps - error_dps) / u_dps
+    return 0.5 * (math.erfc(above / math.sqrt(2.0)) + math.erfc(-below / math.sqrt(2.0)))
+
+
+def _decided(ordered: OrderedConformity, verified: VerifiedError) -> ConformityResult:
+    """Decide at one place that was verified. Raises NoDecision where U is unknown there."""
+    budget = verified.budget
+    if budget.expanded is None or budget.k is None:
+        unknown = "; ".join(f"{line.source}: {line.why}" for line in budget.lines if line.contribution is None)
+        rates = ", ".join(f"{rate:.4g}" for rate in verified.rates_dps)
+        raise NoDecision(
+            f"conformity to {ordered.specification}: the uncertainty of output {verified.output} is not known at "
+            f"{rates} deg/s about x, y, z, where it was verified ({unknown}). {_MEASURE}"
+        )
+    acceptance = ordered.limit_dps - (budget.expanded if ordered.rule == "guard-band" else 0.0)
+    return ConformityResult(
+        output=verified.output, rates_dps=verified.rates_dps, temperature_c=verified.temperature_c,
+        error_dps=verified.error_dps, expanded_dps=budget.expanded, k=budget.k, acceptance_dps=acceptance,
+        passed=abs(verified.error_dps) <= acceptance,
+        risk=specific_risk(verified.error_dps, budget.expanded / budget.k, ordered.limit_dps),
+    )  # fmt: skip
+
+
+def _of(errors: Errors) -> str:
+    """Return in words what the errors are of."""
+    if errors.evidence == "fitted":
+        return OF_FITTED.format(n=errors.datasets)
+    rates = [rate for each in errors.verified for rate in each.rates_dps]
+    warm = [each.temperature_c for each in errors.verified if each.temperature_c is not None]
+    return OF_VERIFICATION.format(
+        n=errors.datasets, rates=f"{min(rates):.4g} to {max(rates):.4g} °/s",
+        temperatures=f"{min(warm):.1f} to {max(warm):.1f} °C" if warm else "the temperature of the room",
+    )  # fmt: skip
+
+
+def _risk(decided: tuple[ConformityResult, ...]) -> str:
+    """Return the largest specific risk in words; nothing where nothing was verified."""
+    if not decided:
+        return ""
+    return (
+        f"; where it was verified, the probability that the error is beyond the limit is at most "
+        f"{100.0 * max(each.risk for each in decided):.2g} % (JCGM 106:2012, no prior knowledge of the error)"
+    )
 
 
 def _otherwise(ordered: OrderedConformity) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 from collections.abc import Callable
 from datetime import datetime
@@ -22,6 +23,7 @@ from labctl.services.planning.attendance import attendance, visits_s
 from labctl.services.planning.fit_rules import check_fit
 from labctl.services.schemas.plans import PlanResponse, Visibility
 from procedures.contracts.errors import PlanRefused
+from procedures.contracts.steps import Acquire
 from procedures.planning.limits import BenchLimits, missing_instruments
 from procedures.planning.plan import Plan, make_plan
 from procedures.recipe.recipe import Recipe, parse_recipe, read_recipe, shipped_recipes
@@ -170,6 +172,8 @@ def plan_answer(
         steps=len(plan.steps),
         datasets=plan.datasets,
         expected_s=plan.expected_s,
+        verification_datasets=sum(isinstance(step, Acquire) for step in plan.verification_steps),
+        verification_s=math.fsum(step.expected_s for step in plan.verification_steps),
         clipped=list(plan.clipped),
         schedule_hash=plan.schedule_hash,
         visibility=look(plan, bench_file) if look else None,

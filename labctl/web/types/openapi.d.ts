@@ -3516,6 +3516,11 @@ export interface components {
             lost: number[];
             /** Damaged */
             damaged: number[];
+            /**
+             * Verification
+             * @description Whether it was measured to verify a calibration: never fitted.
+             */
+            verification: boolean[];
             /** Chamber Setpoint C */
             chamber_setpoint_c: (number | null)[];
             /** Channels */
@@ -5703,6 +5708,16 @@ export interface components {
             /** Expected S */
             expected_s: number;
             /**
+             * Verification Datasets
+             * @description Number of the data sets that verify and are never fitted.
+             */
+            verification_datasets: number;
+            /**
+             * Verification S
+             * @description Expected time of these, with their mountings and soaks, s.
+             */
+            verification_s: number;
+            /**
              * Clipped
              * @description Points left out because the bench or the unit cannot do them.
              */
@@ -7390,9 +7405,15 @@ export interface components {
             recorded_unit: string;
             /**
              * Seen
-             * @description Whether the version was fitted to this recording.
+             * @description Whether the version was fitted to these data sets.
              */
             seen: boolean;
+            /**
+             * Part
+             * @description verification: the data sets of the recording that were measured to verify, and are never fitted; all: the recording has none, so every data set.
+             * @enum {string}
+             */
+            part: "verification" | "all";
             /** Datasets */
             datasets: number;
             /**

@@ -1,0 +1,99 @@
+"""A certificate of a unit whose campaign had a verification part: the statement rests on what no fit has seen."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from labctl.calibration import read_calibration
+from labctl.certificates.document import Certificate
+from labctl.compensator import Compensator
+from labctl.fitting.data.fit_data import fit_data_of
+from labctl.recording import Recording
+from labctl.recording.verification import verification_part
+from labctl.services.calibrations.fitting import fit_unit
+from labctl.services.calibrations.uncertainty import budgets_at
+from labctl.services.certificates.issue import issue
+from labctl.services.planning.loading import limits_of, load_bench, load_recipe
+from labctl.services.schemas.calibrations import FitRequest
+from labctl.services.simulation.plan_simulation import hidden_recording
+from labctl.store import Store, open_store
+from procedures.planning.plan import make_plan
+from procedures.recipe.rules import Verification
+from tests.helpers.certificates import AT, request
+
+SERIAL = "STIM-0001"
+
+
+@pytest.fixture(scope="module")
+def recording() -> Recording:
+    recipe = load_recipe("table1-x-table2").model_copy(update={"verification": Verification(rates=6)})
+    bench = load_bench("triaxial-sim")
+    plan = make_plan(recipe, limits_of(bench))
+    return hidden_recording(plan, bench, bench.gyros[0].model_copy(update={"sample_rate_hz": 1.0}), 4, {})
+
+
+def issued(store: Store, recording: Recording, **conformity: Any) -> Certificate:
+    """Import a recording, fit and certify it, and return its certificate."""
+    store.recordings.add_import(recording, AT)
+    version = fit_unit(store, SERIAL, FitRequest(model="yang2018"), AT).version
+    store.calibrations.certify(SERIAL, version, "certify", by="Ada", reason="meets the criteria", at=AT)
+    ordered = {"specification": "S", "limit_dps": 2.0, "rule": "guard-band", **conformity}
+    issue(store, SERIAL, version, request(conformity=ordered), AT)
+    row = store.certificates.newest(SERIAL, version)
+    assert row is not None
+    return Certificate.model_validate_json(store.certificates.forms(row.number).document)
+
+
+def test_it_states_each_error_that_was_verified(recording: Recording, tmp_path: Path) -> None:
+    with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
+        certificate = issued(store, recording)
+        calibration = read_calibration(store.calibrations.document(SERIAL, 1)[0])
+    found = certificate.conformity
+    assert found is not None
+    assert (found.passed, found.evidence, found.datasets, len(found.results)) == (True, "verification", 18, 54)
+    aside = verification_part(recording)
+    assert aside is not None
+    data = fit_data_of(aside)
+    for each in found.results[::7]:
+        rows = [
+            i for i in range(len(data))
+            if np.allclose([data.true_rate_dps(a)[i] for a in "xyz"], each.rates_dps, atol=1e-9)
+        ]  # fmt: skip
+        (row,) = rows
+        outputs = np.array([data.outputs[axis][row] for axis in "xyz"])
+        warm = np.array([[data.channels.temperature_c(axis)[row] for axis in "xyz"]])
+        corrected = Compensator(calibration).compensate(outputs[None, :], warm).rate_dps[0]
+        axis = "xyz".index(each.output)
+        assert each.error_dps == pytest.approx(corrected[axis] - each.rates_dps[axis], abs=1e-9)
+        budget = budgets_at(calibration, dict(zip("xyz", each.rates_dps, strict=True)), float(warm[0, axis]))[
+            each.output
+        ]
+        assert each.expanded_dps == budget.expanded
+    assert found.largest_error_dps == max(abs(each.error_dps) for each in found.results)
+    assert all(each.expanded_dps <= found.expanded_dps for each in found.results)
+
+
+def test_an_error_that_only_the_verification_shows_fails(recording: Recording, tmp_path: Path) -> None:
+    marked = np.asarray(recording.columns["verification"]) != 0
+    columns = {n: v + 3.0 * marked if n == "gyro_y" else v for n, v in recording.columns.items()}
+    with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
+        found = issued(store, replace(recording, columns=columns)).conformity
+    assert found is not None
+    assert not found.passed
+    assert {each.output for each in found.results if not each.passed} == {"y"}
+    assert min(each.risk for each in found.results if each.output == "y") > 0.99
+
+
+def test_about_its_own_axis_an_output_is_judged_where_it_turned_about_it(recording: Recording, tmp_path: Path) -> None:
+    with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
+        found = issued(store, recording, about="own axis").conformity
+    assert found is not None
+    assert found.evidence == "verification"
+    for each in found.results:
+        others = [rate for axis, rate in zip("xyz", each.rates_dps, strict=True) if axis != each.output]
+        assert np.abs(others).max() < 0.01  # the Earth's rate
