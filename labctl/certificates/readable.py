@@ -29,6 +29,8 @@ PLACES = {
     "other": "at another place",
 }
 MINUS = "−"
+#: A probability below this is written as a bound.
+LEAST_RISK = 1e-4
 #: Marks a standard uncertainty without the standards of the bench.
 FIT_ALONE = " *"
 
@@ -248,6 +250,11 @@ def _conformity(given: Certificate) -> Mapping[str, object] | None:
             "results": [_verified(each) for each in found.results]}  # fmt: skip
 
 
+def percent(probability: float) -> str:
+    """Return a probability in percent, to two digits; one that is too small to matter as a bound."""
+    return f"{100.0 * probability:.2g} %" if probability >= LEAST_RISK else f"below {100.0 * LEAST_RISK:g} %"
+
+
 def _outcome(passed: bool) -> str:
     return "PASS" if passed else "FAIL"
 
@@ -256,4 +263,4 @@ def _verified(given: ConformityResult) -> list[str]:
     error, expanded = rounded(given.error_dps, given.expanded_dps)
     warm = "–" if given.temperature_c is None else _number(given.temperature_c)
     rates = [_number(rate) for rate in given.rates_dps]
-    return [given.output, warm, *rates, error, expanded, f"{100.0 * given.risk:.2g} %", _outcome(given.passed)]
+    return [given.output, warm, *rates, error, expanded, percent(given.risk), _outcome(given.passed)]

@@ -38,17 +38,22 @@ def verification_blocks(recipe: Recipe) -> list[MountingBlock]:
     rules = recipe.verification
     if rules is None:
         return []
-    blocks = []
-    for number, position in enumerate(rules.positions or recipe.positions):
-        lot = np.random.default_rng([rules.seed, number])
-        levels = tuple(
-            Level(
-                temperature_c, tuple(_drawn(recipe.rates_dps, rules.rates, lot)[lot.permutation(rules.rates)].tolist())
-            )
-            for temperature_c in _drawn(recipe.temperatures_c, rules.temperatures, lot).tolist()
+    positions = rules.positions or recipe.positions
+    lot = np.random.default_rng(rules.seed)
+    warm = _drawn(recipe.temperatures_c, len(positions) * rules.temperatures, lot)
+    shares = np.sort(lot.permutation(warm).reshape(len(positions), rules.temperatures), axis=1)
+    return [
+        MountingBlock(
+            position,
+            tuple(Level(at, _in_any_order(_drawn(recipe.rates_dps, rules.rates, lot), lot)) for at in share.tolist()),
+            verification=True,
         )
-        blocks.append(MountingBlock(position, levels, verification=True))
-    return blocks
+        for position, share in zip(positions, shares, strict=True)
+    ]
+
+
+def _in_any_order(values: NDArray[np.float64], lot: np.random.Generator) -> tuple[float, ...]:
+    return tuple(float(value) for value in lot.permutation(values))
 
 
 def _drawn(listed: tuple[float, ...], number: int, lot: np.random.Generator) -> NDArray[np.float64]:

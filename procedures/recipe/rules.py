@@ -80,7 +80,8 @@ class Verification(Table):
     """Points that are measured after all others, and never fitted: what a calibration promises is judged there.
 
     Each position is mounted anew, in a new powered session. Temperatures and rates are drawn from the seed, one in
-    each of as many equal parts of the recipe's ranges, so that they lie between those that are fitted.
+    each of as many equal parts of the recipe's ranges: the temperatures of all mountings together, the rates of each
+    temperature.
     """
 
     temperatures: Whole = Field(default=1, ge=1, le=50)  #: in each mounting

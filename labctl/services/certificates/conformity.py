@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from labctl.certificates.document import AnyAxisResult, Conformity, ConformityResult, ResultPoint
+from labctl.certificates.readable import percent
 from labctl.errors import BadInput
 from labctl.services.certificates.evidence import Errors, VerifiedError
 from labctl.services.schemas.documents.certificates import OrderedConformity
@@ -118,8 +119,8 @@ def _risk(decided: tuple[ConformityResult, ...]) -> str:
     if not decided:
         return ""
     return (
-        f"; where it was verified, the probability that the error is beyond the limit is at most "
-        f"{100.0 * max(each.risk for each in decided):.2g} % (JCGM 106:2012, no prior knowledge of the error)"
+        "; where it was verified, the probability that the error is beyond the limit is "
+        f"{percent(max(each.risk for each in decided))} (JCGM 106:2012, no prior knowledge of the error)"
     )
 
 

@@ -99,7 +99,7 @@ def test_what_was_verified_is_decided_place_by_place_and_named_as_unseen() -> No
     assert [each.passed for each in found.results] == [True, True, True]
     assert "over 3 data sets that were measured to verify, at -40 to 40 °/s and 20.0 to 20.0 °C" in found.statement
     assert "that the calibration was not fitted to" in found.statement
-    assert f"at most {100 * found.results[1].risk:.2g} % (JCGM 106:2012" in found.statement
+    assert f"the limit is {100 * found.results[1].risk:.2g} % (JCGM 106:2012" in found.statement
     failed = conformity(ordered, verified(0.1, -0.81, 0.3), (point(0.15),), (), ())
     assert (failed.passed, [each.passed for each in failed.results]) == (False, [True, False, True])
 

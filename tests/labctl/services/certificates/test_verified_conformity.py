@@ -73,7 +73,7 @@ def test_it_states_each_error_that_was_verified(recording: Recording, tmp_path: 
         budget = budgets_at(calibration, dict(zip("xyz", each.rates_dps, strict=True)), float(warm[0, axis]))[
             each.output
         ]
-        assert each.expanded_dps == budget.expanded
+        assert each.expanded_dps == pytest.approx(budget.expanded, rel=1e-9)
     assert found.largest_error_dps == max(abs(each.error_dps) for each in found.results)
     assert all(each.expanded_dps <= found.expanded_dps for each in found.results)
 
