@@ -11,6 +11,7 @@ STUDIES = (
     "budget_coverage",
     "rate_vector_coverage",
     "single_outputs",
+    "conformity",
     "hand_turns",
     "poses",
     "joint_recordings",

@@ -73,7 +73,7 @@ def scores(number: int) -> Scores:
     unit = Unit.of(rng, 0.0 if case.is_adequate else HIDDEN_DPS)
     bench = Bench.of(rng, stated, plan.positions)
     columns = campaign(unit, bench, plan, noise, stated.turn_on_dps, rng)
-    recording = with_temperature(Recording(_info(case, stated), columns))
+    recording = with_temperature(Recording(info_of(case, stated), columns))
     data, preset = fit_data_of(recording), preset_for(None, list(MODEL))
     result, evidence = fit_preset(data, preset), use_evidence(data, preset)
     conditions = conditions_of(recording.info, result.environment, mountings=result.mountings)
@@ -82,7 +82,7 @@ def scores(number: int) -> Scores:
     later = rng.normal(0, stated.turn_on_dps, 3) + rng.normal(0, noise.drift_dps, (VECTORS, 3))
     output = unit.output(rates, warm, plan.reach_dps) + later
     rows = [AXES.index(axis) for axis in case.outputs]
-    error = _corrected(result.fitted, output[:, rows], warm, case.outputs) - rates[:, rows]
+    error = corrected(result.fitted, output[:, rows], warm, case.outputs) - rates[:, rows]
     claimed = [
         rate_vector_uncertainty(
             result.fitted, dict(zip(AXES, rate, strict=True)), at, evidence=evidence, name="unit", bench=conditions
@@ -99,7 +99,8 @@ def scores(number: int) -> Scores:
     return Scores(number % len(CASES), error / u, turned / aligned, shell, level)
 
 
-def _info(case: Case, stated: Statement) -> RecordingInfo:
+def info_of(case: Case, stated: Statement) -> RecordingInfo:
+    """Return the head of a recording, with the standards that the bench states."""
     standards = (
         Standard(quantity="clock", u=stated.clock_ppm),
         Standard(quantity="thermometer", u=stated.thermometer_c),
@@ -113,7 +114,8 @@ def _info(case: Case, stated: Statement) -> RecordingInfo:
     )  # fmt: skip
 
 
-def _corrected(fitted: FittedModel, output: Array, warm: Array, outputs: tuple[str, ...]) -> Array:
+def corrected(fitted: FittedModel, output: Array, warm: Array, outputs: tuple[str, ...]) -> Array:
+    """Return corrected rates, (n, outputs) deg/s, of outputs (n, outputs) at temperatures (n,)."""
     columns = {"temperature_c": warm, "table_rate_dps": np.zeros(len(warm)), "position": np.full(len(warm), "z")}
     measured = {axis: output[:, number] for number, axis in enumerate(outputs)}
     found = fitted.compensate(measured, Channels(columns, measured))

@@ -127,9 +127,13 @@ class Noise:
 
 
 def campaign(
-    unit: Unit, bench: Bench, plan: Plan, noise: Noise, turn_on_dps: float, rng: np.random.Generator
-) -> dict[str, NDArray[np.generic]]:
-    """Return the columns of a recording of means over one minute, by what the bench indicates."""
+    unit: Unit, bench: Bench, plan: Plan, noise: Noise, turn_on_dps: float, rng: np.random.Generator,
+    *, reach_dps: float | None = None,
+) -> dict[str, NDArray[np.generic]]:  # fmt: skip
+    """Return the columns of a recording of means over one minute, by what the bench indicates.
+
+    The unit's law is over `reach_dps`; absent: the plan's fastest rate.
+    """
     rows = [
         (position, warm, rate)
         for position in plan.positions
@@ -140,7 +144,7 @@ def campaign(
     t_s = 75.0 * np.arange(n) + 5400.0 * np.repeat(np.arange(n // per_level), per_level)
     warm = np.array([row[1] for row in rows]) + rng.normal(0, 0.02, n)
     rates = np.array([row[2] / (1 + bench.clock) * bench.lean[row[0]] for row in rows])
-    output = unit.output(rates, warm, plan.reach_dps) + rng.normal(0, noise.white_dps, (n, 3))
+    output = unit.output(rates, warm, reach_dps or plan.reach_dps) + rng.normal(0, noise.white_dps, (n, 3))
     output += noise.drift(t_s, rng) + rng.normal(0, turn_on_dps, 3)
     columns: dict[str, NDArray[np.generic]] = {
         "dataset": np.arange(1, n + 1), "t_s": t_s, "run": np.ones(n, dtype=np.int64),

@@ -179,6 +179,7 @@ class Conformity(Part):
     limit_dps: float
     rule: DecisionRule
     guard_band_dps: float
+    guard_band_factor: float | None = None  #: guard band over U; None: issued before it was stated, when it was 1 or 0
     acceptance_dps: float
     largest_error_dps: float
     expanded_dps: float

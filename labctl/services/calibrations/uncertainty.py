@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
+from typing import Literal
 
 from labctl.calibration import Calibration, read_calibration
 from labctl.errors import BadInput
@@ -26,6 +27,8 @@ from labctl.fitting.uncertainty import (
 )
 from labctl.fitting.uncertainty.combination import LEVEL
 from labctl.fitting.uncertainty.document import Covered
+from labctl.fitting.uncertainty.largest_error import widening
+from labctl.fitting.uncertainty.vector_bound import PLACES
 from labctl.services.calibrations.contributions import contributions_over
 from labctl.services.criticism.versions import version_of
 from labctl.services.schemas.uncertainty import (
@@ -158,6 +161,23 @@ def uncertainty_grid(calibration: Calibration) -> UncertaintyGrid:
 def uncertainty_of(calibration: Calibration, rate_dps: float, temperature_c: float) -> dict[str, RateUncertainty]:
     """Return axis -> the uncertainty of a calibration's corrected rate. Raises BadInput, NotEnoughData."""
     return _Known.of(calibration).at(rate_dps, temperature_c)
+
+
+def widening_of(calibration: Calibration, about: Literal["any axis", "own axis"]) -> float:
+    """Return the factor from the largest U of one error to the bound of the largest error; NaN where U is unknown.
+
+    Over all outputs, temperatures and rate vectors up to the calibrated rate, or rates about the axis of each output.
+    Raises BadInput, NotEnoughData.
+    """
+    known, (rates, temperatures) = _Known.of(calibration), places_of(calibration)
+    reach = max(map(abs, rates))
+    if about == "any axis":
+        places = [{a: reach * part for a, part in zip(BODY_AXES, place, strict=True)} for place in PLACES]
+        seen = None
+    else:
+        places = [{axis: rate} for axis in calibration.axes for rate in rates]
+        seen = [list(place) for place in places]
+    return max(widening([known.at_vector(place, warm) for place in places], seen) for warm in temperatures)
 
 
 def budgets_at(

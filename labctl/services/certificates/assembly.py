@@ -20,6 +20,7 @@ from labctl.certificates.document import (
     StateOfItem,
 )
 from labctl.errors import BadInput, NotEnoughData
+from labctl.services.calibrations.uncertainty import widening_of
 from labctl.services.certificates import measured
 from labctl.services.certificates.address import address_of
 from labctl.services.certificates.conformity import conformity
@@ -68,6 +69,7 @@ def assembled(
         conformity=None if order.conformity is None else conformity(
             order.conformity, errors_of(measurements, facts.calibration, left, order.conformity.about),
             found.results.points, found.results.any_axis, found.results.left_out,
+            widening_of(facts.calibration, order.conformity.about),
         ),
         due=act.due_at.date() if order.state_due and act.due_at else None,
         external=order.external or NONE,

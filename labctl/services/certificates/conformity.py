@@ -11,8 +11,10 @@ from labctl.services.certificates.evidence import Errors, VerifiedError
 from labctl.services.schemas.documents.certificates import OrderedConformity
 
 #: Largest probability of a false acceptance at the limit (ILAC-G8, table 1), normal distribution.
-RISKS = {"simple": "up to 50 % at the limit", "guard-band": "up to 2.5 % at the limit"}
-RULES = {"simple": "simple acceptance, no guard band (w = 0)", "guard-band": "guard band w = U"}
+RISKS = {
+    "simple": "up to 50 % at the limit for each single error, more for the largest of all",
+    "guard-band": "up to 2.5 % at the limit",
+}
 #: What the errors are of, in the sentence that compares them with the limit.
 OF_FITTED = "over the {n} data sets that the calibration was fitted to"
 OF_VERIFICATION = (
@@ -35,22 +37,24 @@ def conformity(
     results: tuple[ResultPoint, ...],
     any_axis: tuple[AnyAxisResult, ...],
     left_out: tuple[str, ...],
+    widening: float,
 ) -> Conformity:
     """Return the statement on the largest error of a corrected rate, at the places where it was verified one by one.
 
-    It holds for all of the range, so its guard band is the largest U there. `left_out` are the sentences on places of
-    the range where U is not known. Raises NoDecision, NoAcceptance.
+    It holds for the largest error of all of the range, so its guard band is the largest U there, times `widening`
+    (`widening_of`). `left_out` are the sentences on places of the range where U is not known. Raises NoDecision,
+    NoAcceptance.
     """
     expanded, where = _about_any(ordered, any_axis) if ordered.about == "any axis" else _about_own(results)
     if left_out:
         raise NoDecision(f"conformity to {ordered.specification}: {' '.join(left_out)} {_MEASURE}")
     decided = tuple(_decided(ordered, each) for each in errors.verified)
     expanded = max(expanded, *(each.expanded_dps for each in decided), 0.0)
-    band = expanded if ordered.rule == "guard-band" else 0.0
+    band = widening * expanded if ordered.rule == "guard-band" else 0.0
     acceptance = ordered.limit_dps - band
     if acceptance <= 0:
         raise NoAcceptance(
-            f"conformity to {ordered.specification}: the guard band, U = {expanded:.3g} deg/s, is not smaller than the "
+            f"conformity to {ordered.specification}: the guard band, {band:.3g} deg/s, is not smaller than the "
             f"limit, {ordered.limit_dps:g} deg/s; measure with a smaller uncertainty, or agree with the customer on "
             f"{_otherwise(ordered)}"
         )
@@ -59,11 +63,12 @@ def conformity(
         f"{'PASS' if passed else 'FAIL'}: {where}{_temperatures(results)}, the largest error of the corrected rate, "
         f"{errors.largest_dps:.3g} °/s {_of(errors)}, "
         f"{'does not exceed' if passed else 'exceeds'} the acceptance limit of {acceptance:.3g} °/s = "
-        f"{ordered.limit_dps:g} °/s − {band:.3g} °/s. Decision rule: {RULES[ordered.rule]}, U = {expanded:.3g} °/s "
-        f"(ILAC-G8:09/2019); risk of a false acceptance {RISKS[ordered.rule]}{_risk(decided)}."
+        f"{ordered.limit_dps:g} °/s − {band:.3g} °/s. Decision rule: {_rule(ordered, widening)}, "
+        f"U = {expanded:.3g} °/s (ILAC-G8:09/2019); risk of a false acceptance {RISKS[ordered.rule]}{_risk(decided)}."
     )
     return Conformity(
         specification=ordered.specification, limit_dps=ordered.limit_dps, rule=ordered.rule, guard_band_dps=band,
+        guard_band_factor=widening if band else 0.0,
         acceptance_dps=acceptance, largest_error_dps=errors.largest_dps, expanded_dps=expanded, passed=passed,
         about=ordered.about, evidence=errors.evidence, datasets=errors.datasets, results=decided, statement=statement,
     )  # fmt: skip
@@ -100,6 +105,16 @@ def _decided(ordered: OrderedConformity, verified: VerifiedError) -> ConformityR
         passed=abs(verified.error_dps) <= acceptance,
         risk=specific_risk(verified.error_dps, budget.expanded / budget.k, ordered.limit_dps),
     )  # fmt: skip
+
+
+def _rule(ordered: OrderedConformity, widening: float) -> str:
+    """Return the decision rule in words."""
+    if ordered.rule == "simple":
+        return "simple acceptance, no guard band (w = 0)"
+    return (
+        f"guard band w = {widening:.3g} U, which covers the largest of all errors with the probability that U has for "
+        "a single one"
+    )
 
 
 def _of(errors: Errors) -> str:

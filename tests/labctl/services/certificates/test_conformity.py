@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import pytest
@@ -13,6 +14,9 @@ from labctl.services.certificates.evidence import Errors, VerifiedError
 from labctl.services.schemas.documents.certificates import OrderedConformity
 
 OWN = {"specification": "S", "about": "own axis"}
+
+
+decided = partial(conformity, widening=1.0)
 
 
 def fitted(*largest_dps: float) -> Errors:
@@ -51,27 +55,27 @@ def about_any(output: str, expanded_dps: float | None, why: str = "") -> AnyAxis
 )
 def test_the_acceptance_limit_is_that_of_the_rule(rule: str, error_dps: float, passes: bool) -> None:
     ordered = OrderedConformity.model_validate({**OWN, "limit_dps": 1.0, "rule": rule})
-    found = conformity(ordered, fitted(0.1, error_dps), (point(0.125), point(0.25)), (), ())
+    found = decided(ordered, fitted(0.1, error_dps), (point(0.125), point(0.25)), (), ())
     assert found.passed is passes
     assert found.statement.startswith("PASS" if passes else "FAIL")
     assert found.acceptance_dps == (1.0 if rule == "simple" else 0.75)
-    assert ("guard band w = U" in found.statement) is (rule == "guard-band")
+    assert ("guard band w = 1 U" in found.statement) is (rule == "guard-band")
     assert "ILAC-G8" in found.statement
     assert "over the 5 data sets that the calibration was fitted to" in found.statement
 
 
 def test_a_guard_band_as_wide_as_the_limit_is_refused() -> None:
     ordered = OrderedConformity.model_validate({**OWN, "limit_dps": 0.25, "rule": "guard-band"})
-    with pytest.raises(NoAcceptance, match=r"U = 0.25 deg/s, is not smaller than the limit, 0.25 deg/s"):
-        conformity(ordered, fitted(0.0), (point(0.25),), (), ())
+    with pytest.raises(NoAcceptance, match=r"the guard band, 0.25 deg/s, is not smaller than the limit, 0.25 deg/s"):
+        decided(ordered, fitted(0.0), (point(0.25),), (), ())
 
 
 def test_where_the_item_turns_about_any_axis_u_is_that_of_the_rate_vector() -> None:
     ordered = OrderedConformity(specification="S", limit_dps=1.0, rule="guard-band")
-    found = conformity(ordered, fitted(0.3, 0.1), (point(0.1),), (about_any("x", 0.5), about_any("y", 0.6)), ())
+    found = decided(ordered, fitted(0.3, 0.1), (point(0.1),), (about_any("x", 0.5), about_any("y", 0.6)), ())
     assert (found.passed, found.expanded_dps, found.acceptance_dps) == (True, 0.6, 0.4)
     assert "turned about any axis of its case at up to 100 °/s and 20.0 to 20.0 °C" in found.statement
-    assert not conformity(ordered, fitted(0.3, 0.1), (point(0.1),), (about_any("x", 0.71),), ()).passed
+    assert not decided(ordered, fitted(0.3, 0.1), (point(0.1),), (about_any("x", 0.71),), ()).passed
 
 
 @pytest.mark.parametrize(
@@ -89,25 +93,25 @@ def test_nothing_is_decided_where_u_is_not_known(about: str, changed: dict[str, 
     )
     given: dict[str, Any] = {"any_axis": (about_any("z", 0.1),), "left_out": (), **changed}
     with pytest.raises(NoDecision, match=why):
-        conformity(ordered, fitted(0.0), (point(0.1),), given["any_axis"], given["left_out"])
+        decided(ordered, fitted(0.0), (point(0.1),), given["any_axis"], given["left_out"])
 
 
 def test_what_was_verified_is_decided_place_by_place_and_named_as_unseen() -> None:
     ordered = OrderedConformity.model_validate({**OWN, "limit_dps": 1.0, "rule": "guard-band"})
-    found = conformity(ordered, verified(0.1, -0.79, 0.3), (point(0.15),), (), ())
+    found = decided(ordered, verified(0.1, -0.79, 0.3), (point(0.15),), (), ())
     assert (found.passed, found.evidence, found.datasets, found.expanded_dps) == (True, "verification", 3, 0.2)
     assert [each.passed for each in found.results] == [True, True, True]
     assert "over 3 data sets that were measured to verify, at -40 to 40 °/s and 20.0 to 20.0 °C" in found.statement
     assert "that the calibration was not fitted to" in found.statement
     assert f"the limit is {100 * found.results[1].risk:.2g} % (JCGM 106:2012" in found.statement
-    failed = conformity(ordered, verified(0.1, -0.81, 0.3), (point(0.15),), (), ())
+    failed = decided(ordered, verified(0.1, -0.81, 0.3), (point(0.15),), (), ())
     assert (failed.passed, [each.passed for each in failed.results]) == (False, [True, False, True])
 
 
 def test_a_place_within_its_own_u_does_not_pass_the_range_by_itself() -> None:
     """The statement holds for all of the range, where U is larger than at the places that were verified."""
     ordered = OrderedConformity.model_validate({**OWN, "limit_dps": 1.0, "rule": "guard-band"})
-    found = conformity(ordered, verified(0.75), (point(0.3),), (), ())
+    found = decided(ordered, verified(0.75), (point(0.3),), (), ())
     assert (found.passed, found.results[0].passed, found.acceptance_dps) == (False, True, 0.7)
 
 
@@ -116,7 +120,7 @@ def test_nothing_is_decided_where_u_is_not_known_at_a_place_that_was_verified() 
     with pytest.raises(
         NoDecision, match=r"not known at 0, 0, -40 deg/s about x, y, z, .* \(repeatability: one power-on"
     ):
-        conformity(ordered, verified(0.1, expanded_dps=None), (point(0.1),), (), ())
+        decided(ordered, verified(0.1, expanded_dps=None), (point(0.1),), (), ())
 
 
 @pytest.mark.parametrize(
@@ -132,3 +136,12 @@ def test_nothing_is_decided_where_u_is_not_known_at_a_place_that_was_verified() 
 )
 def test_the_specific_risk_is_that_of_the_normal_distribution(error_dps: float, u_dps: float, risk: float) -> None:
     assert specific_risk(error_dps, u_dps, 1.0) == pytest.approx(risk, rel=1e-4)
+
+
+def test_the_guard_band_covers_the_largest_of_all_errors() -> None:
+    ordered = OrderedConformity.model_validate({**OWN, "limit_dps": 1.0, "rule": "guard-band"})
+    found = conformity(ordered, fitted(0.6), (point(0.25),), (), (), 1.5)
+    assert (found.passed, found.guard_band_dps, found.acceptance_dps, found.expanded_dps) == (True, 0.375, 0.625, 0.25)
+    assert "guard band w = 1.5 U, which covers the largest of all errors" in found.statement
+    simple = OrderedConformity.model_validate({**OWN, "limit_dps": 1.0, "rule": "simple"})
+    assert conformity(simple, fitted(0.6), (point(0.25),), (), (), 1.5).guard_band_dps == 0.0

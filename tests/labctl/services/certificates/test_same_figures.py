@@ -96,8 +96,10 @@ def test_u_about_any_axis_is_one_figure(documents: dict[str, Any]) -> None:
 def test_conformity_is_decided_by_the_same_u(documents: dict[str, Any]) -> None:
     stated = documents["json"]["conformity"]
     bound = largest(documents, "bound_dps")
-    assert stated["expanded_dps"] == stated["guard_band_dps"] == bound
-    assert stated["acceptance_dps"] == LIMIT_DPS - bound
+    assert stated["expanded_dps"] == bound
+    assert stated["guard_band_dps"] == stated["guard_band_factor"] * bound
+    assert stated["acceptance_dps"] == LIMIT_DPS - stated["guard_band_dps"]
+    assert f"w = {stated['guard_band_factor']:.3g} U" in stated["statement"]
     assert f"U = {bound:.3g} °/s" in stated["statement"]
     declared = ET.tostring(documents["xml"], encoding="unicode")
     assert stated["statement"] in declared.replace("&#8722;", "−")
