@@ -2,7 +2,7 @@
 
 Every unit is simulated with numpy alone (`rate_vector_simulation`), calibrated, and verified at rates and temperatures
 that the fit has not seen, on the same fixture. The limit is half to four times the largest true error of the corrected
-rate over the ball of rate vectors and the range of temperatures, in a later powered session. `LABCTL_STUDY_UNITS` is how
+rate over the ball of rate vectors and the range of temperatures, in a later session. `LABCTL_STUDY_UNITS` is how
 many units, `LABCTL_STUDY_WORKERS` how many processes, `LABCTL_STUDY_SEED` the first seed.
 """
 
