@@ -191,6 +191,17 @@ class Conformity(Part):
     statement: str
 
 
+class StabilityResult(Part):
+    """What the item is expected to drift by until the next calibration; None: not known, and why."""
+
+    until: date
+    years: float
+    per_year_dps: float | None  #: root mean square over the intervals, at the worst place
+    intervals: int  #: between calibrations of this item
+    drift_dps: float | None  #: half width, with the coverage of U
+    why: str = ""
+
+
 class Authorisation(Part):
     """Who authorised the results: the act of certification."""
 
@@ -249,6 +260,7 @@ class Certificate(Part):
     adjustment: str
     conformity: Conformity | None  #: None: none was ordered
     due: date | None  #: of the next calibration; None: not agreed with the customer
+    stability: StabilityResult | None = None  #: None: no date is stated, or issued before it was stated
     external: str  #: results of external providers
     authorised: Authorisation
     calibration: CalibrationFacts

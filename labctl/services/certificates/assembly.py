@@ -16,10 +16,12 @@ from labctl.certificates.document import (
     ManifestNamed,
     Method,
     Replaced,
+    StabilityResult,
     StandardUsed,
     StateOfItem,
 )
 from labctl.errors import BadInput, NotEnoughData
+from labctl.services.calibrations.stability import stability_of, years_until
 from labctl.services.calibrations.uncertainty import widening_of
 from labctl.services.certificates import measured
 from labctl.services.certificates.address import address_of
@@ -28,7 +30,7 @@ from labctl.services.certificates.evidence import errors_of
 from labctl.services.certificates.facts import Facts
 from labctl.services.certificates.found import Found
 from labctl.services.certificates.missing import MissingFacts
-from labctl.services.certificates.statements import statements
+from labctl.services.certificates.statements import statements, until
 from labctl.services.criticism.measurements import Measurements
 from labctl.services.schemas.documents.certificates import CertificateRequest
 from labctl.store import CertificateRow, Store
@@ -46,6 +48,7 @@ def assembled(
         raise MissingFacts.of(facts.what, [])  # refused before
     before, left, adjustment = _states(store, facts, measurements)
     order, number = facts.order, _number(store, facts, at)
+    stability = _stability(store, facts, act.due_at) if order.state_due and act.due_at else None
     return Certificate(
         number=number,
         issued_on=at.date(),
@@ -69,16 +72,31 @@ def assembled(
         conformity=None if order.conformity is None else conformity(
             order.conformity, errors_of(measurements, facts.calibration, left, order.conformity.about),
             found.results.points, found.results.any_axis, found.results.left_out,
-            widening_of(facts.calibration, order.conformity.about),
+            widening_of(facts.calibration, order.conformity.about), stability,
         ),
-        due=act.due_at.date() if order.state_due and act.due_at else None,
+        due=None if stability is None else stability.until,
+        stability=stability,
         external=order.external or NONE,
         authorised=Authorisation(name=act.by, at=act.at, reason=act.reason),
         calibration=CalibrationFacts(
             version=facts.row.version, hash=facts.row.hash, address=address_of(facts.laboratory.url, facts.row)
         ),
         manifests=tuple(_manifests(store, facts)),
-        statements=(*statements(facts), *found.results.left_out),
+        statements=(*statements(facts), *until(stability, found.results.points), *found.results.left_out),
+    )  # fmt: skip
+
+
+def _stability(store: Store, facts: Facts, until: datetime) -> StabilityResult:
+    """Return what the item is expected to drift by until a date."""
+    known, years = stability_of(store, facts.row.serial, facts.row.version), years_until(store, facts.row, until)
+    if known is None:
+        return StabilityResult(
+            until=until.date(), years=years, per_year_dps=None, intervals=0, drift_dps=None,
+            why="this item has no earlier certified calibration to compare with",
+        )  # fmt: skip
+    return StabilityResult(
+        until=until.date(), years=years, per_year_dps=known.per_year_dps, intervals=known.intervals,
+        drift_dps=known.expanded_dps(years),
     )  # fmt: skip
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from labctl.certificates.document import AnyAxisResult, Conformity, ConformityResult, ResultPoint
+from labctl.certificates.document import AnyAxisResult, Conformity, ConformityResult, ResultPoint, StabilityResult
 from labctl.certificates.readable import percent
 from labctl.errors import BadInput
 from labctl.services.certificates.evidence import Errors, VerifiedError
@@ -38,18 +38,20 @@ def conformity(
     any_axis: tuple[AnyAxisResult, ...],
     left_out: tuple[str, ...],
     widening: float,
+    stability: StabilityResult | None = None,
 ) -> Conformity:
     """Return the statement on the largest error of a corrected rate, at the places where it was verified one by one.
 
     It holds for the largest error of all of the range, so its guard band is the largest U there, times `widening`
-    (`widening_of`). `left_out` are the sentences on places of the range where U is not known. Raises NoDecision,
-    NoAcceptance.
+    (`widening_of`). Where a date is stated until which it holds, U contains the drift until then (`stability`).
+    `left_out` are the sentences on places of the range where U is not known. Raises NoDecision, NoAcceptance.
     """
     expanded, where = _about_any(ordered, any_axis) if ordered.about == "any axis" else _about_own(results)
     if left_out:
         raise NoDecision(f"conformity to {ordered.specification}: {' '.join(left_out)} {_MEASURE}")
     decided = tuple(_decided(ordered, each) for each in errors.verified)
-    expanded = max(expanded, *(each.expanded_dps for each in decided), 0.0)
+    drift = 0.0 if stability is None else stability.drift_dps or 0.0
+    expanded = math.hypot(max(expanded, *(each.expanded_dps for each in decided), 0.0), drift)
     band = widening * expanded if ordered.rule == "guard-band" else 0.0
     acceptance = ordered.limit_dps - band
     if acceptance <= 0:
@@ -64,7 +66,8 @@ def conformity(
         f"{errors.largest_dps:.3g} °/s {_of(errors)}, "
         f"{'does not exceed' if passed else 'exceeds'} the acceptance limit of {acceptance:.3g} °/s = "
         f"{ordered.limit_dps:g} °/s − {band:.3g} °/s. Decision rule: {_rule(ordered, widening)}, "
-        f"U = {expanded:.3g} °/s (ILAC-G8:09/2019); risk of a false acceptance {RISKS[ordered.rule]}{_risk(decided)}."
+        f"U = {expanded:.3g} °/s (ILAC-G8:09/2019); risk of a false acceptance {RISKS[ordered.rule]}{_risk(decided)}"
+        f"{_until(stability)}."
     )
     return Conformity(
         specification=ordered.specification, limit_dps=ordered.limit_dps, rule=ordered.rule, guard_band_dps=band,
@@ -137,6 +140,15 @@ def _risk(decided: tuple[ConformityResult, ...]) -> str:
         "; where it was verified, the probability that the error is beyond the limit is "
         f"{percent(max(each.risk for each in decided))} (JCGM 106:2012, no prior knowledge of the error)"
     )
+
+
+def _until(stability: StabilityResult | None) -> str:
+    """Return in words until when the statement holds; nothing where no date is stated."""
+    if stability is None:
+        return ""
+    if stability.drift_dps is None:
+        return f"; it holds at the time of the calibration: the drift until {stability.until} is not known"
+    return f"; U contains a drift of {stability.drift_dps:.3g} °/s until {stability.until}"
 
 
 def _otherwise(ordered: OrderedConformity) -> str:

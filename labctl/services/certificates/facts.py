@@ -74,6 +74,11 @@ class Facts:
                 yield name, "[method] of the order"
         if self.authorised is None:
             yield "authorisation", f"`labctl certify {self.row.serial} {self.row.version} --by NAME --reason TEXT`"
+        elif self.order.state_due and self.authorised.due_at is None:
+            yield (
+                "date of the next calibration, which state_due of the order asks for",
+                f"`labctl certify {self.row.serial} {self.row.version} --due-days DAYS ...`, or leave state_due out",
+            )
         yield from self._traceability()
 
     def _traceability(self) -> Iterator[tuple[str, str]]:
