@@ -12,6 +12,7 @@ from instruments.clock import VirtualClock
 from labctl.cli.demo import example_data, find_missing_effect, serve_calibrations, single_axis, triaxial
 from labctl.cli.demo.runner import DemoRunner, maybe_silent
 from labctl.errors import BadInput
+from labctl.fitting.estimation.error_metrics import first_of_smallest
 from labctl.json_types.models import ErrorFiguresJson
 from labctl.services.calibrations.certification import certify
 from labctl.services.schemas.certification import CertifyRequest
@@ -30,7 +31,7 @@ def run_demo(folder: Path, database: str | None, *, quick: bool, quiet: bool) ->
         example_data.play(demo)
         find_missing_effect.play(demo, "OSU-FOG-2024")
         serials = [triaxial.SERIAL, single_axis.SERIAL, "WEISS-ENV05S", "OSU-FOG-2024"]
-        demo.title("Certified: for each unit, the version with the smallest held-out error")
+        demo.title("Certified: for each unit, the first version of those with the least held-out error")
         for serial in serials:
             _certify_best(demo, serial)
         serve_calibrations.play(demo, serials)
@@ -41,10 +42,11 @@ def run_demo(folder: Path, database: str | None, *, quick: bool, quiet: bool) ->
 
 
 def _certify_best(demo: DemoRunner, serial: str) -> None:
-    """Put the version with the least error in force; objections are printed, and overridden."""
+    """Put the first version of those with the least error in force; objections are printed, and overridden."""
     request = CertifyRequest(by="the demo", reason="computed and checked in this run of the demo", override=True)
     rows = sorted(demo.store.calibrations.of_unit(serial), key=lambda row: row.version)
-    best = min(rows, key=lambda row: _least_known(row.answer["error"]))
+    points = sum(len(demo.store.recordings.data_sets(number)) for number in rows[0].recordings)
+    best = rows[first_of_smallest([_least_known(row.answer["error"]) for row in rows], points)]
     act = certify(demo.store, serial, best.version, request, VirtualClock().utc())
     demo.say(f"{serial} version {act.version} ({best.model}): verdict {act.verdict or f'none, {act.verdict_reason}'}")
     for each in act.objections:

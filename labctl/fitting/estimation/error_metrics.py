@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,6 +56,16 @@ def rms(errors: Mapping[str, Array]) -> float | None:
     """Return the root mean square over axes and data sets, unweighted; None when there are none."""
     pooled = np.concatenate([values[np.isfinite(values)] for values in errors.values()] or [np.zeros(0)])
     return float(np.sqrt(np.mean(pooled**2))) if len(pooled) else None
+
+
+def first_of_smallest(errors_dps: Sequence[float], n: int) -> int:
+    """Return which of several root mean squares of n errors is the smallest, or the first that is not clearly larger.
+
+    One is clearly larger by more than two of its standard uncertainties, each 1 / sqrt(2 n) of it; n = 0: unknown, so
+    every difference is.
+    """
+    clear = min(errors_dps) * (1.0 + (2.0 / np.sqrt(2.0 * n) if n else 0.0))
+    return next(place for place, error in enumerate(errors_dps) if error <= clear)
 
 
 def by_turning_axis(data: FitData, errors: Mapping[str, Array]) -> dict[str, dict[str, Spread]]:

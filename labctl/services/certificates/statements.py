@@ -42,7 +42,7 @@ def until(stability: StabilityResult | None, results: Sequence[ResultPoint]) -> 
         f"The uncertainties hold at the time of the calibration. By {stability.intervals} "
         f"{'interval' if stability.intervals == 1 else 'intervals'} between calibrations, the errors of this item "
         f"change by {stability.per_year_dps:.3g} °/s per year (root mean square, at the worst rate and temperature): "
-        f"until {stability.until} by {stability.drift_dps:.3g} °/s at most (95.45 %, Student's t). With it, the largest U of "
-        f"the results is {math.hypot(largest, stability.drift_dps):.3g} °/s."
+        f"until {stability.until} by {stability.drift_dps:.3g} °/s at most (95.45 %, Student's t). With it, the "
+        f"largest U of the results is {math.hypot(largest, stability.drift_dps):.3g} °/s."
     )
     return (text,)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting import fit
+from labctl.fitting.estimation.error_metrics import first_of_smallest
 from labctl.fitting.models.inversion import NotConverged
 from labctl.progress import report_stage
 from labctl.services.calibrations.assessment import assess
@@ -30,7 +31,7 @@ def report_on(store: Store, draft: CalibrationRecord, recording: int, rules: Fit
     as_found, as_found_why, drift = _as_found(store, draft, measured, rules)
     limits = held_against(rules.limits, error, as_left, drift)
     report = DraftReport(
-        model=draft.model, error=error, compared=compared, smallest_heldout=_smallest_heldout(compared),
+        model=draft.model, error=error, compared=compared, smallest_heldout=_smallest_heldout(compared, measured),
         verdict=known.verdict if known else None, verdict_text=known.verdict_text if known else "",
         verdict_reason=known.verdict_reason if known else NOT_ASKED, objections=known.objections if known else [],
         as_found=as_found, as_found_why=as_found_why, as_left=as_left, as_left_why=as_left_why, drift=drift,
@@ -60,13 +61,16 @@ def _compared(measured: Measurements, rules: FitRules) -> list[ComparedModel]:
     return found
 
 
-def _smallest_heldout(compared: list[ComparedModel]) -> str | None:
+def _smallest_heldout(compared: list[ComparedModel], measured: Measurements) -> str | None:
     known = [
         (each.error.heldout_rms_dps, each.model)
         for each in compared
         if each.error is not None and each.error.heldout_rms_dps is not None
     ]
-    return min(known)[1] if known else None
+    if not known:
+        return None
+    n = len(measured.points) * len(measured.points.info.axes)
+    return known[first_of_smallest([error for error, _ in known], n)][1]
 
 
 def _as_found(

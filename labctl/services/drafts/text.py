@@ -26,7 +26,7 @@ def _sentences(serial: str, version: int, report: DraftReport) -> Iterator[str]:
     if report.verdict is not None:
         yield f"Verdict: {report.verdict}."
     if report.smallest_heldout is not None and report.smallest_heldout != report.model:
-        yield f"Of the models compared, {report.smallest_heldout} has the smallest held-out error."
+        yield f"Of the models compared, {report.smallest_heldout} has a clearly smaller held-out error."
     if report.as_found is not None:
         yield f"As found (version {report.as_found.version}): {report.as_found.rms_dps:.3g} deg/s RMS."
     if report.as_left is not None:

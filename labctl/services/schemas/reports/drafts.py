@@ -105,7 +105,8 @@ class DraftReport(ResponseModel):
     error: CertifiedErrors
     compared: list[ComparedModel] = Field(description="The draft's model first, then those of the recipe.")
     smallest_heldout: str | None = Field(
-        description="Model with the smallest held-out error; null: no model has a held-out error."
+        description="Model with the smallest held-out error, or the first that is listed of those whose errors are not "
+        "clearly larger; null: no model has a held-out error."
     )
     verdict: str | None = Field(description="Verdict of the criticism on the recording; null: see `verdict_reason`.")
     verdict_text: str
