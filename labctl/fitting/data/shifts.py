@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.linalg import helmert
 
 from labctl.fitting.data.channels import Channels
+from labctl.fitting.data.faces import WIDE_RAD, face_columns
 from labctl.fitting.data.joined import recordings_in
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording.columns import RECORDING
@@ -73,12 +74,14 @@ def shift_columns(channels: Channels, axis: str) -> NDArray[np.float64]:
 def shift_contrasts(channels: Channels, axis: str) -> tuple[NDArray[np.float64], Array]:
     """Return contrasts between the shifts of one axis, (n, k), and the largest standard deviation of each, (k,).
 
-    What all recordings have in common is no shift: an error of the bias that they share can still be found.
+    What all recordings have in common is no shift: an error of the bias that they share can still be found. So it is
+    with opposite mountings.
     """
     kinds: dict[tuple[ShiftKind, str], list[Array]] = {}
     for shift in shifts_of(channels, axis):
         kinds.setdefault((shift.kind, shift.along), []).append(shift.values)
-    columns, largest = [np.zeros((len(channels), 0))], []
+    faces = face_columns(channels, axis)
+    columns, largest = [np.column_stack([*faces.values(), np.zeros((len(channels), 0))])], [WIDE_RAD] * len(faces)
     for (kind, _), values in kinds.items():
         columns.append(np.column_stack(values) @ helmert(len(values)).T)
         largest += [KINDS[kind].largest] * (len(values) - 1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from scipy.linalg import block_diag
 from labctl.errors import NotEnoughData
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.data.earth import turning_columns
+from labctl.fitting.data.faces import face_columns
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.data.shifts import Shift, shifts_of
 from labctl.fitting.effects import Column
@@ -37,6 +38,7 @@ class AxisDesign:
     held: HeldPart  #: coefficients that are not estimated; their part of the error is in `offset_dps`
     laws: tuple[str, ...] = ()  #: names of the coefficients that enter by a law
     shifts: tuple[Shift, ...] = ()  #: what differs between recordings, where there are several
+    faces: Mapping[str, Array] = field(default_factory=dict)  #: what opposite mountings differ by, (m,) by body axis
 
 
 def axis_design(
@@ -85,6 +87,7 @@ def axis_design(
         held.part,
         tuple(laws),
         tuple(shifts_of(data.channels, axis)),
+        face_columns(data.channels, axis),
     )
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from labctl.errors import NotEnoughData
 from labctl.fitting.data.earth import turning_columns, turning_size_dps, with_known_size, with_prior
+from labctl.fitting.data.faces import WIDE_RAD, face_columns
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.data.rate_profile import TIME_CONSTANT
 from labctl.fitting.data.shifts import KINDS, shifts_of
@@ -41,6 +42,7 @@ class Nuisance:
 
     turning: Array  #: the Earth's rate that goes round: cosine and sine per position, deg/s
     shifts: Mapping[str, float] = field(default_factory=dict)  #: of several recordings, by name of the shift
+    faces: Mapping[str, float] = field(default_factory=dict)  #: half of what opposite mountings differ by, rad
 
     def error_dps(self, data: FitData, axis: str) -> Array:
         """Return what it adds to the output of data sets, (m,) deg/s; a shift that they do not show adds nothing."""
@@ -51,6 +53,8 @@ class Nuisance:
                 error += columns @ self.turning
         for shift in shifts_of(data.channels, axis) if self.shifts else ():
             error += self.shifts.get(shift.name, 0.0) * shift.values
+        for other, values in face_columns(data.channels, axis).items() if self.faces else ():
+            error += self.faces.get(other, 0.0) * values
         return error
 
 
@@ -83,10 +87,15 @@ def solve_axes(data: FitData, model: ErrorModel, fixed: Mapping[str, Solution] |
 
 
 def _nuisance(design: AxisDesign, solution: Solution) -> Nuisance:
-    """Return what stands behind the model's own columns in a solution: the Earth's rate, then the shifts."""
+    """Return what stands behind the model's own columns in a solution: the Earth's rate, the faces, then the shifts."""
     beside = solution.values[design.columns.shape[1] :]
-    turning, shifts = np.split(beside, [len(beside) - len(design.shifts)])
-    return Nuisance(turning, {shift.name: float(v) for shift, v in zip(design.shifts, shifts, strict=True)})
+    first_shift = len(beside) - len(design.shifts)
+    turning, faces, shifts = np.split(beside, [first_shift - len(design.faces), first_shift])
+    return Nuisance(
+        turning,
+        {shift.name: float(v) for shift, v in zip(design.shifts, shifts, strict=True)},
+        {other: float(v) for other, v in zip(design.faces, faces, strict=True)},
+    )
 
 
 def _converged(data: FitData, model: ErrorModel, axis: str, fixed: Solution | None) -> tuple[AxisDesign, Solution]:
@@ -127,9 +136,11 @@ def _solve_axis(data: FitData, model: ErrorModel, axis: str, design: AxisDesign,
         )
     y = data.outputs[axis] - data.true_rate_dps(axis) - design.offset_dps
     known, random = data.scatter(axis), None
-    if design.shifts:
+    if design.shifts or design.faces:
         known = _with_white_noise(design, y, known)
     columns, y, scatter = with_known_size(design.columns, design.turning, y, known, turning_size_dps(data.info))
+    faces = np.column_stack([*design.faces.values(), np.zeros((len(data), 0))])
+    columns, y, scatter = with_prior(columns, faces, y, scatter, np.full(len(design.faces), WIDE_RAD**2))
     if design.shifts:
         wide = np.array([KINDS[shift.kind].largest for shift in design.shifts])
         values = np.column_stack([shift.values for shift in design.shifts])
@@ -147,12 +158,12 @@ def _with_white_noise(design: AxisDesign, y: Array, scatter: Scatter) -> Scatter
     """Return a scatter whose white noise is known: where the readings do not say it, by what the design leaves."""
     if scatter.white_var is not None:
         return scatter
-    columns = np.column_stack([design.columns, *(shift.values for shift in design.shifts)])
+    columns = np.column_stack([design.columns, *design.faces.values(), *(shift.values for shift in design.shifts)])
     rank = rank_of(columns)
     if len(y) <= rank:
         raise NotEnoughData(
-            f"{len(y)} data sets are too few to fit {rank} coefficients (including the shifts from recording to "
-            f"recording) and to estimate the error of the fit: at least {rank + 1} are needed; measure more data sets, "
+            f"{len(y)} data sets are too few to fit {rank} coefficients (including what differs between recordings and "
+            f"mountings) and to estimate the error of the fit: at least {rank + 1} are needed; measure more data sets, "
             "or leave effects out"
         )
     taken, *_ = np.linalg.lstsq(columns, y, rcond=1e-12)
