@@ -1,4 +1,4 @@
-"""Defaults: the database, the API key, the user's name and the interval of calibrations."""
+"""Defaults: the database, keys, the user's name and the interval of calibrations."""
 
 from __future__ import annotations
 

@@ -50,6 +50,7 @@ def _pages(given: Certificate) -> dict[str, object]:
         "issued_by": given.issued_by,
         "authorised": f"{given.authorised.name}, {given.authorised.at:%Y-%m-%d %H:%M} UTC",
         "authorised_name": given.authorised.name,
+        "signature": _signature(given),
         "method": _method(given),
         "plan_hash": given.method.plan_hash or "",
         "environment": [
@@ -84,6 +85,18 @@ def _pages(given: Certificate) -> dict[str, object]:
         "address": given.calibration.address,
         "manifests": [[f"Manifest {each.manifest}, {each.record}", each.hash] for each in given.manifests],
     }
+
+
+def _signature(given: Certificate) -> str:
+    """Return the note below the names: how the certificate is valid, and who signed the file."""
+    recorded = "The authorisation is recorded electronically in the audit trail of the laboratory;"
+    signer = given.signed_by
+    if signer is None:
+        return f"{recorded} the certificate is valid without a signature by hand."
+    return (
+        f"{recorded} this file and the attached dcc.xml are signed electronically by {signer.subject} (certificate "
+        f"SHA-256 {signer.fingerprint[:16]}…)."
+    )
 
 
 def _with_unit(value: float, unit: str) -> str:
