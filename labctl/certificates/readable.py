@@ -58,7 +58,7 @@ def _pages(given: Certificate) -> dict[str, object]:
             for each in given.environment
         ],
         "standards": [_standard(each) for each in given.standards],
-        "uncertainty": _uncertainty(given),
+        "uncertainty": uncertainty_text(given),
         "budget": [
             [
                 each.source.replace("_", " "),
@@ -182,7 +182,8 @@ def _method(given: Certificate) -> list[list[str]]:
     return [each for each in found if each[1]]
 
 
-def _uncertainty(given: Certificate) -> str:
+def uncertainty_text(given: Certificate) -> str:
+    """Return how the expanded uncertainties are to be read."""
     found = given.uncertainty
     warm = "" if found.temperature_c is None else f" and {_number(found.temperature_c)} °C"
     return (
