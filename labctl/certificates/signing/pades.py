@@ -25,13 +25,19 @@ SIGNATURE_BYTES = 1024
 
 def sign_pdf(pdf: bytes, key: SigningKey, at: datetime) -> bytes:
     """Return the PDF with its signature; `at` is the time of it, aware. Raises BadInput where the key does not sign."""
-    writer = IncrementalPdfFileWriter(BytesIO(pdf))
-    writer.document_meta.last_modified = at
+    writer = _Writer(BytesIO(pdf))
     meta = PdfSignatureMetadata(
         field_name=FIELD, md_algorithm=key.digest, subfilter=SigSeedSubFilter.PADES, reason=REASON
     )
     signed = _PdfSigner(meta, _CmsSigner(key), at).sign_pdf(writer)
     return bytes(signed.getbuffer())
+
+
+class _Writer(IncrementalPdfFileWriter):
+    """Appends to a PDF and leaves its metadata as they are; the library would write the system's time into them."""
+
+    def _update_meta(self) -> None:
+        pass
 
 
 class _CmsSigner(Signer):
