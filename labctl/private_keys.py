@@ -5,10 +5,13 @@ from __future__ import annotations
 import stat
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 from urllib.parse import unquote
 
 from labctl.errors import BadInput
+
+if TYPE_CHECKING:
+    from pkcs11 import Session
 
 SCHEME = "pkcs11:"
 
@@ -19,7 +22,7 @@ class KeyUse:
 
     name: str
     variable: str  #: of the environment, that names the key
-    make: str  #: how to get such a key
+    make: str = ""  #: how to get such a key; begins with "; "
 
 
 def refuse_open_key(path: Path, use: KeyUse) -> None:
@@ -27,7 +30,9 @@ def refuse_open_key(path: Path, use: KeyUse) -> None:
     try:
         mode = path.stat().st_mode
     except OSError as error:
-        raise BadInput(f"{use.name} {path}: {error.strerror}; {use.make}") from error
+        raise BadInput(
+            f"{use.name} {path}: {error.strerror}; name an existing file by {use.variable}{use.make}"
+        ) from error
     if mode & (stat.S_IRWXG | stat.S_IRWXO):
         raise BadInput(
             f"{use.name} {path}: its mode is {stat.S_IMODE(mode):04o}, so others than its owner have access to it; "
@@ -84,7 +89,7 @@ def read_secret(path: Path, use: KeyUse) -> str:
     return path.read_text(encoding="utf-8").strip()
 
 
-def open_session(uri: TokenUri) -> Any:
+def open_session(uri: TokenUri) -> Session:
     """Log in to a token; returns a session of python-pkcs11. Raises pkcs11.PKCS11Error, RuntimeError."""
     import pkcs11  # noqa: PLC0415  only where a token is used
     from pkcs11.exceptions import UserAlreadyLoggedIn  # noqa: PLC0415  as above

@@ -15,8 +15,8 @@ from labctl.errors import BadInput
 from labctl.private_keys import SCHEME, KeyUse, refuse_open_key
 
 NEEDS = "pip install 'labctl[sign]'"
-SIGNING_KEY = KeyUse("signing key", SIGN_KEY_VARIABLE, f"name an existing file by {SIGN_KEY_VARIABLE}")
-PASSWORD_FILE = KeyUse("password file", SIGN_PASSWORD_VARIABLE, f"name an existing file by {SIGN_PASSWORD_VARIABLE}")
+SIGNING_KEY = KeyUse("signing key", SIGN_KEY_VARIABLE)
+PASSWORD_FILE = KeyUse("password file", SIGN_PASSWORD_VARIABLE)
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,6 @@ PublicKey = RSAPublicKey | EllipticCurvePublicKey
 Digest = Literal["sha256", "sha384"]
 #: Least size of an RSA key, bit (ETSI TS 119 312).
 RSA_BITS = 2048
-USED = f"give an RSA key of {RSA_BITS} bits or more, or an ECDSA key on P-256 or P-384"
 
 
 @dataclass(frozen=True)
@@ -115,7 +114,7 @@ def _of_file(path: Path, settings: SigningSettings) -> SigningKey:
     content = path.read_bytes()
     key, beside = (_pem if b"-----BEGIN" in content else _pkcs12)(content, password, where)
     if not isinstance(key, RSAPrivateKey | EllipticCurvePrivateKey):
-        raise BadInput(f"{where}: this kind of key is not used; {USED}")
+        raise _unused(where)
     given = read_certificates(Path(settings.certificate)) if settings.certificate else beside
     certificate, chain = _own(given, key.public_key(), where)
     digest = digest_of(_public(certificate, where))
@@ -133,7 +132,7 @@ def _pem(content: bytes, password: bytes | None, where: str) -> tuple[object, li
     try:
         key = load_pem_private_key(content, password if b"ENCRYPTED" in content else None)
     except (ValueError, TypeError) as error:
-        raise BadInput(f"{where}: {_unreadable(password, encrypted=b'ENCRYPTED' in content)}") from error
+        raise _unreadable(where, password, encrypted=b"ENCRYPTED" in content) from error
     return key, x509.load_pem_x509_certificates(content) if b"-----BEGIN CERTIFICATE" in content else []
 
 
@@ -143,16 +142,28 @@ def _pkcs12(content: bytes, password: bytes | None, where: str) -> tuple[object,
         key, own, more = load_key_and_certificates(content, password)
     except ValueError as error:
         is_der = content[:1] == b"\x30"
-        raise BadInput(f"{where}: {_unreadable(password, encrypted=is_der)}") from error
+        raise _unreadable(where, password, encrypted=is_der) from error
     return key, [*([own] if own else []), *more]
 
 
-def _unreadable(password: bytes | None, *, encrypted: bool) -> str:
+def _unreadable(where: str, password: bytes | None, *, encrypted: bool) -> BadInput:
     if not encrypted:
-        return "this is no private key in PEM form or PKCS#12; name such a file"
+        return BadInput(f"{where}: this is no private key in PEM form or PKCS#12; name such a file")
     if password is None:
-        return f"it needs a password; write it into a file with mode 0600, and name that by {SIGN_PASSWORD_VARIABLE}"
-    return f"the password in the file that {SIGN_PASSWORD_VARIABLE} names does not open it; correct the password"
+        return BadInput(
+            f"{where}: it needs a password; write it into a file with mode 0600, and name that by "
+            f"{SIGN_PASSWORD_VARIABLE}"
+        )
+    return BadInput(
+        f"{where}: the password in the file that {SIGN_PASSWORD_VARIABLE} names does not open it; correct the password"
+    )
+
+
+def _unused(where: str) -> BadInput:
+    return BadInput(
+        f"{where}: this kind of key is not used; give an RSA key of {RSA_BITS} bits or more, or an ECDSA key on P-256 "
+        "or P-384"
+    )
 
 
 def _of_token(uri: TokenUri, settings: SigningSettings) -> SigningKey:
@@ -232,7 +243,7 @@ def _public(certificate: x509.Certificate, where: str) -> PublicKey:
     is_rsa = isinstance(public, RSAPublicKey) and public.key_size >= RSA_BITS
     is_ec = isinstance(public, EllipticCurvePublicKey) and public.curve.name in ("secp256r1", "secp384r1")
     if not isinstance(public, RSAPublicKey | EllipticCurvePublicKey) or not (is_rsa or is_ec):
-        raise BadInput(f"{where}: this kind of key is not used; {USED}")
+        raise _unused(where)
     try:
         usage = certificate.extensions.get_extension_for_class(x509.KeyUsage).value
     except x509.ExtensionNotFound:

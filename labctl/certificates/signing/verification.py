@@ -8,7 +8,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime
+from datetime import datetime
 from io import BytesIO
 from typing import Any, Literal
 
@@ -80,7 +80,7 @@ def _xades(root: Any, xml: bytes, roots: Sequence[x509.Certificate] | None) -> S
         return replace(found, problem="the signature is not over the whole certificate")
     (signed,) = [each for each in results if isinstance(each, XAdESVerifyResult)]
     at = datetime.fromisoformat(signed.signed_properties.findtext(f"{{{XADES}}}SigningTime"))
-    return _with_trust(replace(found, valid=True, signed_at=at), own, chain, roots)
+    return _with_trust(replace(found, valid=True, signed_at=at), at, own, chain, roots)
 
 
 def _pem(text: str) -> bytes:
@@ -113,7 +113,8 @@ def _pades(signature: EmbeddedPdfSignature, roots: Sequence[x509.Certificate] | 
     own, *chain = [
         x509.load_der_x509_certificate(each.dump()) for each in (signature.signer_cert, *signature.other_embedded_certs)
     ]
-    found = SignatureFound("PAdES", signatory=signatory_of(own), signed_at=signature.self_reported_timestamp)
+    at = signature.self_reported_timestamp
+    found = SignatureFound("PAdES", signatory=signatory_of(own), signed_at=at)
     try:
         intact, by_key = validate_sig_integrity(
             signature.signer_info, signature.signer_cert, "data", signature.compute_digest()
@@ -128,22 +129,22 @@ def _pades(signature: EmbeddedPdfSignature, roots: Sequence[x509.Certificate] | 
     if covered is not SignatureCoverageLevel.ENTIRE_FILE:
         return replace(found, problem="something was added to the file after it was signed")
     first, last = own.not_valid_before_utc, own.not_valid_after_utc
-    if found.signed_at is None or not first <= found.signed_at <= last:
+    if at is None or not first <= at <= last:
         return replace(found, problem=f"its certificate is valid from {first:%Y-%m-%d} to {last:%Y-%m-%d} only")
-    return _with_trust(replace(found, valid=True), own, chain, roots)
+    return _with_trust(replace(found, valid=True), at, own, chain, roots)
 
 
 def _with_trust(
     found: SignatureFound,
+    at: datetime,
     own: x509.Certificate,
     chain: Sequence[x509.Certificate],
     roots: Sequence[x509.Certificate] | None,
 ) -> SignatureFound:
-    """State whether an authority that is trusted vouches for the signer, at the time that the signature states."""
+    """Return a valid signature with whether an authority that is trusted vouches for the signer at the time `at`."""
     if roots is None:
         what = "self-signed" if own.issuer == own.subject else f"issued by {own.issuer.rfc4514_string()}"
         return replace(found, reason=f"{what}: trust not established; name the file of a trusted authority by --ca")
-    at = found.signed_at or datetime.now(UTC)
     context = ValidationContext(trust_roots=[_asn1(each) for each in roots], allow_fetching=False, moment=at)
     validator = CertificateValidator(_asn1(own), [_asn1(each) for each in chain], validation_context=context)
     try:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ec import EllipticCurvePrivateKey
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
-SEAL_KEY = KeyUse("seal key", SEAL_KEY_VARIABLE, "`labctl seal-key create FILE` makes a key")
+SEAL_KEY = KeyUse("seal key", SEAL_KEY_VARIABLE, "; `labctl seal-key create FILE` makes a key")
 P256_BYTES = 32
 
 

@@ -3,7 +3,6 @@ were: PDF/A-3 with its attachment, a DCC by PTB's rules."""
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Callable
 from contextlib import suppress
@@ -17,7 +16,6 @@ from xml.etree import ElementTree as ET
 
 import pikepdf
 import pytest
-import xmlschema
 from dcclib.validation import SchematronValidator
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -29,8 +27,8 @@ from labctl.certificates.signing.verification import SignatureFound, signatures_
 from labctl.certificates.signing.xades import sign_dcc
 from labctl.errors import BadInput
 from tests.helpers.certificates import issued
+from tests.helpers.dcc_schema import needs_schema, schema_objections
 from tests.helpers.signing import AT, KINDS, Owner, key_file, owner, pdf_verifies, xml_verifies
-from tests.labctl.certificates.test_dcc import IMPORTED, SCHEMA
 
 DS, XADES = "{http://www.w3.org/2000/09/xmldsig#}", "{http://uri.etsi.org/01903/v1.3.2#}"
 #: The rules object to every empty element; these of a signature are always empty (XML Signature 1.1), in PTB's own too.
@@ -185,13 +183,10 @@ def test_the_signed_dcc_is_valid_by_ptbs_rules_with_the_signature_at_its_end() -
     assert [ET.tostring(each) for each in root[:-1]] == [ET.tostring(each) for each in unsigned]
 
 
-@pytest.mark.skipif(not os.environ.get(SCHEMA), reason=f"{SCHEMA} names no folder with dcc.xsd 3.3.0 of PTB")
+@needs_schema
 @pytest.mark.parametrize("kind", KINDS)
 def test_the_schema_of_ptb_accepts_the_signed_dcc(kind: str) -> None:
-    folder = Path(os.environ[SCHEMA])
-    locations = {space: str(folder / name) for space, name in IMPORTED.items()}
-    schema = xmlschema.XMLSchema10(str(folder / "dcc.xsd"), locations=locations, allow="local")
-    assert [str(each) for each in schema.iter_errors(signed(kind).xml.decode())] == []
+    assert schema_objections(signed(kind).xml) == []
 
 
 @pytest.mark.parametrize("kind", KINDS)
