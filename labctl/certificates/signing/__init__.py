@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from labctl.config import SIGN_KEY_VARIABLE, SIGN_PASSWORD_VARIABLE
+from labctl.config import SIGN_CERTIFICATE_VARIABLE, SIGN_KEY_VARIABLE, SIGN_PASSWORD_VARIABLE, variable
 from labctl.errors import BadInput
 from labctl.private_keys import SCHEME, KeyUse, refuse_open_key
 
@@ -33,6 +33,13 @@ class SigningSettings:
             refuse_open_key(Path(self.key), SIGNING_KEY)
         if self.key and self.password_file:
             refuse_open_key(Path(self.password_file), PASSWORD_FILE)
+
+
+def signing_settings() -> SigningSettings:
+    """Return what the environment names."""
+    return SigningSettings(
+        variable(SIGN_KEY_VARIABLE), variable(SIGN_CERTIFICATE_VARIABLE), variable(SIGN_PASSWORD_VARIABLE)
+    )
 
 
 @contextmanager

@@ -39,6 +39,7 @@ class SigningKey:
     certificate: x509.Certificate
     chain: tuple[x509.Certificate, ...]  #: of intermediate certificates, as they were given
     _sign: Callable[[bytes], bytes]
+    close: Callable[[], object] = lambda: None  #: ends the session with a token
 
     @property
     def digest(self) -> Digest:
@@ -191,7 +192,7 @@ def _of_token(uri: TokenUri, settings: SigningSettings) -> SigningKey:
             said = " ".join(str(error).split()) or type(error).__name__
             raise BadInput(f"{where}: {said}; nothing was signed; check the token") from error
 
-    return SigningKey(where, given[0], tuple(given[1:]), sign)
+    return SigningKey(where, given[0], tuple(given[1:]), sign, session.close)
 
 
 def _signed_by_token(key: Any, digest: Digest, data: bytes) -> bytes:

@@ -96,11 +96,9 @@ def _migrated(location: str) -> None:
     from labctl.cli.printing.migration import migration_text
     from labctl.log import get_logger
     from labctl.services.admin.maintenance import migrate_before_service
-    from labctl.services.admin.seal_keys import refuse_unusable_key
-    from labctl.services.certificates.signature import refuse_unusable_signing_key
+    from labctl.services.admin.seal_keys import refuse_unusable_keys
 
-    refuse_unusable_key()
-    refuse_unusable_signing_key()
+    refuse_unusable_keys()
     answer = migrate_before_service(location)
     if answer is not None:
         stderr.print(f"labctl: {migration_text(answer)}", markup=False)

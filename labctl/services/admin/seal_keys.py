@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from labctl.certificates.signing import signing_settings
 from labctl.config import SEAL_KEY_VARIABLE, default_database, seal_key
 from labctl.errors import BadInput
 from labctl.private_keys import SCHEME, refuse_open_key
@@ -29,8 +30,12 @@ def sign(database: str | None) -> SignedResponse:
     return SignedResponse(signed=None if head is None else head.length, fingerprint=fingerprint)
 
 
-def refuse_unusable_key() -> None:
-    """Raise BadInput for a key file that is missing or open to others; a token is asked only when it signs."""
+def refuse_unusable_keys() -> None:
+    """Raise BadInput for a file of the seal key or of the signing key that is missing or open to others.
+
+    A token is asked only when it signs.
+    """
+    signing_settings().refuse_open_files()
     if (setting := seal_key()) and not setting.startswith(SCHEME):
         refuse_open_key(Path(setting), SEAL_KEY)
 

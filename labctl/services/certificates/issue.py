@@ -42,9 +42,9 @@ def issue(store: Store, serial: str, version: int, request: CertificateRequest, 
     facts = facts_of(store, serial, version, order)
     found = Found.of(store, facts)
     refuse(facts, found)
-    key = signing_key(at)
-    certificate = to_be_signed(assembled(store, facts, found, request, at, kept), key)
-    forms = forms_of(certificate, key, at)
+    with signing_key(at) as key:
+        certificate = to_be_signed(assembled(store, facts, found, request, at, kept), key)
+        forms = forms_of(certificate, key, at)
     row = CertificateRow(
         certificate.number, serial, version, kept.number if kept else None, request.amend or "", request.by, at,
         hash_of_certificate(forms.document), order.model_dump(mode="json", exclude_defaults=True),

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
 from datetime import datetime
 from typing import TYPE_CHECKING
 
-from labctl import config
 from labctl.certificates.dcc import dcc_of
 from labctl.certificates.document import Certificate
 from labctl.certificates.pdf import pdf_of
-from labctl.certificates.signing import SigningSettings, libraries
+from labctl.certificates.signing import SigningSettings, libraries, signing_settings
+from labctl.config import SIGN_KEY_VARIABLE
 from labctl.errors import BadInput
 from labctl.services.schemas.documents.signatures import SigningKeyResponse
 from labctl.store import CertificateForms
@@ -18,54 +20,43 @@ if TYPE_CHECKING:
     from labctl.certificates.signing.keys import SigningKey
 
 
-def settings() -> SigningSettings:
-    """Return what names the signing key."""
-    return SigningSettings(
-        config.variable(config.SIGN_KEY_VARIABLE),
-        config.variable(config.SIGN_CERTIFICATE_VARIABLE),
-        config.variable(config.SIGN_PASSWORD_VARIABLE),
-    )
-
-
-def signing_key(at: datetime) -> SigningKey | None:
-    """Open the key that signs certificates at an aware time; None where none is set.
+@contextmanager
+def signing_key(at: datetime) -> Iterator[SigningKey | None]:
+    """Open the key that signs certificates at an aware time for a while; None where none is set.
 
     Raises BadInput, which names the file or token, what is wrong with it, and what to do.
     """
-    given = settings()
+    given = signing_settings()
     if not given.key:
-        return None
+        yield None
+        return
+    with closing(_opened(given)) as key:
+        key.refuse_outside_validity(at)
+        yield key
+
+
+def _opened(given: SigningSettings) -> SigningKey:
     with libraries("signing"):
         from labctl.certificates.signing.keys import open_signing_key  # noqa: PLC0415  only where a key is set
-    with libraries("signing"):
-        key = open_signing_key(given)
-    key.refuse_outside_validity(at)
-    return key
 
-
-def refuse_unusable_signing_key() -> None:
-    """Raise BadInput for a key or password file that is missing or open to others; a token is asked when it signs."""
-    settings().refuse_open_files()
+        return open_signing_key(given)
 
 
 def show_signing_key() -> SigningKeyResponse:
     """Return whose the signing key is, and how long it may sign. Raises BadInput."""
-    given = settings()
+    given = signing_settings()
     if not given.key:
         raise BadInput(
-            f"{config.SIGN_KEY_VARIABLE} is not set; name the signing key by it: a PEM or PKCS#12 file with key and "
+            f"{SIGN_KEY_VARIABLE} is not set; name the signing key by it: a PEM or PKCS#12 file with key and "
             "certificate, or a PKCS#11 URI"
         )
-    with libraries("signing"):
-        from labctl.certificates.signing.keys import open_signing_key  # noqa: PLC0415  as above
-    with libraries("signing"):
-        key = open_signing_key(given)
-    return SigningKeyResponse(
-        **key.signatory.model_dump(),
-        valid_from=key.certificate.not_valid_before_utc,
-        valid_until=key.certificate.not_valid_after_utc,
-        digest=key.digest,
-    )
+    with closing(_opened(given)) as key:
+        return SigningKeyResponse(
+            **key.signatory.model_dump(),
+            valid_from=key.certificate.not_valid_before_utc,
+            valid_until=key.certificate.not_valid_after_utc,
+            digest=key.digest,
+        )
 
 
 def to_be_signed(certificate: Certificate, key: SigningKey | None) -> Certificate:
