@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import xmlsec
-from asn1crypto import cms
+from asn1crypto import cms, tsp
 from cryptography import x509
 from cryptography.exceptions import InvalidSignature
 from cryptography.hazmat.primitives import hashes
@@ -29,6 +29,8 @@ from lxml import etree
 AT = datetime(2027, 3, 1, 12, tzinfo=UTC)
 KINDS = ("p256", "p384", "rsa2048")
 Key = Any
+#: Adds attributes to asn1crypto.cms, which pyHanko needs; they cannot be added after the first use.
+ATTRIBUTES = tsp.CMSAttributeType
 
 
 def new_key(kind: str) -> Key:

@@ -63,7 +63,8 @@ def verify(
 ) -> None:
     """Verify the file of a certificate: whether it is as it was issued, and its signatures.
 
-    Exit status 1 when something speaks against the file, or neither the register nor a trusted signature for it.
+    Exit status 1 when the file differs from the one that was issued, a signature is not valid or its signer not trusted,
+    or neither the register nor a trusted signature confirms the file.
     """
     from labctl.services.certificates.verification import verify_file
     from labctl.services.commands.open import open_readonly

@@ -46,5 +46,5 @@ class VerifiedFileResponse(ResponseModel):
     certificate: CertificateResponse | None = Field(description="The certificate of this number in the database.")
     signatures: list[SignatureResponse]
     ok: bool = Field(
-        description="Whether nothing speaks against the file, and the register or a trusted signature speaks for it."
+        description="Whether the register or a trusted signature confirms the file, and no check of it failed."
     )

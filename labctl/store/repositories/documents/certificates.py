@@ -33,7 +33,7 @@ class CertificateRow:
     at: datetime
     hash: str
     order: JsonDocument
-    signed_by: JsonDocument | None = None  #: who signed PDF and DCC, as the document says; None: nobody
+    signed_by: JsonDocument | None = None  #: who signed PDF and DCC, as the document says; None: no signature
 
 
 @dataclass(frozen=True)
