@@ -63,7 +63,7 @@ def verify(
 ) -> None:
     """Verify the file of a certificate: whether it is as it was issued, and its signatures.
 
-    Exit status 1 when the file differs from the one that was issued, a signature is not valid or its signer not trusted,
+    Exit status 1 when the file differs from the one that was issued, a signature is not valid or not trusted,
     or neither the register nor a trusted signature confirms the file.
     """
     from labctl.services.certificates.verification import verify_file
