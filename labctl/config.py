@@ -1,4 +1,4 @@
-"""Defaults: the database, the API key, the user's name and the interval of calibrations."""
+"""Defaults: the database, keys, the user's name and the interval of calibrations."""
 
 from __future__ import annotations
 
@@ -9,6 +9,9 @@ DATABASE_VARIABLE = "LABCTL_DATABASE"
 KEY_VARIABLE = "LABCTL_KEY"
 DUE_VARIABLE = "LABCTL_DUE_DAYS"
 SEAL_KEY_VARIABLE = "LABCTL_SEAL_KEY"
+SIGN_KEY_VARIABLE = "LABCTL_SIGN_KEY"
+SIGN_CERTIFICATE_VARIABLE = "LABCTL_SIGN_CERTIFICATE"
+SIGN_PASSWORD_VARIABLE = "LABCTL_SIGN_PASSWORD_FILE"  # noqa: S105  the name of the variable
 LOG_LEVEL_VARIABLE = "LABCTL_LOG_LEVEL"
 
 

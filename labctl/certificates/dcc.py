@@ -5,14 +5,22 @@ from __future__ import annotations
 from itertools import groupby
 from xml.etree import ElementTree as ET
 
-from labctl.certificates.document import Certificate, StandardUsed, StateOfItem
+from labctl.certificates.document import Certificate, Condition, Conformity, StandardUsed, StateOfItem
+from labctl.certificates.readable import uncertainty_text
 from labctl.certificates.units import readable
-from labctl.certificates.xml_parts import DCC, ENGLISH, SI, child, contact, optional, quantity, texts
+from labctl.certificates.xml_parts import DCC, ENGLISH, SI, child, contact, optional, quantity, referred, texts
 
 VERSION = "3.3.0"
 XSI = "http://www.w3.org/2001/XMLSchema-instance"
 #: Identifiers of statements and results: what the documentation of certificates refers to.
 STATED = "https://ptb.de/dcc"
+#: Where PTB defines the refTypes with the prefix basic_; docs/reference/certificate.md says where each one is.
+REF_TYPES = "https://digilab.ptb.de/dkd/refType/vocab/index.php?tema=2"
+#: Conditions for which PTB has a refType, with one for the least and one for the largest value.
+CONDITIONS = {
+    "Temperature of the chamber air": "basic_temperature",
+    "Relative humidity of the air": "basic_humidityRelative",
+}
 
 
 def dcc_of(given: Certificate) -> bytes:
@@ -29,6 +37,10 @@ def dcc_of(given: Certificate) -> bytes:
 
 def _administrative(parent: ET.Element, given: Certificate) -> None:
     _software(child(parent, "dccSoftware"), given.method.software)
+    defined = child(child(parent, "refTypeDefinitions"), "refTypeDefinition")
+    texts(defined, "name", "Namespace of refTypes that several communities share")
+    child(defined, "namespace", "basic")
+    child(defined, "link", REF_TYPES)
     _core(child(parent, "coreData"), given)
     _item(child(parent, "items"), given)
     laboratory = child(parent, "calibrationLaboratory")
@@ -117,24 +129,32 @@ def _statements(parent: ET.Element, given: Certificate) -> None:
     _statement(parent, "Authorisation", f"{given.authorised.name}, {given.authorised.at:%Y-%m-%d %H:%M} UTC: "
                f"{given.authorised.reason}")  # fmt: skip
     if given.due is not None:
-        made = _statement(parent, "Next calibration", "Agreed with the customer.")
+        made = _statement(parent, "Next calibration", "Agreed with the customer.", ref_type="basic_recalibration")
         child(made, "date", given.due.isoformat())
-    found = given.conformity
-    if found is None:
-        return
-    made = _statement(parent, "Conformity", found.statement, norm=("ILAC-G8:09/2019",), reference=found.specification)
+    if given.conformity is not None:
+        _conformity(parent, given.conformity, max(each.k for each in given.results))
+
+
+def _conformity(parent: ET.Element, found: Conformity, k: float) -> None:
+    made = _statement(parent, "Conformity", found.statement, norm=("ILAC-G8:09/2019",), reference=found.specification,
+                      ref_type="basic_conformity")  # fmt: skip
     child(made, "conformity", "pass" if found.passed else "fail")
     data = child(made, "data")
-    quantity(data, "Limit of the error", [found.limit_dps], "deg/s")
+    for name, limit, ref_type in (
+        ("Limit of the error", found.limit_dps, "basic_toleranceLimit"),
+        ("Acceptance limit of the error", found.acceptance_dps, "basic_acceptanceLimit"),
+    ):
+        quantity(data, f"{name}, lower", [-limit], "deg/s", ref_type=f"{ref_type}Lower")
+        quantity(data, f"{name}, upper", [limit], "deg/s", ref_type=f"{ref_type}Upper")
     quantity(data, "Guard band", [found.guard_band_dps], "deg/s")
     quantity(data, "Largest error of the corrected rate", [found.largest_error_dps], "deg/s",
-             expanded=[found.expanded_dps], k=[max(each.k for each in given.results)])  # fmt: skip
+             expanded=[found.expanded_dps], k=[k], ref_type="basic_measurementError")  # fmt: skip
 
 
 def _statement(
-    parent: ET.Element, name: str, text: str, *, norm: tuple[str, ...] = (), reference: str = ""
+    parent: ET.Element, name: str, text: str, *, norm: tuple[str, ...] = (), reference: str = "", ref_type: str = ""
 ) -> ET.Element:
-    made = child(parent, "statement")
+    made = child(parent, "statement", **referred(ref_type))
     texts(made, "name", name)
     for each in norm:
         child(made, "norm", each)
@@ -146,18 +166,29 @@ def _statement(
 def _measured(parent: ET.Element, given: Certificate) -> None:
     made = child(parent, "measurementResult")
     texts(made, "name", f"Calibration of {given.item.serial}, version {given.calibration.version}")
-    _method(child(child(made, "usedMethods"), "usedMethod"), given)
+    methods = child(made, "usedMethods")
+    _method(child(methods, "usedMethod"), given)
+    stated = child(methods, "usedMethod", **referred("basic_uncertainty"))
+    texts(stated, "name", "Uncertainty of measurement")
+    texts(stated, "description", uncertainty_text(given))
+    child(stated, "norm", "JCGM 100:2008")
     _software(child(made, "usedSoftware"), given.method.software)
     equipment = child(made, "measuringEquipments")
     for each in given.standards:
         _standard(equipment, each)
     conditions = child(made, "influenceConditions")
     for condition in given.environment:
-        one = child(conditions, "influenceCondition")
-        texts(one, "name", condition.name)
-        data = child(one, "data")
-        quantity(data, "Least and largest mean of a data set", [condition.low, condition.high], condition.unit)
+        _condition(conditions, condition)
     _results(child(made, "results"), given)
+
+
+def _condition(parent: ET.Element, given: Condition) -> None:
+    ref_type = CONDITIONS.get(given.name, "")
+    made = child(parent, "influenceCondition", **referred(ref_type))
+    texts(made, "name", given.name)
+    data = child(made, "data")
+    for name, value, suffix in (("Least", given.low, "Min"), ("Largest", given.high, "Max")):
+        quantity(data, f"{name} mean of a data set", [value], given.unit, ref_type=ref_type and f"{ref_type}{suffix}")
 
 
 def _method(made: ET.Element, given: Certificate) -> None:
@@ -176,7 +207,7 @@ def _method(made: ET.Element, given: Certificate) -> None:
 
 
 def _standard(parent: ET.Element, given: StandardUsed) -> None:
-    made = child(parent, "measuringEquipment")
+    made = child(parent, "measuringEquipment", **referred("basic_standardUsed"))
     texts(made, "name", given.name or given.quantity)
     said = [f"Reference standard of {given.quantity}."]
     said += [f"Calibrated {given.calibrated}."] if given.calibrated else []
@@ -197,13 +228,15 @@ def _results(parent: ET.Element, given: Certificate) -> None:
         points = list(of_axis)
         made = _result(parent, f"Error of indication of axis {axis}", "Output by its nominal scale minus true rate.")
         table = child(made, "list")
-        quantity(table, "True rate", [each.rate_dps for each in points], "deg/s")
+        rates = [each.rate_dps for each in points]
+        quantity(table, "True rate", rates, "deg/s", ref_type="basic_referenceValue")
         warm = [each.temperature_c for each in points if each.temperature_c is not None]
         if len(warm) == len(points):
             quantity(table, "Temperature of the item", warm, "deg C")
         quantity(
             table, "Error of indication", [each.error_dps for each in points], "deg/s",
             expanded=[each.expanded_dps for each in points], k=[each.k for each in points], probability=probability,
+            ref_type="basic_measurementError",
         )  # fmt: skip
     _any_axis(parent, given)
     _state(parent, "Errors as found, before adjustment", given.as_found)

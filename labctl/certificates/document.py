@@ -234,6 +234,14 @@ class ManifestNamed(Part):
     hash: str  #: SHA-256
 
 
+class Signatory(Part):
+    """Who signs the PDF and the DCC: what the certificate (X.509) of the signing key states."""
+
+    subject: str  #: as RFC 4514 writes it
+    issuer: str
+    fingerprint: str  #: SHA-256 of the certificate in DER form
+
+
 class Certificate(Part):
     """All of it."""
 
@@ -266,6 +274,7 @@ class Certificate(Part):
     calibration: CalibrationFacts
     manifests: tuple[ManifestNamed, ...] = ()  #: of the recordings and the certification; none: issued before 0017
     statements: tuple[str, ...]
+    signed_by: Signatory | None = None  #: of the PDF and the DCC; None: no signing key was set, or issued before
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, populate_by_name=True)
 

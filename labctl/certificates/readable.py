@@ -53,6 +53,7 @@ def _pages(given: Certificate) -> dict[str, object]:
         "issued_by": given.issued_by,
         "authorised": f"{given.authorised.name}, {given.authorised.at:%Y-%m-%d %H:%M} UTC",
         "authorised_name": given.authorised.name,
+        "signature": _signature(given),
         "method": _method(given),
         "plan_hash": given.method.plan_hash or "",
         "environment": [
@@ -60,7 +61,7 @@ def _pages(given: Certificate) -> dict[str, object]:
             for each in given.environment
         ],
         "standards": [_standard(each) for each in given.standards],
-        "uncertainty": _uncertainty(given),
+        "uncertainty": uncertainty_text(given),
         "budget": [
             [
                 each.source.replace("_", " "),
@@ -87,6 +88,18 @@ def _pages(given: Certificate) -> dict[str, object]:
         "address": given.calibration.address,
         "manifests": [[f"Manifest {each.manifest}, {each.record}", each.hash] for each in given.manifests],
     }
+
+
+def _signature(given: Certificate) -> str:
+    """Return the note below the names: how the certificate is valid, and who signed the file."""
+    recorded = "The authorisation is recorded electronically in the audit trail of the laboratory;"
+    signer = given.signed_by
+    if signer is None:
+        return f"{recorded} the certificate is valid without a signature by hand."
+    return (
+        f"{recorded} this file and the attached dcc.xml are signed electronically by {signer.subject} (certificate "
+        f"SHA-256 {signer.fingerprint[:16]}…)."
+    )
 
 
 def _with_unit(value: float, unit: str) -> str:
@@ -172,7 +185,8 @@ def _method(given: Certificate) -> list[list[str]]:
     return [each for each in found if each[1]]
 
 
-def _uncertainty(given: Certificate) -> str:
+def uncertainty_text(given: Certificate) -> str:
+    """Return how the expanded uncertainties are to be read."""
     found = given.uncertainty
     warm = "" if found.temperature_c is None else f" and {_number(found.temperature_c)} °C"
     return (

@@ -22,6 +22,11 @@ def child(parent: ET.Element, name: str, text: str | None = None, **attributes: 
     return made
 
 
+def referred(ref_type: str) -> dict[str, str]:
+    """Return the attribute that says by PTB's word what an element is; none without a word."""
+    return {"refType": ref_type} if ref_type else {}
+
+
 def texts(parent: ET.Element, name: str, *said: str, **attributes: str) -> ET.Element:
     """Add an element with its text in English; `said` is joined, as PTB's rules allow one text per language."""
     made = child(parent, name, **attributes)
@@ -67,7 +72,7 @@ def quantity(
 
     Where D-SI has no word for the unit the numbers are a text.
     """
-    made = child(parent, element, **({"refType": ref_type} if ref_type else {}))
+    made = child(parent, element, **referred(ref_type))
     texts(made, "name", name)
     symbol = dsi(unit)
     if symbol is None:

@@ -27,9 +27,10 @@ from labctl.cli.commands import (
     schedule,
     seal_key,
     server,
+    signing_key,
     trend,
 )
-from labctl.cli.commands.documents import certificate, datasheet, reproduction, uncertainty
+from labctl.cli.commands.documents import certificate, certificate_list, datasheet, reproduction, uncertainty
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.interrupts import process_of_one_command
 from labctl.config import os_user
@@ -52,6 +53,8 @@ app.add_typer(recordings.export_app, name="export")
 app.add_typer(keys.app, name="key")
 app.add_typer(audit.app, name="audit")
 app.add_typer(seal_key.app, name="seal-key")
+app.add_typer(signing_key.app, name="signing-key")
+app.add_typer(certificate_list.app, name="certificates")
 COMMANDS: dict[str, Callable[..., None]] = {
     "demo": server.demo,
     "serve": server.serve,
@@ -77,7 +80,6 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "certifications": calibrations.certifications,
     "calibration": calibrations.calibration,
     "certificate": certificate.certificate,
-    "certificates": certificate.certificates,
     "uncertainty": uncertainty.uncertainty,
     "compensate": calibrations.compensate,
     "backup": database.backup,

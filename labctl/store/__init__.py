@@ -50,10 +50,11 @@ from labctl.store.repositories.recordings import Recordings
 from labctl.store.repositories.resume_points import ResumePoint, ResumePoints, Resumption
 from labctl.store.repositories.scheduled_starts import NewStart, StartEventRow, StartRow, Starts
 from labctl.store.repositories.units import Certifications, Units
-from labctl.store.sealing.signers import Signer, create_key, refuse_open_key, signer_of
+from labctl.store.sealing.signers import SEAL_KEY, Signer, create_key, signer_of
 from labctl.store.sealing.signing import begin_signing, sign_chain
 
 __all__ = [
+    "SEAL_KEY",
     "Audit",
     "AuditRow",
     "BenchRow",
@@ -125,7 +126,6 @@ __all__ = [
     "open_store",
     "parse_anchor",
     "read_public_key",
-    "refuse_open_key",
     "shown",
     "sign_chain",
     "signer_of",

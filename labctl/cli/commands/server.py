@@ -91,14 +91,14 @@ def _print_ready(service: Ready, request: ServeRequest, *, as_json: bool) -> Non
 
 
 def _migrated(location: str) -> None:
-    """Bring a database of an earlier version up to date before the service starts, and say so; a seal key that cannot
-    be used is refused."""
+    """Bring a database of an earlier version up to date before the service starts, and say so; a seal or signing key
+    that cannot be used is refused."""
     from labctl.cli.printing.migration import migration_text
     from labctl.log import get_logger
     from labctl.services.admin.maintenance import migrate_before_service
-    from labctl.services.admin.seal_keys import refuse_unusable_key
+    from labctl.services.admin.seal_keys import refuse_unusable_keys
 
-    refuse_unusable_key()
+    refuse_unusable_keys()
     answer = migrate_before_service(location)
     if answer is not None:
         stderr.print(f"labctl: {migration_text(answer)}", markup=False)

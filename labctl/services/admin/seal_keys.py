@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from labctl.certificates.signing import signing_settings
 from labctl.config import SEAL_KEY_VARIABLE, default_database, seal_key
 from labctl.errors import BadInput
+from labctl.private_keys import SCHEME, refuse_open_key
 from labctl.services.schemas.admin import SealKeyResponse, SignedResponse
-from labctl.store import Signer, create_key, refuse_open_key, sign_chain, signer_of
+from labctl.store import SEAL_KEY, Signer, create_key, sign_chain, signer_of
 
 
 def create_seal_key(path: Path) -> SealKeyResponse:
@@ -28,10 +30,14 @@ def sign(database: str | None) -> SignedResponse:
     return SignedResponse(signed=None if head is None else head.length, fingerprint=fingerprint)
 
 
-def refuse_unusable_key() -> None:
-    """Raise BadInput for a key file that is missing or open to others; a token is asked only when it signs."""
-    if (setting := seal_key()) and not setting.startswith("pkcs11:"):
-        refuse_open_key(Path(setting))
+def refuse_unusable_keys() -> None:
+    """Raise BadInput for a file of the seal key or of the signing key that is missing or open to others.
+
+    A token is asked only when it signs.
+    """
+    signing_settings().refuse_open_files()
+    if (setting := seal_key()) and not setting.startswith(SCHEME):
+        refuse_open_key(Path(setting), SEAL_KEY)
 
 
 def _setting() -> str:

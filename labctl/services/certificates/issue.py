@@ -1,20 +1,24 @@
-"""Issue of a certificate: refused, or made in its three forms and recorded; the same request gives the same bytes."""
+"""Issue of a certificate: refused, or made in its three forms, signed and recorded; asked again, the same bytes."""
 
 from __future__ import annotations
 
 from datetime import date, datetime
 
 from instruments.standards import Standard
-from labctl.certificates.dcc import dcc_of
 from labctl.certificates.document import hash_of_certificate
-from labctl.certificates.pdf import pdf_of
 from labctl.errors import Conflict
 from labctl.services.certificates.assembly import assembled
 from labctl.services.certificates.facts import Facts, facts_of
 from labctl.services.certificates.found import Found
 from labctl.services.certificates.missing import MissingFacts
-from labctl.services.schemas.documents.certificates import CertificateOrder, CertificateRequest, CertificateResponse
-from labctl.store import CertificateForms, CertificateRow, Store
+from labctl.services.certificates.signature import forms_of, signing_key, to_be_signed
+from labctl.services.schemas.documents.certificates import (
+    CertificateOrder,
+    CertificateRequest,
+    CertificateResponse,
+    SignatoryResponse,
+)
+from labctl.store import CertificateRow, Store
 
 
 class CertificateRefused(Conflict):
@@ -26,7 +30,8 @@ class CertificateRefused(Conflict):
 def issue(store: Store, serial: str, version: int, request: CertificateRequest, at: datetime) -> CertificateResponse:
     """Issue the certificate of a version at an aware time; one that was issued is answered as it is.
 
-    Raises NotFound, MissingFacts, CertificateRefused, Conflict where other facts are given for one that was issued.
+    Raises NotFound, MissingFacts, CertificateRefused, Conflict where other facts are given for one that was issued,
+    BadInput for a signing key that cannot be used.
     """
     kept = store.certificates.newest(store.units.get(serial).serial, version)
     if kept is not None and request.amend is None:
@@ -37,13 +42,13 @@ def issue(store: Store, serial: str, version: int, request: CertificateRequest, 
     facts = facts_of(store, serial, version, order)
     found = Found.of(store, facts)
     refuse(facts, found)
-    certificate = assembled(store, facts, found, request, at, kept)
-    document = certificate.to_bytes()
-    xml = dcc_of(certificate)
-    forms = CertificateForms(document, xml, pdf_of(certificate, xml))
+    with signing_key(at) as key:
+        certificate = to_be_signed(assembled(store, facts, found, request, at, kept), key)
+        forms = forms_of(certificate, key, at)
     row = CertificateRow(
         certificate.number, serial, version, kept.number if kept else None, request.amend or "", request.by, at,
-        hash_of_certificate(document), order.model_dump(mode="json", exclude_defaults=True),
+        hash_of_certificate(forms.document), order.model_dump(mode="json", exclude_defaults=True),
+        None if certificate.signed_by is None else certificate.signed_by.model_dump(mode="json"),
     )  # fmt: skip
     return response(store.certificates.add(row, forms))
 
@@ -105,4 +110,5 @@ def response(row: CertificateRow, replaced_by: str | None = None) -> Certificate
     return CertificateResponse(
         serial=row.serial, version=row.version, number=row.number, issued_at=row.at, by=row.by, hash=row.hash,
         replaces=row.replaces, reason=row.reason, replaced_by=replaced_by,
+        signed_by=None if row.signed_by is None else SignatoryResponse.model_validate(row.signed_by),
     )  # fmt: skip

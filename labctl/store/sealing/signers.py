@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import os
-import stat
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
-from urllib.parse import unquote
 
+from labctl.config import SEAL_KEY_VARIABLE
 from labctl.errors import BadInput
+from labctl.private_keys import SCHEME, KeyUse, TokenUri, open_session, refuse_open_key, token_uri
 from labctl.store.connection.private_files import FILE
 from labctl.store.manifests.signatures import NEEDS, PublicKey, public_key, signed_text
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ec import EllipticCurvePrivateKey
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
-SCHEME = "pkcs11:"
+SEAL_KEY = KeyUse("seal key", SEAL_KEY_VARIABLE, "; `labctl seal-key create FILE` makes a key")
 P256_BYTES = 32
 
 
@@ -48,19 +48,6 @@ def signer_of(setting: str) -> Signer:
         raise BadInput(f"the seal key needs {error.name}, which is not installed; run {NEEDS}") from error
 
 
-def refuse_open_key(path: Path) -> None:
-    """Raise BadInput for a key file that is missing, or that others than its owner can read or write."""
-    try:
-        mode = path.stat().st_mode
-    except OSError as error:
-        raise BadInput(f"seal key {path}: {error.strerror}; `labctl seal-key create FILE` makes a key") from error
-    if mode & (stat.S_IRWXG | stat.S_IRWXO):
-        raise BadInput(
-            f"seal key {path}: its mode is {stat.S_IMODE(mode):04o}, so others than its owner have access to it; "
-            f"run `chmod 600 {path}`"
-        )
-
-
 @dataclass(frozen=True)
 class FileSigner:
     """A key of the cryptography library."""
@@ -86,7 +73,7 @@ def _file_signer(path: Path) -> FileSigner:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey  # noqa: PLC0415
     from cryptography.hazmat.primitives.serialization import load_pem_private_key  # noqa: PLC0415
 
-    refuse_open_key(path)
+    refuse_open_key(path, SEAL_KEY)
     try:
         key = load_pem_private_key(path.read_bytes(), None)
     except (ValueError, TypeError) as error:
@@ -129,62 +116,18 @@ def create_key(path: Path) -> FileSigner:
     return _file_signer(path)
 
 
-@dataclass(frozen=True)
-class TokenUri:
-    """A key of a PKCS#11 token, as RFC 7512 names it."""
-
-    token: str
-    object: str
-    module: str
-    pin: str
-
-
-def token_uri(text: str) -> TokenUri:
-    """Read `pkcs11:token=T;object=O?module-path=FILE&pin-source=FILE`. Raises BadInput; no message shows a PIN."""
-    path, _, query = text.removeprefix(SCHEME).partition("?")
-    try:
-        given = dict(_attribute(part) for part in [*path.split(";"), *query.split("&")] if part)
-    except ValueError as error:
-        raise BadInput("LABCTL_SEAL_KEY: an attribute of the PKCS#11 URI has no '='; write token=NAME") from error
-    if missing := [name for name in ("token", "object", "module-path") if not given.get(name)]:
-        raise BadInput(
-            f"LABCTL_SEAL_KEY: the PKCS#11 URI has no {', '.join(missing)}; write "
-            "pkcs11:token=NAME;object=NAME?module-path=FILE&pin-source=FILE"
-        )
-    return TokenUri(given["token"], given["object"], given["module-path"], _pin(given))
-
-
-def _attribute(part: str) -> tuple[str, str]:
-    name, value = part.split("=", 1)
-    return name, unquote(value)
-
-
-def _pin(given: dict[str, str]) -> str:
-    if "pin-value" in given:
-        return given["pin-value"]
-    if "pin-source" not in given:
-        return ""
-    path = Path(given["pin-source"].removeprefix("file:"))
-    refuse_open_key(path)
-    return path.read_text(encoding="utf-8").strip()
-
-
 class TokenSigner:
     """An ECDSA key on P-256 in a PKCS#11 token; it never leaves it."""
 
     def __init__(self, uri: TokenUri) -> None:
         """Log in and find the key. Raises BadInput."""
         import pkcs11  # noqa: PLC0415  only where a token is used
-        from pkcs11.exceptions import PKCS11Error, UserAlreadyLoggedIn  # noqa: PLC0415  as above
+        from pkcs11.exceptions import PKCS11Error  # noqa: PLC0415  as above
         from pkcs11.util.ec import encode_ec_public_key  # noqa: PLC0415  as above
 
-        where = f"seal key pkcs11:token={uri.token};object={uri.object}"
+        where = f"seal key {uri.named}"
         try:
-            token = pkcs11.lib(uri.module).get_token(token_label=uri.token)
-            try:
-                self._session = token.open(user_pin=uri.pin or None)
-            except UserAlreadyLoggedIn:  # a process logs in once
-                self._session = token.open()
+            self._session = open_session(uri)
             self._key: Any = self._session.get_key(object_class=pkcs11.ObjectClass.PRIVATE_KEY, label=uri.object)
             public: Any = self._session.get_key(object_class=pkcs11.ObjectClass.PUBLIC_KEY, label=uri.object)
             der = encode_ec_public_key(public)
@@ -217,4 +160,4 @@ def _pem_of(der: bytes) -> bytes:
 
 
 def _token_signer(setting: str) -> TokenSigner:
-    return TokenSigner(token_uri(setting))
+    return TokenSigner(token_uri(setting, SEAL_KEY))

@@ -2744,6 +2744,8 @@ export interface components {
              * @description Number of the later certificate that replaces this certificate; null: this certificate is valid.
              */
             replaced_by: string | null;
+            /** @description Who signed the PDF (PAdES) and the DCC (XAdES); null: they have no signature. */
+            signed_by: components["schemas"]["SignatoryResponse"] | null;
         };
         /**
          * CertificationResponse
@@ -6587,6 +6589,27 @@ export interface components {
             value: number;
             /** U */
             u: number;
+        };
+        /**
+         * SignatoryResponse
+         * @description Who signed, or signs, a certificate: what the certificate (X.509) of the signing key states.
+         */
+        SignatoryResponse: {
+            /**
+             * Subject
+             * @description Name of the signer, as RFC 4514 writes it.
+             */
+            subject: string;
+            /**
+             * Issuer
+             * @description Name of the authority that issued the certificate (X.509).
+             */
+            issuer: string;
+            /**
+             * Fingerprint
+             * @description SHA-256 of the certificate (X.509) in DER form.
+             */
+            fingerprint: string;
         };
         /**
          * SimulatedRecordingResponse

@@ -1,4 +1,4 @@
-"""`labctl certificate`, `labctl certificates`: issue the certificate of a version, or write the one that was issued."""
+"""`labctl certificate`: issue the certificate of a version, or write the one that was issued."""
 
 from __future__ import annotations
 
@@ -85,24 +85,8 @@ def certificate(
         return
     issued = f"issued {answer.issued_at:%Y-%m-%d} by {answer.by}"
     issued += f", replaces {answer.replaces}" if answer.replaces else ""
+    issued += f", signed by {answer.signed_by.subject}" if answer.signed_by else ""
     console.print(f"certificate {answer.number} of {serial} version {number}, {issued} -> {out}", markup=False)
-
-
-def certificates(serial: Serial, as_json: Json = False, database: Database = None) -> None:
-    """List the certificates of a unit, newest first, with what replaces them."""
-    from labctl.services.certificates.served import list_certificates
-    from labctl.services.commands.open import open_readonly
-
-    with one_clear_line(), open_readonly(database) as store:
-        rows = list_certificates(store, serial)
-    if as_json:
-        print_json(rows)
-        return
-    for row in rows:
-        said = f"{row.number}  version {row.version}, issued {row.issued_at:%Y-%m-%d} by {row.by}"
-        said += f", replaces {row.replaces}: {row.reason}" if row.replaces else ""
-        said += f"; replaced by {row.replaced_by}" if row.replaced_by else ""
-        console.print(said, markup=False)
 
 
 def read_order(path: Path | None) -> CertificateOrder:

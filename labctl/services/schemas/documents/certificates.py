@@ -98,6 +98,14 @@ class CertificateRequest(Request):
     )
 
 
+class SignatoryResponse(ResponseModel):
+    """Who signed, or signs, a certificate: what the certificate (X.509) of the signing key states."""
+
+    subject: str = Field(description="Name of the signer, as RFC 4514 writes it.")
+    issuer: str = Field(description="Name of the authority that issued the certificate (X.509).")
+    fingerprint: str = Field(description="SHA-256 of the certificate (X.509) in DER form.")
+
+
 class CertificateResponse(ResponseModel):
     """A certificate that was issued."""
 
@@ -114,4 +122,7 @@ class CertificateResponse(ResponseModel):
     replaced_by: str | None = Field(
         default=None,
         description="Number of the later certificate that replaces this certificate; null: this certificate is valid.",
+    )
+    signed_by: SignatoryResponse | None = Field(
+        default=None, description="Who signed the PDF (PAdES) and the DCC (XAdES); null: they have no signature."
     )

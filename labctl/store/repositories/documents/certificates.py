@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
@@ -32,6 +33,7 @@ class CertificateRow:
     at: datetime
     hash: str
     order: JsonDocument
+    signed_by: JsonDocument | None = None  #: who signed PDF and DCC, as the document says; None: no signature
 
 
 @dataclass(frozen=True)
@@ -86,11 +88,14 @@ class Certificates:
     def of_unit(self, serial: str) -> list[CertificateRow]:
         """Return every certificate of a unit, newest first."""
         c = tables.certificates.c
-        query = sa.select(
-            c.number, c.serial, c.version, c.replaces, c.reason, c.by, c.at, c.hash, c.order
-        ).where(c.serial == serial).order_by(c.id.desc())  # fmt: skip
         with self._database.reading() as connection:
-            return [CertificateRow(*row) for row in connection.execute(query)]
+            return [_row(row) for row in connection.execute(_ROWS.where(c.serial == serial).order_by(c.id.desc()))]
+
+    def of_number(self, number: str) -> CertificateRow | None:
+        """Return the certificate of a number; None: none has it."""
+        with self._database.reading() as connection:
+            row = connection.execute(_ROWS.where(tables.certificates.c.number == number)).first()
+        return None if row is None else _row(row)
 
     def newest(self, serial: str, version: int) -> CertificateRow | None:
         """Return the certificate of a version that none replaces; None: none was issued."""
@@ -102,3 +107,15 @@ class Certificates:
         with self._database.reading() as connection:
             row = connection.execute(sa.select(c.document, c.xml, c.pdf).where(c.number == number)).one()
         return CertificateForms(bytes(row.document), bytes(row.xml), bytes(row.pdf))
+
+
+_C = tables.certificates.c
+_ROWS = sa.select(
+    _C.number, _C.serial, _C.version, _C.replaces, _C.reason, _C.by, _C.at, _C.hash, _C.order, _C.document
+)  # fmt: skip
+
+
+def _row(found: sa.Row[*tuple[Any, ...]]) -> CertificateRow:
+    number, serial, version, replaces, reason, by, at, digest, order, document = found
+    signed_by = json.loads(bytes(document)).get("signed_by")
+    return CertificateRow(number, serial, version, replaces, reason, by, at, digest, order, signed_by)

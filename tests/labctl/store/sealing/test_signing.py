@@ -15,12 +15,13 @@ from typer.testing import CliRunner
 
 from labctl.cli.app import app
 from labctl.errors import BadInput
+from labctl.private_keys import token_uri
 from labctl.services.admin.seal_keys import create_seal_key, sign
 from labctl.store import Store, check, open_store, read_public_key, signer_of
 from labctl.store.connection.database import Database
 from labctl.store.manifests.signatures import public_key
 from labctl.store.sealing import signing
-from labctl.store.sealing.signers import Signer, token_uri
+from labctl.store.sealing.signers import SEAL_KEY, Signer
 
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
 MODULES = ("/usr/lib/softhsm/libsofthsm2.so", "/usr/lib/x86_64-linux-gnu/softhsm/libsofthsm2.so")
@@ -157,13 +158,13 @@ def test_a_pkcs11_uri_is_read(tmp_path: Path) -> None:
     pin = tmp_path / "pin"
     pin.write_text("1234\n", encoding="utf-8")
     pin.chmod(0o600)
-    found = token_uri(f"pkcs11:token=The%20lab;object=seal?module-path=/lib/x.so&pin-source=file:{pin}")
+    found = token_uri(f"pkcs11:token=The%20lab;object=seal?module-path=/lib/x.so&pin-source=file:{pin}", SEAL_KEY)
     assert (found.token, found.object, found.module, found.pin) == ("The lab", "seal", "/lib/x.so", "1234")
     with pytest.raises(BadInput, match="has no object, module-path"):
-        token_uri("pkcs11:token=a")
+        token_uri("pkcs11:token=a", SEAL_KEY)
     pin.chmod(0o644)
     with pytest.raises(BadInput, match="mode is 0644"):
-        token_uri(f"pkcs11:token=a;object=b?module-path=c&pin-source={pin}")
+        token_uri(f"pkcs11:token=a;object=b?module-path=c&pin-source={pin}", SEAL_KEY)
 
 
 @pytest.fixture

@@ -1,0 +1,109 @@
+"""A file of a certificate, verified: as it was issued by the register, and its signatures."""
+
+from __future__ import annotations
+
+import hashlib
+import html
+import json
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from labctl.certificates.document import TITLE
+from labctl.certificates.signing import libraries
+from labctl.errors import BadInput
+from labctl.services.certificates.issue import response
+from labctl.services.certificates.served import CertificateFormat
+from labctl.services.schemas.documents.signatures import SignatureResponse, VerifiedFileResponse
+from labctl.store import Store
+
+if TYPE_CHECKING:
+    from labctl.certificates.signing.verification import SignatureFound
+
+#: Where a file states its number: in the metadata of a PDF, which are readable in PDF/A, and in a DCC. The last counts.
+_NUMBER = {
+    "pdf": re.compile(rb"<rdf:li[^>]*>" + TITLE.encode() + rb" ([^<]+)</rdf:li>"),
+    "xml": re.compile(rb"<(?:\w+:)?uniqueIdentifier>([^<]+)<"),
+}
+
+
+def verify_file(store: Store, path: Path, ca: Path | None) -> VerifiedFileResponse:
+    """Verify a PDF, DCC or JSON file; `ca`: the authorities that are trusted, in PEM form. Raises BadInput."""
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise BadInput(f"{path}: {error.strerror}; name the file of a certificate") from error
+    form = _format_of(content, path)
+    number = _number_in(content, form)
+    row = None if number is None else store.certificates.of_number(number)
+    in_register: Literal["same", "differs", "unknown"] = "unknown"
+    if row is not None:
+        forms = store.certificates.forms(row.number)
+        kept = {"pdf": forms.pdf, "xml": forms.xml, "json": forms.document}[form]
+        in_register = "same" if kept == content else "differs"
+    found = _signatures(content, form, path, ca)
+    against = in_register == "differs" or not all(each.valid for each in found)
+    against = against or any(each.trust == "not trusted" for each in found)
+    vouched = in_register == "same" or any(each.trust == "trusted" for each in found)
+    replaced_by = None if row is None else _replaced_by(store, row.serial, row.number)
+    return VerifiedFileResponse(
+        format=form,
+        sha256=hashlib.sha256(content).hexdigest(),
+        number=number,
+        in_register=in_register,
+        certificate=None if row is None else response(row, replaced_by),
+        signatures=[_answer(each) for each in found],
+        ok=vouched and not against,
+    )
+
+
+def _replaced_by(store: Store, serial: str, number: str) -> str | None:
+    return next((each.number for each in store.certificates.of_unit(serial) if each.replaces == number), None)
+
+
+def _format_of(content: bytes, path: Path) -> CertificateFormat:
+    start = content.lstrip(b"\xef\xbb\xbf \r\n\t")[:5]
+    if start.startswith(b"%PDF"):
+        return "pdf"
+    if start.startswith(b"<"):
+        return "xml"
+    if start.startswith(b"{"):
+        return "json"
+    raise BadInput(f"{path}: this is no PDF, XML or JSON file; name the file of a certificate as it was issued")
+
+
+def _number_in(content: bytes, form: CertificateFormat) -> str | None:
+    """Return the number that a file states, whatever else is wrong with it."""
+    try:
+        if form == "json":
+            return str(json.loads(content)["number"])
+        found = _NUMBER[form].findall(content)
+        return html.unescape(found[-1].decode()) if found else None
+    except (ValueError, KeyError, TypeError):
+        return None
+
+
+def _signatures(content: bytes, form: CertificateFormat, path: Path, ca: Path | None) -> list[SignatureFound]:
+    if form == "json":  # its hash is in the register; it has no signature of its own
+        return []
+    with libraries("the verification of signatures"):
+        from labctl.certificates.signing import verification  # noqa: PLC0415  only where one is verified
+        from labctl.certificates.signing.keys import read_certificates  # noqa: PLC0415  as above
+    roots = None if ca is None else read_certificates(ca)
+    try:
+        look = verification.signatures_of_pdf if form == "pdf" else verification.signatures_of_dcc
+        return look(content, roots)
+    except BadInput as error:
+        raise BadInput(f"{path}: {error}") from error
+
+
+def _answer(found: SignatureFound) -> SignatureResponse:
+    return SignatureResponse(
+        form=found.form,
+        valid=found.valid,
+        problem=found.problem,
+        signed_by=None if found.signatory is None else found.signatory.model_dump(),
+        signed_at=found.signed_at,
+        trust=found.trust,
+        reason=found.reason,
+    )

@@ -1,0 +1,50 @@
+"""Signatures of certificates: the key that signs, and what the verification of a file finds."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Literal
+
+from pydantic import Field
+
+from labctl.services.schemas.base import ResponseModel
+from labctl.services.schemas.documents.certificates import CertificateResponse, SignatoryResponse
+
+
+class SigningKeyResponse(SignatoryResponse):
+    """The key that signs certificates; the private key is never shown."""
+
+    valid_from: datetime
+    valid_until: datetime = Field(description="Last instant at which the key may sign.")
+    digest: Literal["sha256", "sha384"] = Field(description="Hash that is signed.")
+
+
+class SignatureResponse(ResponseModel):
+    """What is found of one signature of a file."""
+
+    form: Literal["PAdES", "XAdES"] = Field(description="PAdES: of the PDF; XAdES: of the DCC.")
+    valid: bool = Field(description="Whether the signature is over these bytes, by the key of its certificate (X.509).")
+    problem: str = Field(description="Why the signature is not valid; empty: it is.")
+    signed_by: SignatoryResponse | None = Field(description="Who signed; null: the certificate (X.509) is damaged.")
+    signed_at: datetime | None = Field(description="Time of the signature, as the signer states it; null: not known.")
+    trust: Literal["trusted", "not trusted", "not established"] = Field(
+        description="Whether an authority that was named as trusted vouches for the signer; not established: none was."
+    )
+    reason: str = Field(description="Why the signer is trusted, or not.")
+
+
+class VerifiedFileResponse(ResponseModel):
+    """A file of a certificate, compared with the register of the database, and its signatures."""
+
+    format: Literal["pdf", "xml", "json"]
+    sha256: str = Field(description="SHA-256 of the file.")
+    number: str | None = Field(description="Number of the certificate that the file states; null: none.")
+    in_register: Literal["same", "differs", "unknown"] = Field(
+        description="same: byte for byte as it was issued; differs: the certificate was issued with other bytes; "
+        "unknown: the database has no certificate of this number."
+    )
+    certificate: CertificateResponse | None = Field(description="The certificate of this number in the database.")
+    signatures: list[SignatureResponse]
+    ok: bool = Field(
+        description="Whether the register or a trusted signature confirms the file, and no check of it failed."
+    )
