@@ -29,6 +29,7 @@ from labctl.store.records import (
     MeanRow,
     NewUnit,
     RecordingRow,
+    Release,
     ServedCalibration,
     StepRow,
     Unit,
@@ -40,6 +41,7 @@ from labctl.store.repositories.campaign_journal import StoreJournal
 from labctl.store.repositories.campaign_summaries import CampaignSummary
 from labctl.store.repositories.campaigns import Campaigns, NewCampaign
 from labctl.store.repositories.documents.certificates import CertificateForms, CertificateRow, Certificates
+from labctl.store.repositories.documents.withdrawals import Withdrawal
 from labctl.store.repositories.drafts.records import DraftEvent, DraftRow, DraftState
 from labctl.store.repositories.drafts.repository import Drafts
 from labctl.store.repositories.keys import Keys
@@ -99,6 +101,7 @@ __all__ = [
     "PublicKey",
     "RecordingRow",
     "Recordings",
+    "Release",
     "ResumePoint",
     "ResumePoints",
     "Resumption",
@@ -114,6 +117,7 @@ __all__ = [
     "StoreJournal",
     "Unit",
     "Units",
+    "Withdrawal",
     "Writer",
     "check",
     "copy_database",

@@ -157,6 +157,16 @@ class Judgement:
 
 
 @dataclass(frozen=True)
+class Release:
+    """The second person of a certification."""
+
+    by: str
+    by_key: str
+    reason: str
+    request: int | None = None  #: number of the request that was released
+
+
+@dataclass(frozen=True)
 class CertificationRow:
     """One act of certifying or revoking."""
 
@@ -168,6 +178,8 @@ class CertificationRow:
     at: datetime
     due_at: datetime | None
     judgement: Judgement | None = None  #: None of a revocation, and of acts before verdicts were kept
+    by_key: str | None = None  #: name of the API key that acted; None: `by` is as typed
+    release: Release | None = None  #: None: no second person was needed
 
 
 @dataclass(frozen=True)

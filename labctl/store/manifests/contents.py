@@ -7,7 +7,7 @@ a record becomes a part of its own.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import sqlalchemy as sa
 
@@ -28,6 +28,7 @@ class Part:
     columns: str
     order: str = ""
     only: Callable[[], sa.ColumnElement[bool]] = sa.true
+    since: str = "0017"  #: schema that has these columns
 
     def query(self, record: int | str) -> sa.Select[*tuple[object, ...]]:
         """Return the query of its rows, as they are stored, in an order that does not depend on the database."""
@@ -49,6 +50,11 @@ class Kind:
     at_rest: Callable[[], sa.ColumnElement[bool]] = sa.true  #: whether nothing of the record is still to come
     whole: Callable[[], sa.ColumnElement[bool]] = field(default=sa.true)  #: whether it is there for others at all
     has_blocks: bool = False
+    since: str = "0017"  #: schema that has the table
+
+    def as_of(self, schema: str) -> Kind:
+        """Return the kind with the parts that a schema has."""
+        return replace(self, parts=tuple(part for part in self.parts if part.since <= schema))
 
     @property
     def is_numbered(self) -> bool:
@@ -168,6 +174,10 @@ CERTIFICATION = Kind(
         Part(
             "verdict", _T.certifications, "id", "verdict verdict_recording verdict_at override assessment",
         ),
+        Part(
+            "persons", _T.certifications, "id", "by_key request_id released_by released_key release_reason",
+            since="0018",
+        ),
     ),
     lambda row: f"certification {row[0]} ({row[3]} of {row[1]} version {row[2]})",
     "id serial version act",
@@ -182,10 +192,35 @@ CERTIFICATE = Kind(
         Part("document", _T.certificates, "id", "document"),
         Part("XML", _T.certificates, "id", "xml"),
         Part("PDF", _T.certificates, "id", "pdf"),
+        Part("persons", _T.certificates, "id", "by_key", since="0018"),
     ),
     lambda row: f"certificate {row[0]}",
     "number",
 )
+
+WITHDRAWAL = Kind(
+    "withdrawal",
+    _T.certificate_withdrawals,
+    "id",
+    (Part("head", _T.certificate_withdrawals, "id", "number by by_key reason at certification_id", since="0018"),),
+    lambda row: f"withdrawal of certificate {row[0]}",
+    "number",
+    since="0018",
+)
+
+RELEASE_REQUEST = Kind(
+    "release request",
+    _T.release_requests,
+    "id",
+    (
+        Part(
+            "head", _T.release_requests, "id", "serial version by by_key reason at due_days override", since="0018",
+        ),
+    ),
+    lambda row: f"request {row[0]} to release {row[1]} version {row[2]}",
+    "id serial version",
+    since="0018",
+)  # fmt: skip
 
 KEY = Kind(
     "key",
@@ -201,5 +236,6 @@ KEY = Kind(
 )
 
 KINDS: Mapping[str, Kind] = {
-    kind.name: kind for kind in (CAMPAIGN, RECORDING, CALIBRATION, CERTIFICATION, CERTIFICATE, KEY)
+    kind.name: kind
+    for kind in (CAMPAIGN, RECORDING, CALIBRATION, CERTIFICATION, CERTIFICATE, KEY, WITHDRAWAL, RELEASE_REQUEST)
 }

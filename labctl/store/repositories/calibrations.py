@@ -16,8 +16,9 @@ from labctl.json_types.models import KeptAnswer
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.manifests.contents import CALIBRATION, CERTIFICATION
-from labctl.store.records import CalibrationRecord, CertificationRow, Judgement
+from labctl.store.records import CalibrationRecord, CertificationRow, Judgement, Release
 from labctl.store.repositories.audit import append
+from labctl.store.repositories.documents.withdrawals import Withdrawal, withdraw_of_version
 from labctl.store.repositories.drafts.marks import mark_fitted
 from labctl.store.repositories.units import SEEN
 from labctl.store.schema import tables
@@ -41,7 +42,8 @@ def _acts_query() -> sa.Select[*tuple[Any, ...]]:
     x = tables.certifications.c
     columns = (x.serial, x.version, x.act, x.by, x.reason, x.at, x.due_at)
     judgement = (x.verdict, x.verdict_recording, x.verdict_at, x.override, x.assessment)
-    return sa.select(*columns, *judgement).where(x.serial == sa.bindparam("serial")).order_by(x.id.desc())
+    persons = (x.by_key, x.released_by, x.released_key, x.release_reason)
+    return sa.select(*columns, *judgement, *persons).where(x.serial == sa.bindparam("serial")).order_by(x.id.desc())
 
 
 _ACTS = _acts_query()
@@ -52,7 +54,10 @@ def _act(row: sa.Row[Any]) -> CertificationRow:
     if row.override is not None:
         detail: JudgementDetail = row.assessment or JudgementDetail()
         known = Judgement(row.verdict, row.verdict_recording, row.verdict_at, bool(row.override), detail)
-    return CertificationRow(row.serial, row.version, row.act, row.by, row.reason, row.at, row.due_at, known)
+    release = None if row.released_by is None else Release(row.released_by, row.released_key, row.release_reason)
+    return CertificationRow(
+        row.serial, row.version, row.act, row.by, row.reason, row.at, row.due_at, known, row.by_key, release
+    )
 
 
 def _judgement_columns(judgement: Judgement | None) -> dict[str, Any]:
@@ -61,6 +66,15 @@ def _judgement_columns(judgement: Judgement | None) -> dict[str, Any]:
     return {
         "verdict": judgement.verdict, "verdict_recording": judgement.recording, "verdict_at": judgement.at,
         "override": judgement.override, "assessment": dict(judgement.detail),
+    }  # fmt: skip
+
+
+def _release_columns(release: Release | None) -> dict[str, Any]:
+    if release is None:
+        return {}
+    return {
+        "released_by": release.by, "released_key": release.by_key, "release_reason": release.reason,
+        "request_id": release.request,
     }  # fmt: skip
 
 
@@ -219,11 +233,14 @@ class Calibrations:
         due_at: datetime | None = None,
         who: str | None = None,
         judgement: Judgement | None = None,
+        by_key: str | None = None,
+        release: Release | None = None,
     ) -> CertificationRow:
-        """Put a version in force, or take the one in force out of it. Raises NotFound, Conflict.
+        """Put a version in force, or take the one in force out of it, with its certificates. Raises NotFound, Conflict.
 
         `by` is the person who answers for it; `who` is the one who did it, where that is known otherwise than from
-        `by`; `judgement` is what was known of the version.
+        `by`; `by_key` is the API key that acted; `judgement` is what was known of the version; `release` is who
+        released what `by` asked for.
         """
         self.get(serial, version)
         last = self._last_act(serial)
@@ -233,12 +250,12 @@ class Calibrations:
                 f"{serial} version {version} is not in force (in force: {in_force or 'none'}); give the version in "
                 "force"
             )
-        row = CertificationRow(serial, version, act, by, reason, at, due_at, judgement)
+        row = CertificationRow(serial, version, act, by, reason, at, due_at, judgement, by_key, release)
         with self._database.writing() as connection:
             number = connection.scalar(
                 sa.insert(tables.certifications).values(
                     serial=serial, version=version, act=act, by=by, reason=reason, at=at, due_at=due_at,
-                    **_judgement_columns(judgement),
+                    by_key=by_key, **_judgement_columns(judgement), **_release_columns(release),
                 ).returning(tables.certifications.c.id)
             )  # fmt: skip
             detail = {"by": by, "reason": reason, "due": due_at.isoformat() if due_at else None}
@@ -246,6 +263,8 @@ class Calibrations:
                 detail |= _audited(judgement)
             append(connection, at, act, f"{serial} version {version}", detail, who=who or by)
             seal(connection, (CERTIFICATION.name, str(number)), at, act)
+            if act == "revoke":
+                withdraw_of_version(connection, serial, version, Withdrawal(by, by_key, reason, at, number))
         return row
 
     def document(self, serial: str, version: int | None) -> tuple[bytes, str]:

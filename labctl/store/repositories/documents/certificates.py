@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Any
 
 import sqlalchemy as sa
 from sqlalchemy import exc
 
-from labctl.errors import Conflict
+from labctl.errors import Conflict, NotFound
 from labctl.json_types import JsonDocument
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.manifests.contents import CERTIFICATE
 from labctl.store.repositories.audit import append
+from labctl.store.repositories.documents.withdrawals import Withdrawal, withdraw
 from labctl.store.schema import tables
 from labctl.store.sealing.seals import seal
 
@@ -32,6 +34,8 @@ class CertificateRow:
     at: datetime
     hash: str
     order: JsonDocument
+    by_key: str | None = None  #: name of the API key that issued it; None: `by` is as typed
+    withdrawal: Withdrawal | None = None
 
 
 @dataclass(frozen=True)
@@ -41,6 +45,14 @@ class CertificateForms:
     document: bytes
     xml: bytes
     pdf: bytes
+
+
+_W = tables.certificate_withdrawals.c
+_WITHDRAWAL = (_W.by, _W.by_key, _W.reason, _W.at, _W.certification_id)
+
+
+def _withdrawal(columns: Sequence[Any]) -> Withdrawal | None:
+    return None if columns[0] is None else Withdrawal(*columns)
 
 
 class Certificates:
@@ -65,7 +77,7 @@ class Certificates:
         values = {
             "number": row.number, "serial": row.serial, "version": row.version, "replaces": row.replaces,
             "reason": row.reason, "by": row.by, "at": row.at, "hash": row.hash, "order": dict(row.order),
-            "document": forms.document, "xml": forms.xml, "pdf": forms.pdf,
+            "document": forms.document, "xml": forms.xml, "pdf": forms.pdf, "by_key": row.by_key,
         }  # fmt: skip
         detail: dict[str, Any] = {
             "number": row.number, "hash": row.hash, "replaces": row.replaces, "reason": row.reason, "by": row.by,
@@ -83,14 +95,47 @@ class Certificates:
             ) from error
         return row
 
+    @transaction
+    def withdraw(self, number: str, said: Withdrawal) -> CertificateRow:
+        """Withdraw one certificate. Raises NotFound, Conflict for one that is withdrawn already."""
+        row = self.get(number)
+        again = Conflict(f"certificate {number} is withdrawn already; `labctl certificates {row.serial}` says why")
+        if row.withdrawal is not None:
+            raise again
+        detail: dict[str, Any] = {"number": number, "reason": said.reason, "by": said.by}
+        try:
+            with self._database.writing() as connection:
+                subject = f"{row.serial} version {row.version}"
+                append(connection, said.at, "certificate withdraw", subject, detail, who=said.by)
+                withdraw(connection, number, said, said.at)
+        except exc.IntegrityError as error:
+            raise again from error
+        return replace(row, withdrawal=said)
+
     def of_unit(self, serial: str) -> list[CertificateRow]:
         """Return every certificate of a unit, newest first."""
-        c = tables.certificates.c
-        query = sa.select(
-            c.number, c.serial, c.version, c.replaces, c.reason, c.by, c.at, c.hash, c.order
-        ).where(c.serial == serial).order_by(c.id.desc())  # fmt: skip
+        return self._rows(tables.certificates.c.serial == serial)
+
+    def get(self, number: str) -> CertificateRow:
+        """Return a certificate by its number. Raises NotFound."""
+        rows = self._rows(tables.certificates.c.number == number)
+        if not rows:
+            raise NotFound(
+                f"there is no certificate {number!r} in this database; `labctl certificates SERIAL` lists those of a "
+                "unit"
+            )
+        return rows[0]
+
+    def _rows(self, which: sa.ColumnElement[bool]) -> list[CertificateRow]:
+        c, w = tables.certificates.c, tables.certificate_withdrawals.c
+        joined = tables.certificates.outerjoin(tables.certificate_withdrawals, w.number == c.number)
+        columns = (c.number, c.serial, c.version, c.replaces, c.reason, c.by, c.at, c.hash, c.order, c.by_key)
+        query = sa.select(*columns, *_WITHDRAWAL).select_from(joined).where(which).order_by(c.id.desc())
         with self._database.reading() as connection:
-            return [CertificateRow(*row) for row in connection.execute(query)]
+            return [
+                CertificateRow(*row[: len(columns)], _withdrawal(row[len(columns) :]))
+                for row in connection.execute(query)
+            ]
 
     def newest(self, serial: str, version: int) -> CertificateRow | None:
         """Return the certificate of a version that none replaces; None: none was issued."""
