@@ -52,6 +52,7 @@ app.add_typer(recordings.export_app, name="export")
 app.add_typer(keys.app, name="key")
 app.add_typer(audit.app, name="audit")
 app.add_typer(seal_key.app, name="seal-key")
+app.add_typer(certificate.app, name="certificate")
 COMMANDS: dict[str, Callable[..., None]] = {
     "demo": server.demo,
     "serve": server.serve,
@@ -76,7 +77,6 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "revoke": calibrations.revoke,
     "certifications": calibrations.certifications,
     "calibration": calibrations.calibration,
-    "certificate": certificate.certificate,
     "certificates": certificate.certificates,
     "uncertainty": uncertainty.uncertainty,
     "compensate": calibrations.compensate,

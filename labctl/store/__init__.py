@@ -33,6 +33,7 @@ from labctl.store.records import (
     ServedCalibration,
     StepRow,
     Unit,
+    Withdrawal,
 )
 from labctl.store.repositories.audit import Audit, Broken, Head
 from labctl.store.repositories.benches import Benches, BenchRow
@@ -41,7 +42,6 @@ from labctl.store.repositories.campaign_journal import StoreJournal
 from labctl.store.repositories.campaign_summaries import CampaignSummary
 from labctl.store.repositories.campaigns import Campaigns, NewCampaign
 from labctl.store.repositories.documents.certificates import CertificateForms, CertificateRow, Certificates
-from labctl.store.repositories.documents.withdrawals import Withdrawal
 from labctl.store.repositories.drafts.records import DraftEvent, DraftRow, DraftState
 from labctl.store.repositories.drafts.repository import Drafts
 from labctl.store.repositories.keys import Keys

@@ -157,6 +157,17 @@ class Judgement:
 
 
 @dataclass(frozen=True)
+class Withdrawal:
+    """Who withdrew a certificate, when and why."""
+
+    by: str
+    by_key: str | None  #: name of the API key that acted; None: `by` is as typed
+    reason: str
+    at: datetime
+    revocation: int | None = None  #: number of the act that revoked its version; None: it alone was withdrawn
+
+
+@dataclass(frozen=True)
 class Release:
     """The second person of a certification."""
 
@@ -190,6 +201,8 @@ class ServedCalibration:
     hash: str
     act: CertificationRow | None
     in_force: bool  #: whether that act is the newest of the unit, and puts the version in force
+    certificate: str | None = None  #: number of the newest certificate of the version; None: it has none
+    withdrawal: Withdrawal | None = None  #: of that certificate
 
 
 @dataclass(frozen=True)

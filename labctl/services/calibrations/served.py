@@ -12,6 +12,7 @@ from labctl.certification import Certification, State
 from labctl.exports import Loss
 from labctl.services.calibrations.exporting import exported
 from labctl.store import ServedCalibration, Store
+from labctl.withdrawal import HEADER, Withdrawn, quoted
 
 #: State of a version that was never certified.
 NOT_CERTIFIED = "not-certified"
@@ -29,9 +30,10 @@ class CalibrationFile:
     what: str  #: unit and version
     certification: Certification | None
     losses: tuple[Loss, ...] = ()  #: what the format does not carry
+    withdrawn: Withdrawn | None = None  #: it was revoked, or its certificate was withdrawn
 
     def headers(self, now: datetime) -> dict[str, str]:
-        """Return the HTTP headers beside the bytes at an aware time: tag, state, due date, and a warning."""
+        """Return the HTTP headers beside the bytes at an aware time: tag, state, due date, warning and notice."""
         known = self.certification
         found = {"ETag": f'"{self.etag}"', "Cache-Control": "no-cache", "X-Labctl-State": NOT_CERTIFIED}
         if known is None:
@@ -40,7 +42,9 @@ class CalibrationFile:
         if known.due is not None and known.state != "revoked":
             found["X-Labctl-Due"] = f"{known.due.astimezone(UTC):%Y-%m-%dT%H:%M:%SZ}"
         if text := known.warning(self.what, now):
-            found["Warning"] = f"299 labctl {_quoted(text)}"
+            found["Warning"] = f"299 labctl {quoted(text)}"
+        if self.withdrawn is not None:
+            found[HEADER] = self.withdrawn.header()
         return found
 
 
@@ -61,9 +65,26 @@ def calibration_file(
     content, tag = (found.document, found.hash) if known is None else _certified(found.document, known)
     what = f"{serial} version {number}"
     if format_name == "json" and not options:
-        return CalibrationFile(content, "application/json", tag, what, known)
+        return CalibrationFile(content, "application/json", tag, what, known, withdrawn=notice_of(found))
     file = exported(store, content, format_name, options)
-    return CalibrationFile(file.content, file.media_type, f"{tag}-{file.tag}", what, known, file.losses)
+    return CalibrationFile(
+        file.content, file.media_type, f"{tag}-{file.tag}", what, known, file.losses, notice_of(found)
+    )
+
+
+def notice_of(found: ServedCalibration) -> Withdrawn | None:
+    """Return the notice for those who fetch a version: it was revoked, or its certificate was withdrawn.
+
+    A certification after the withdrawal ends the notice: a person has then vouched for the version again.
+    """
+    act, gone = found.act, found.withdrawal
+    if act is None:
+        return None
+    if act.act == "revoke":
+        return Withdrawn(act.at, act.by, act.reason)
+    if gone is not None and gone.revocation is None and gone.at >= act.at:
+        return Withdrawn(gone.at, gone.by, gone.reason, found.certificate or "")
+    return None
 
 
 def _certification(found: ServedCalibration) -> Certification | None:
@@ -76,8 +97,3 @@ def _certification(found: ServedCalibration) -> Certification | None:
 #: Files of certified versions, with their hashes, as they were served last.
 _certified = lru_cache(maxsize=MOST_FILES)(with_certification)
 
-
-def _quoted(text: str) -> str:
-    """Return a quoted string of an HTTP field (RFC 9110, 5.6.4): visible ASCII, what else there is becomes `?`."""
-    plain = "".join(char if " " <= char <= "~" else "?" for char in text)
-    return '"' + plain.replace("\\", "\\\\").replace('"', '\\"') + '"'

@@ -7,6 +7,7 @@ from datetime import datetime
 from importlib.metadata import version as package_version
 
 from instruments.standards import Standard
+from labctl.acting_user import acting_key
 from labctl.calibration import read_calibration
 from labctl.certificates.document import (
     Authorisation,
@@ -18,10 +19,11 @@ from labctl.certificates.document import (
     Replaced,
     StandardUsed,
     StateOfItem,
+    identity_of,
 )
 from labctl.errors import BadInput, NotEnoughData
 from labctl.services.certificates import measured
-from labctl.services.certificates.address import address_of
+from labctl.services.certificates.address import address_of, page_of
 from labctl.services.certificates.conformity import conformity
 from labctl.services.certificates.facts import Facts
 from labctl.services.certificates.found import Found
@@ -29,7 +31,7 @@ from labctl.services.certificates.missing import MissingFacts
 from labctl.services.certificates.statements import statements
 from labctl.services.criticism.measurements import Measurements
 from labctl.services.schemas.documents.certificates import CertificateRequest
-from labctl.store import CertificateRow, Store
+from labctl.store import CertificateRow, CertificationRow, Store
 
 NONE = "None."
 
@@ -46,8 +48,10 @@ def assembled(
     order, number = facts.order, _number(store, facts, at)
     return Certificate(
         number=number,
+        state_address=page_of(facts.laboratory.url, number, facts.row.hash),
         issued_on=at.date(),
         issued_by=request.by,
+        issued_by_identity=identity_of(acting_key()),
         replaces=Replaced(number=kept.number, hash=kept.hash, reason=request.amend or "") if kept else None,
         laboratory=facts.laboratory,
         customer=order.customer,
@@ -69,12 +73,21 @@ def assembled(
         ),
         due=act.due_at.date() if order.state_due and act.due_at else None,
         external=order.external or NONE,
-        authorised=Authorisation(name=act.by, at=act.at, reason=act.reason),
+        authorised=_authorisation(act),
         calibration=CalibrationFacts(
             version=facts.row.version, hash=facts.row.hash, address=address_of(facts.laboratory.url, facts.row)
         ),
         manifests=tuple(_manifests(store, facts)),
         statements=(*statements(facts), *found.results.left_out),
+    )  # fmt: skip
+
+
+def _authorisation(act: CertificationRow) -> Authorisation:
+    """Return who authorised the results; the person who released them too, where two persons have to agree."""
+    second = act.release
+    return Authorisation(
+        name=act.by, at=act.at, reason=act.reason, identity=identity_of(act.by_key),
+        released_by=second.by if second else "", released_identity=identity_of(second.by_key) if second else "",
     )  # fmt: skip
 
 

@@ -35,7 +35,7 @@ from labctl.services.schemas.benches import BenchCheckResponse, BenchStatus, Che
 from labctl.services.schemas.calibrations import FitRequest, FitResponse, ImproveRequest, ImproveResponse
 from labctl.services.schemas.campaigns import CampaignResponse, ConfirmRequest, ReasonRequest
 from labctl.services.schemas.certification import CertificationResponse, CertifyRequest, RevokeRequest
-from labctl.services.schemas.documents.certificates import CertificateRequest, CertificateResponse
+from labctl.services.schemas.documents.certificates import CertificateRequest, CertificateResponse, WithdrawRequest
 from labctl.services.schemas.recordings import (
     ExampleRequest,
     ImportResponse,
@@ -83,6 +83,10 @@ def _revoke(context: CommandContext, asked: ToVersion[RevokeRequest]) -> Certifi
 
 def _issue_certificate(context: CommandContext, asked: ToVersion[CertificateRequest]) -> CertificateResponse:
     return certificates.issue(context.store, asked.serial, asked.version, asked.body, context.now())
+
+
+def _withdraw_certificate(context: CommandContext, asked: WithdrawRequest) -> CertificateResponse:
+    return certificates.withdraw(context.store, asked, context.now())
 
 
 def _start_campaign(context: CommandContext, asked: CampaignStart) -> CampaignResponse | ScheduledResponse:
@@ -200,6 +204,12 @@ ISSUE_CERTIFICATE = Command(
     handler=_issue_certificate,
     responses={201: CertificateResponse},
     computes=True,
+)
+WITHDRAW_CERTIFICATE = Command(
+    method="POST",
+    path="/api/certificates/withdraw",
+    handler=_withdraw_certificate,
+    responses={200: CertificateResponse},
 )
 START_CAMPAIGN: Command[CampaignStart, CampaignResponse | ScheduledResponse] = Command(
     method="POST",

@@ -16,9 +16,9 @@ from labctl.json_types.models import KeptAnswer
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.manifests.contents import CALIBRATION, CERTIFICATION
-from labctl.store.records import CalibrationRecord, CertificationRow, Judgement, Release
+from labctl.store.records import CalibrationRecord, CertificationRow, Judgement, Release, Withdrawal
 from labctl.store.repositories.audit import append
-from labctl.store.repositories.documents.withdrawals import Withdrawal, withdraw_of_version
+from labctl.store.repositories.documents.withdrawals import withdraw_of_version
 from labctl.store.repositories.drafts.marks import mark_fitted
 from labctl.store.repositories.units import SEEN
 from labctl.store.schema import tables

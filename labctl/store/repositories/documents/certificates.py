@@ -15,8 +15,9 @@ from labctl.json_types import JsonDocument
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.manifests.contents import CERTIFICATE
+from labctl.store.records import Withdrawal
 from labctl.store.repositories.audit import append
-from labctl.store.repositories.documents.withdrawals import Withdrawal, withdraw
+from labctl.store.repositories.documents.withdrawals import withdraw
 from labctl.store.schema import tables
 from labctl.store.sealing.seals import seal
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from datetime import datetime
 
 import sqlalchemy as sa
@@ -10,20 +9,10 @@ import sqlalchemy as sa
 from instruments.clock import SystemClock
 from labctl.store.manifests import chain
 from labctl.store.manifests.contents import WITHDRAWAL
+from labctl.store.records import Withdrawal
 from labctl.store.repositories.audit import append
 from labctl.store.schema import tables
 from labctl.store.sealing.seals import seal
-
-
-@dataclass(frozen=True)
-class Withdrawal:
-    """Who withdrew a certificate, when and why."""
-
-    by: str
-    by_key: str | None  #: name of the API key that acted; None: `by` is as typed
-    reason: str
-    at: datetime
-    revocation: int | None = None  #: number of the act that revoked its version; None: it alone was withdrawn
 
 
 def withdraw(
