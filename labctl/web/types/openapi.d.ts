@@ -655,6 +655,52 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/certificates/state": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * State of a certificate
+         * @description Whether a certificate is valid, amended, superseded or withdrawn, since when and why, and what replaces it.
+         *
+         *     Needs no key: who knows both number and hash has the certificate. 404 where they do not belong together. It is what
+         *     the page behind the QR code shows.
+         */
+        get: operations["state_api_certificates_state_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/certificates/withdraw": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Withdraw a certificate
+         * @description Withdraw one certificate; the version stays in force. Its files are still served, with `X-Labctl-Withdrawn`.
+         *
+         *     Whoever fetches the calibration is told too, until the version is certified again. 409 for a certificate that is
+         *     withdrawn already. Needs an approver's key.
+         */
+        post: operations["withdraw_api_certificates_withdraw_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/units/{serial}/certificates": {
         parameters: {
             query?: never;
@@ -664,7 +710,7 @@ export interface paths {
         };
         /**
          * Certificates of a unit
-         * @description Every certificate of the unit, newest first, with what it replaces and what replaces it.
+         * @description Every certificate of the unit, newest first, with its state, what it replaces and what replaces it.
          */
         get: operations["certificates_api_units__serial__certificates_get"];
         put?: never;
@@ -685,6 +731,9 @@ export interface paths {
         /**
          * A certificate as it was issued
          * @description The certificate as a file, always the same bytes; the ETag is the hash of its JSON and the format.
+         *
+         *     `X-Labctl-State` is valid, amended, superseded or withdrawn; `X-Labctl-Withdrawn` says when, by whom and why, and
+         *     `X-Labctl-Replaced-By` is the number of the certificate that replaces it.
          */
         get: operations["certificate_api_units__serial__calibrations__version__certificate_get"];
         put?: never;
@@ -2708,7 +2757,7 @@ export interface components {
         };
         /**
          * CertificateResponse
-         * @description A certificate that was issued.
+         * @description A certificate that was issued, and its state now.
          */
         CertificateResponse: {
             /** Serial */
@@ -2724,6 +2773,11 @@ export interface components {
             issued_at: string;
             /** By */
             by: string;
+            /**
+             * By Key
+             * @description Name of the API key that acted; null: none did, the person's name is as typed.
+             */
+            by_key: string | null;
             /**
              * Hash
              * @description SHA-256 of the certificate in its JSON form.
@@ -2741,9 +2795,48 @@ export interface components {
             reason: string;
             /**
              * Replaced By
-             * @description Number of the later certificate that replaces this certificate; null: this certificate is valid.
+             * @description Number of the certificate of the same version that was issued in place of this one; null: none.
              */
             replaced_by: string | null;
+            /**
+             * Superseded By
+             * @description Number of the certificate of the version that was certified last; null: it is of this version.
+             */
+            superseded_by: string | null;
+            /**
+             * State
+             * @description withdrawn: by its number, or with its version; amended: another certificate of the version replaces it (`replaced_by`); superseded: another version was certified later and has a certificate (`superseded_by`); valid: none of these.
+             * @default valid
+             * @enum {string}
+             */
+            state: "valid" | "amended" | "superseded" | "withdrawn";
+            /**
+             * State Since
+             * @description When it came into this state.
+             */
+            state_since: string | null;
+            /**
+             * State Reason
+             * @description Why it is in this state; empty for a valid certificate.
+             * @default
+             */
+            state_reason: string;
+            /**
+             * State By
+             * @description Name of the person whose act brought it into this state.
+             * @default
+             */
+            state_by: string;
+            /**
+             * State By Key
+             * @description Name of the API key that acted; null: none did, the person's name is as typed.
+             */
+            state_by_key: string | null;
+            /**
+             * Valid Instead
+             * @description Number of the unit's valid certificate; null: it is this one, or none is valid.
+             */
+            valid_instead: string | null;
         };
         /**
          * CertificationResponse
@@ -5912,6 +6005,52 @@ export interface components {
             within_s: number | null;
         };
         /**
+         * PublicCertificate
+         * @description What the page behind the QR code of a certificate says: its state, and what to compare with the paper.
+         */
+        PublicCertificate: {
+            /** Number */
+            number: string;
+            /**
+             * Hash
+             * @description SHA-256 of the certificate in its JSON form.
+             */
+            hash: string;
+            /**
+             * Calibration Hash
+             * @description SHA-256 of the calibration, as printed on the certificate.
+             */
+            calibration_hash: string;
+            /** Serial */
+            serial: string;
+            /** Version */
+            version: number;
+            /** Laboratory */
+            laboratory: string;
+            /**
+             * Issued At
+             * Format: date-time
+             */
+            issued_at: string;
+            /**
+             * State
+             * @enum {string}
+             */
+            state: "valid" | "amended" | "superseded" | "withdrawn";
+            /** State Since */
+            state_since: string | null;
+            /** State Reason */
+            state_reason: string;
+            /** State By */
+            state_by: string;
+            /** Replaced By */
+            replaced_by: string | null;
+            /** Superseded By */
+            superseded_by: string | null;
+            /** Valid Instead */
+            valid_instead: string | null;
+        };
+        /**
          * PulseResponse
          * @description What a caller without a key may know: that the service answers, and its version.
          */
@@ -7590,6 +7729,27 @@ export interface components {
             experiment: string;
         };
         /**
+         * WithdrawRequest
+         * @description Withdraw a certificate; it stays withdrawn, and its bytes stay what they are.
+         */
+        WithdrawRequest: {
+            /**
+             * Number
+             * @description Number of the certificate.
+             */
+            number: string;
+            /**
+             * By
+             * @description Name of the person who withdraws it.
+             */
+            by: string;
+            /**
+             * Reason
+             * @description Why; the list, the file and the page say it.
+             */
+            reason: string;
+        };
+        /**
          * WorstDataSet
          * @description A data set far from the model.
          */
@@ -8642,6 +8802,73 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["CatalogueResponse"];
+                };
+            };
+        };
+    };
+    state_api_certificates_state_get: {
+        parameters: {
+            query: {
+                /** @description Number of the certificate. */
+                number: string;
+                /** @description Hash of the calibration as printed on the certificate, or its first 16 digits or more. */
+                calibration: string;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PublicCertificate"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    withdraw_api_certificates_withdraw_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["WithdrawRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CertificateResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
                 };
             };
         };

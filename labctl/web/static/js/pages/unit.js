@@ -20,6 +20,7 @@ import { ladderFigure } from "../explore/error_ladder.js";
 import { askCertification, askRevocation, certificationTable } from "../unit/certification.js";
 import { coefficients, comparison } from "../unit/coefficients.js";
 import { certificateFiles } from "../unit/certificate.js";
+import { certificateTable } from "../unit/certificate_state.js";
 import { datasheetCard } from "../unit/datasheet.js";
 import { exportFiles } from "../unit/export_files.js";
 import { inForce } from "../unit/in_force.js";
@@ -63,6 +64,7 @@ export async function page({ params, signal }) {
           h("p", {}, "No calibration yet."),
           h("p", {}, h("a", { class: "button primary", href: explore }, "Fit a model")),
         ),
+    issued.length ? card("Certificates", certificateTable(issued)) : null,
     unit.recordings.length ? datasheetCard(unit.serial, signal) : null,
     h(
       "div",

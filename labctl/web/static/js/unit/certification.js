@@ -98,7 +98,7 @@ export async function askRevocation(serial, version) {
       { name: "reason", label: "Why" },
     ],
     {
-      text: "The unit then has no calibration in force. The revocation is written to the audit trail.",
+      text: "The unit then has no calibration in force, and every certificate of the version is withdrawn for good. The revocation is written to the audit trail.",
       confirm: "Revoke",
       kind: "danger",
     },
