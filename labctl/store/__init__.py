@@ -44,6 +44,7 @@ from labctl.store.repositories.campaigns import Campaigns, NewCampaign
 from labctl.store.repositories.documents.certificates import CertificateForms, CertificateRow, Certificates
 from labctl.store.repositories.drafts.records import DraftEvent, DraftRow, DraftState
 from labctl.store.repositories.drafts.repository import Drafts
+from labctl.store.repositories.fetches import Fetches, FetchRow
 from labctl.store.repositories.keys import Keys
 from labctl.store.repositories.leases import LeaseRow, Leases
 from labctl.store.repositories.manifests import ManifestRow, Manifests
@@ -79,6 +80,8 @@ __all__ = [
     "DraftState",
     "Drafts",
     "EventRow",
+    "FetchRow",
+    "Fetches",
     "Finding",
     "Head",
     "Holder",
@@ -150,6 +153,7 @@ class Store:
         self.calibrations = Calibrations(database)
         self.certifications = Certifications(database)
         self.certificates = Certificates(database)
+        self.fetches = Fetches(database)
         self.drafts = Drafts(database)
         self.audit = Audit(database)
         self.keys = Keys(database)

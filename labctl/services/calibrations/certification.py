@@ -5,11 +5,12 @@ from __future__ import annotations
 from datetime import datetime, timedelta
 from typing import Literal, cast
 
-from labctl.acting_user import actor
+from labctl.acting_user import acting_key, actor
 from labctl.errors import BadInput, CertificationRefused
 from labctl.json_types.calibrations import JudgementDetail
 from labctl.services.calibrations.assessment import LEAST_REASON_CHARACTERS, LEAST_REASON_WORDS, assess
 from labctl.services.calibrations.due import interval_days
+from labctl.services.calibrations.fetch_log import fetched_by
 from labctl.services.schemas.certification import (
     AssessmentResponse,
     CertificationResponse,
@@ -30,8 +31,9 @@ def list_certifications(store: Store, serial: str) -> list[CertificationResponse
 def certification_response(row: CertificationRow) -> CertificationResponse:
     act: Literal["certify", "revoke"] = "certify" if row.act == "certify" else "revoke"
     response = CertificationResponse(
-        serial=row.serial, version=row.version, act=act, by=row.by, reason=row.reason, at=row.at, due=row.due_at
-    )
+        serial=row.serial, version=row.version, act=act, by=row.by, by_key=row.by_key, reason=row.reason,
+        at=row.at, due=row.due_at,
+    )  # fmt: skip
     known = row.judgement
     if known is None:
         return response
@@ -68,9 +70,20 @@ def certify(store: Store, serial: str, version: int, request: CertifyRequest, at
 
 
 def revoke(store: Store, serial: str, version: int, request: RevokeRequest, at: datetime) -> CertificationResponse:
-    """Revoke the certification of a version. Raises NotFound, Conflict."""
-    store.units.get(serial)
-    return _set_in_force(store, serial, version, "revoke", request, at)
+    """Revoke the certification of a version, and withdraw its certificates. Raises NotFound, Conflict.
+
+    The answer names these, and who fetched the version and has to be told.
+    """
+    known = store.units.get(serial).serial
+    before = {row.number for row in store.certificates.of_unit(known) if row.withdrawal is not None}
+    answer = _set_in_force(store, serial, version, "revoke", request, at)
+    withdrawn = [
+        row.number
+        for row in reversed(store.certificates.of_unit(known))
+        if row.version == version and row.number not in before
+    ]
+    told = {"withdrawn_certificates": withdrawn, "fetched_by": fetched_by(store, known, version)}
+    return answer.model_copy(update=told)
 
 
 def _set_in_force(
@@ -86,7 +99,7 @@ def _set_in_force(
     caller = actor()
     row = store.calibrations.certify(
         serial, version, act, by=request.by, reason=request.reason, at=at, due_at=due, judgement=judgement,
-        who=caller.name if caller.via == "key" else request.by,
+        who=caller.name if caller.via == "key" else request.by, by_key=acting_key(),
     )  # fmt: skip
     return certification_response(row)
 

@@ -180,6 +180,12 @@ class Calibrations:
             )
         return rows[0]
 
+    def version_of(self, serial: str, hash_: str) -> int | None:
+        """Return the version of a unit whose calibration has a hash; None where none has."""
+        c = tables.calibrations.c
+        with self._database.reading() as connection:
+            return connection.scalar(sa.select(c.version).where(c.serial == serial, c.hash == hash_))
+
     def of_unit(self, serial: str) -> list[CalibrationRecord]:
         """Return every version of a unit, newest first."""
         return self._rows(tables.calibrations.c.serial == serial)
