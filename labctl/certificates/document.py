@@ -219,7 +219,9 @@ class Certificate(Part):
     issued_on: date
     issued_by: str
     issued_by_identity: str = ""  #: as of the authorisation
-    state_address: str = ""  #: of the page that says which state the certificate is in; empty: issued before there was one
+    state_address: str = (
+        ""  #: of the page that says which state the certificate is in; empty: issued before there was one
+    )
     replaces: Replaced | None
     laboratory: Laboratory
     customer: Customer

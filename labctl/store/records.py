@@ -164,7 +164,7 @@ class Withdrawal:
     by_key: str | None  #: name of the API key that acted; None: `by` is as typed
     reason: str
     at: datetime
-    revocation: int | None = None  #: number of the act that revoked its version; None: it alone was withdrawn
+    act: int | None = None  #: number of the newest act on its version then: its revocation, or a certification
 
 
 @dataclass(frozen=True)
@@ -203,6 +203,7 @@ class ServedCalibration:
     in_force: bool  #: whether that act is the newest of the unit, and puts the version in force
     certificate: str | None = None  #: number of the newest certificate of the version; None: it has none
     withdrawal: Withdrawal | None = None  #: of that certificate
+    act_number: int | None = None
 
 
 @dataclass(frozen=True)

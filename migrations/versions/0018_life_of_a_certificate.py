@@ -1,4 +1,4 @@
-"""The life of a certificate: withdrawals, keys of those who act, releases by a second person, and fetches of versions."""
+"""The life of a certificate: withdrawals, keys of those who act, releases by a second person, fetches of versions."""
 
 from __future__ import annotations
 

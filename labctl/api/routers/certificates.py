@@ -71,7 +71,9 @@ async def issue(serial: str, version: int, request: CertificateRequest, service:
     return await execute(service, ISSUE_CERTIFICATE, ToVersion(serial, version, request))
 
 
-@router.get(UNIT + "/calibrations/{version}/certificate", summary="A certificate as it was issued", response_class=Response)
+@router.get(
+    UNIT + "/calibrations/{version}/certificate", summary="A certificate as it was issued", response_class=Response
+)
 def certificate(
     serial: str,
     version: int,

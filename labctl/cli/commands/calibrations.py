@@ -114,7 +114,7 @@ def certify(
 def revoke(
     serial: Serial, version: Version, by: By, reason: Reason, as_json: Json = False, database: Database = None
 ) -> None:
-    """Revoke the certification of a version."""
+    """Revoke the certification of a version; its certificates are withdrawn, and who fetched it is listed."""
     from labctl.services.commands.open import execute
     from labctl.services.commands.registry import REVOKE
     from labctl.services.commands.requests import ToVersion
@@ -173,6 +173,9 @@ def calibration(
             sys.stdout.buffer.write(file.content)
         else:
             out.write_bytes(file.content)
+    if file.withdrawn is not None:
+        said = f"labctl: calibration of {file.what} must not be used: {file.withdrawn.text}"
+        stderr.print(said, style="bold red", markup=False, soft_wrap=True)
     for loss in file.losses:
         typer.echo(f"format {format_} cannot express: {loss.text}", err=True)
 

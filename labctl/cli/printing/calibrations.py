@@ -88,6 +88,11 @@ def print_certification(answer: CertificationResponse) -> None:
     if answer.act == "certify":
         console.print(f"  verdict: {_verdict(answer)}", markup=False, soft_wrap=True)
     _print_objections(answer)
+    for number in answer.withdrawn_certificates:
+        console.print(f"  certificate {number} is withdrawn", markup=False, soft_wrap=True)
+    for each in answer.fetched_by:
+        when = f"{each.first_at:%Y-%m-%d %H:%M} to {each.last_at:%Y-%m-%d %H:%M} UTC"
+        console.print(f"  fetched by {each.who}, {when}: tell them", markup=False, soft_wrap=True)
 
 
 def print_certifications(rows: Sequence[CertificationResponse]) -> None:

@@ -111,7 +111,7 @@ def notice_of(found: ServedCalibration) -> Withdrawn | None:
         return None
     if act.act == "revoke":
         return Withdrawn(act.at, act.by, act.reason)
-    if gone is not None and gone.revocation is None and gone.at >= act.at:
+    if gone is not None and gone.act == found.act_number:  # not by dates: a clock may have been set back
         return Withdrawn(gone.at, gone.by, gone.reason, found.certificate or "")
     return None
 
@@ -125,4 +125,3 @@ def _certification(found: ServedCalibration) -> Certification | None:
 
 #: Files of certified versions, with their hashes, as they were served last.
 _certified = lru_cache(maxsize=MOST_FILES)(with_certification)
-

@@ -118,4 +118,3 @@ def _refuse_dates(facts: Facts) -> None:
 
 def _off(standard: Standard, first: date, last: date) -> bool:
     return standard.is_overdue(last) or (standard.calibrated is not None and standard.calibrated > first)
-

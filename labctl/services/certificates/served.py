@@ -82,8 +82,8 @@ def public_certificate(store: Store, number: str, calibration: str) -> PublicCer
     and hash are not those of one certificate.
     """
     none = NotFound(
-        "this laboratory issued no certificate with this number and this hash of the calibration; compare both with the "
-        f"paper (of the hash at least the first {HASH_DIGITS} digits)"
+        "this laboratory issued no certificate with this number and this hash of the calibration; compare both with "
+        f"the paper (of the hash at least the first {HASH_DIGITS} digits)"
     )
     try:
         now = certificate_by_number(store, number)

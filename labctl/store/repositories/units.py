@@ -79,7 +79,7 @@ _LAST = sa.select(sa.func.max(_X.id)).where(_X.serial == sa.bindparam("serial"))
 _Z, _W = tables.certificates.c, tables.certificate_withdrawals.c
 _CERTIFICATE = (
     _Z.number.label("certificate"), _W.by.label("w_by"), _W.by_key.label("w_key"), _W.reason.label("w_reason"),
-    _W.at.label("w_at"), _W.certification_id.label("w_revocation"),
+    _W.at.label("w_at"), _W.certification_id.label("w_act"),
 )  # fmt: skip
 
 
@@ -142,8 +142,8 @@ class Certifications:
         in_force = act is not None and act.act == "certify" and row.act_id == row.last_id
         gone = None
         if row.w_by is not None:
-            gone = Withdrawal(row.w_by, row.w_key, row.w_reason, row.w_at, row.w_revocation)
-        return ServedCalibration(bytes(row.document), str(row.hash), act, in_force, row.certificate, gone)
+            gone = Withdrawal(row.w_by, row.w_key, row.w_reason, row.w_at, row.w_act)
+        return ServedCalibration(bytes(row.document), str(row.hash), act, in_force, row.certificate, gone, row.act_id)
 
     def in_force(self) -> dict[str, CertificationRow]:
         """Return serial number -> the act that put its version in force, for every unit that has a version in force."""

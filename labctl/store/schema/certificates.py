@@ -39,6 +39,6 @@ certificate_withdrawals = sa.Table(
     sa.Column("by_key", sa.String(100)),  #: as of a certificate
     sa.Column("reason", sa.Text, nullable=False),
     sa.Column("at", Instant, nullable=False),
-    #: The revocation of the version that withdrew it; absent: the certificate alone was withdrawn.
+    #: The newest act on the version then: the revocation that withdrew it, or the certification that stays.
     sa.Column("certification_id", RowId, sa.ForeignKey("certifications.id")),
 )

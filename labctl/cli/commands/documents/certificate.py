@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 from typer.core import TyperGroup
@@ -13,8 +13,6 @@ from labctl.cli.options import Database, Json, Serial
 from labctl.cli.output import console, print_json, stderr
 
 if TYPE_CHECKING:
-    from click import Context
-
     from labctl.services.schemas.documents.certificates import CertificateOrder, CertificateResponse
 
 #: The command that is meant where none is named.
@@ -24,9 +22,9 @@ USUAL = "issue"
 class _IssueUnlessNamed(TyperGroup):
     """Takes `labctl certificate SERIAL ...` for `labctl certificate issue SERIAL ...`."""
 
-    def parse_args(self, ctx: Context, args: list[str]) -> list[str]:
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Put the usual command in front of arguments that begin with none, and do not ask for help alone."""
-        if args and args[0] not in self.commands and args != ["--help"]:
+        if args and args[0] not in (*self.commands, "--help"):
             args = [USUAL, *args]
         return super().parse_args(ctx, args)
 

@@ -98,7 +98,7 @@ class Certificates:
 
     @transaction
     def withdraw(self, number: str, said: Withdrawal) -> CertificateRow:
-        """Withdraw one certificate. Raises NotFound, Conflict for one that is withdrawn already."""
+        """Withdraw one certificate; its version stays in force. Raises NotFound, Conflict where it is withdrawn."""
         row = self.get(number)
         again = Conflict(f"certificate {number} is withdrawn already; `labctl certificates {row.serial}` says why")
         if row.withdrawal is not None:
@@ -108,6 +108,9 @@ class Certificates:
             with self._database.writing() as connection:
                 subject = f"{row.serial} version {row.version}"
                 append(connection, said.at, "certificate withdraw", subject, detail, who=said.by)
+                x = tables.certifications.c
+                last = sa.select(sa.func.max(x.id)).where(x.serial == row.serial, x.version == row.version)
+                said = replace(said, act=connection.scalar(last))
                 withdraw(connection, number, said, said.at)
         except exc.IntegrityError as error:
             raise again from error
@@ -133,10 +136,8 @@ class Certificates:
         columns = (c.number, c.serial, c.version, c.replaces, c.reason, c.by, c.at, c.hash, c.order, c.by_key)
         query = sa.select(*columns, *_WITHDRAWAL).select_from(joined).where(which).order_by(c.id.desc())
         with self._database.reading() as connection:
-            return [
-                CertificateRow(*row[: len(columns)], _withdrawal(row[len(columns) :]))
-                for row in connection.execute(query)
-            ]
+            rows = connection.execute(query).all()
+        return [CertificateRow(*row[: len(columns)], withdrawal=_withdrawal(row[len(columns) :])) for row in rows]
 
     def newest(self, serial: str, version: int) -> CertificateRow | None:
         """Return the certificate of a version that none replaces; None: none was issued."""

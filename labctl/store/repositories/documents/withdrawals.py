@@ -23,7 +23,7 @@ def withdraw(
     made = connection.scalar(
         sa.insert(w).values(
             number=number, by=said.by, by_key=said.by_key, reason=said.reason, at=said.at,
-            certification_id=said.revocation,
+            certification_id=said.act,
         ).returning(w.c.id)
     )  # fmt: skip
     seal(connection, (WITHDRAWAL.name, str(made)), sealed_at, why)
@@ -39,9 +39,7 @@ def withdraw_of_version(connection: sa.Connection, serial: str, version: int, sa
     return found
 
 
-def _standing(
-    connection: sa.Connection, serial: str, version: int, issued_until: datetime | None = None
-) -> list[str]:
+def _standing(connection: sa.Connection, serial: str, version: int, issued_until: datetime | None = None) -> list[str]:
     c, w = tables.certificates.c, tables.certificate_withdrawals.c
     query = sa.select(c.number).where(
         c.serial == serial, c.version == version, c.number.not_in(sa.select(w.number)),

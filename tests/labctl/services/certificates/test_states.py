@@ -140,7 +140,9 @@ def test_who_fetches_the_calibration_is_told_until_the_version_is_certified_agai
 def test_a_new_certificate_in_place_of_a_withdrawn_one_needs_a_reason(store: Store) -> None:
     withdraw(store, WithdrawRequest(number=FIRST, by="Rita", reason="standard was bad"), AT + DAY)
     assert issue(store, SERIAL, 1, CertificateRequest(by="I. Issuer"), AT).state == "withdrawn"  # a copy
-    with pytest.raises(CertificateRefused, match=rf"{FIRST} .* was withdrawn at .* by Rita \(standard was bad\).*amend"):
+    with pytest.raises(
+        CertificateRefused, match=rf"{FIRST} .* was withdrawn at .* by Rita \(standard was bad\).*amend"
+    ):
         issue(store, SERIAL, 1, request(), AT + 2 * DAY)
     with pytest.raises(Conflict, match="is withdrawn already"):
         withdraw(store, WithdrawRequest(number=FIRST, by="Rita", reason="again"), AT + 2 * DAY)
