@@ -152,7 +152,7 @@ def test_on_the_command_line_every_state_is_said(database: Path, tmp_path: Path)
     revoked = lab.run("revoke", SERIAL, "1", "--by", "Rita", "--reason", "was dropped").stdout
     assert f"fetched by {ANONYMOUS}" in revoked
     assert "the version was revoked" in lab.run("calibration", SERIAL, "--version", "1").stderr
-    assert "withdraw" in lab.run("certificate", "--help").stdout
+    assert "--reason" in lab.run("certificate", "withdraw", "--help").stdout
 
 
 class Failing:

@@ -137,7 +137,8 @@ class Certificates:
         query = sa.select(*columns, *_WITHDRAWAL).select_from(joined).where(which).order_by(c.id.desc())
         with self._database.reading() as connection:
             rows = connection.execute(query).all()
-        return [CertificateRow(*row[: len(columns)], withdrawal=_withdrawal(row[len(columns) :])) for row in rows]
+        n = len(columns)
+        return [replace(CertificateRow(*row[:n]), withdrawal=_withdrawal(row[n:])) for row in rows]
 
     def newest(self, serial: str, version: int) -> CertificateRow | None:
         """Return the certificate of a version that none replaces; None: none was issued."""
