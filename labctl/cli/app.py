@@ -74,6 +74,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "datasheet": datasheet.datasheet,
     "units": trend.units,
     "certify": calibrations.certify,
+    "release": calibrations.release,
     "revoke": calibrations.revoke,
     "certifications": calibrations.certifications,
     "calibration": calibrations.calibration,

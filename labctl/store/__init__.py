@@ -50,6 +50,7 @@ from labctl.store.repositories.leases import LeaseRow, Leases
 from labctl.store.repositories.manifests import ManifestRow, Manifests
 from labctl.store.repositories.recording_writer import Imports, ImportTicket
 from labctl.store.repositories.recordings import Recordings
+from labctl.store.repositories.releases import NewReleaseRequest, ReleaseRequestRow, ReleaseRequests
 from labctl.store.repositories.resume_points import ResumePoint, ResumePoints, Resumption
 from labctl.store.repositories.scheduled_starts import NewStart, StartEventRow, StartRow, Starts
 from labctl.store.repositories.units import Certifications, Units
@@ -98,6 +99,7 @@ __all__ = [
     "Migrated",
     "NewCalibration",
     "NewCampaign",
+    "NewReleaseRequest",
     "NewStart",
     "NewUnit",
     "Progress",
@@ -105,6 +107,8 @@ __all__ = [
     "RecordingRow",
     "Recordings",
     "Release",
+    "ReleaseRequestRow",
+    "ReleaseRequests",
     "ResumePoint",
     "ResumePoints",
     "Resumption",
@@ -153,6 +157,7 @@ class Store:
         self.calibrations = Calibrations(database)
         self.certifications = Certifications(database)
         self.certificates = Certificates(database)
+        self.release_requests = ReleaseRequests(database)
         self.fetches = Fetches(database)
         self.drafts = Drafts(database)
         self.audit = Audit(database)

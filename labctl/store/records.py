@@ -174,7 +174,7 @@ class Release:
     by: str
     by_key: str
     reason: str
-    request: int | None = None  #: number of the request that was released
+    request: int  #: number of the request that was released
 
 
 @dataclass(frozen=True)

@@ -53,6 +53,7 @@ def upgrade() -> None:
         sa.Column("at", sa.BigInteger(), nullable=False),
         sa.Column("due_days", sa.Integer(), nullable=True),
         sa.Column("override", sa.Boolean(), nullable=False),
+        sa.Column("after_act", _ROW_ID, nullable=False),
         sa.ForeignKeyConstraint(
             ["serial", "version"],
             ["calibrations.serial", "calibrations.version"],

@@ -13,7 +13,7 @@ from labctl.cli.demo import example_data, find_missing_effect, serve_calibration
 from labctl.cli.demo.runner import DemoRunner, maybe_silent
 from labctl.errors import BadInput
 from labctl.json_types.models import ErrorFiguresJson
-from labctl.services.calibrations.certification import certify
+from labctl.services.calibrations.certification import put_in_force
 from labctl.services.schemas.certification import CertifyRequest
 from labctl.store import open_store
 
@@ -45,7 +45,8 @@ def _certify_best(demo: DemoRunner, serial: str) -> None:
     request = CertifyRequest(by="the demo", reason="computed and checked in this run of the demo", override=True)
     rows = sorted(demo.store.calibrations.of_unit(serial), key=lambda row: row.version)
     best = min(rows, key=lambda row: _least_known(row.answer["error"]))
-    act = certify(demo.store, serial, best.version, request, VirtualClock().utc())
+    # no second person: the demo certifies units of its own
+    act = put_in_force(demo.store, serial, best.version, request, VirtualClock().utc(), None)
     demo.say(f"{serial} version {act.version} ({best.model}): verdict {act.verdict or f'none, {act.verdict_reason}'}")
     for each in act.objections:
         demo.say(f"  overridden: {each.text}")

@@ -10,6 +10,7 @@ from labctl.certificates.dcc import dcc_of
 from labctl.certificates.document import hash_of_certificate
 from labctl.certificates.pdf import pdf_of
 from labctl.errors import Conflict
+from labctl.services.calibrations.release import needs_second_person
 from labctl.services.certificates.assembly import assembled
 from labctl.services.certificates.facts import Facts, facts_of
 from labctl.services.certificates.found import Found
@@ -86,7 +87,8 @@ def _unchanged(kept: CertificateRow, request: CertificateRequest) -> Certificate
 
 
 def refuse(facts: Facts, found: Found) -> None:
-    """Raise MissingFacts, or CertificateRefused for a revoked version and a standard outside its dates."""
+    """Raise MissingFacts, or CertificateRefused for a version that was revoked, or certified by one person where two
+    are needed, and for a standard outside its dates."""
     if missing := [*facts.missing(), *found.missing()]:
         raise MissingFacts.of(facts.what, missing)
     act = facts.authorised
@@ -94,6 +96,11 @@ def refuse(facts: Facts, found: Found) -> None:
         raise CertificateRefused(
             f"{facts.what} was revoked at {act.at:%Y-%m-%d %H:%M} UTC by {act.by} ({act.reason}); certify "
             "another version, and issue the certificate of that version"
+        )
+    if act is not None and act.release is None and needs_second_person():
+        raise CertificateRefused(
+            f"{facts.what} was certified by {act.by} alone, at {act.at:%Y-%m-%d %H:%M} UTC, and two persons have to "
+            f"certify a version here; certify it again, and have it released (`labctl release`)"
         )
     _refuse_dates(facts)
 

@@ -41,6 +41,27 @@ class CertifyRequest(RevokeRequest):
     )
 
 
+class ReleaseRequest(Request):
+    """Who releases, as the second person, what a first one asked to certify, and why."""
+
+    by: str = Field(min_length=1)
+    reason: str = Field(min_length=1)
+
+
+class ReleaseRequestResponse(ResponseModel):
+    """A version that waits for its release by a second person; it is not in force yet."""
+
+    serial: str
+    version: int
+    by: str
+    by_key: str = Field(description="Name of the API key of the first person; the second needs another one.")
+    reason: str
+    at: datetime
+    due_days: int | None
+    override: bool
+    waits_for_release: Literal[True] = True
+
+
 class Objection(ResponseModel):
     """One objection to certifying a version."""
 
@@ -131,6 +152,9 @@ class CertificationResponse(ResponseModel):
         default=None, description="Whether the version was certified although there were objections."
     )
     objections: list[Objection] = Field(default_factory=list)
+    released_by: str | None = Field(default=None, description="The second person; null: none was needed.")
+    released_key: str | None = Field(default=None, description="Name of the API key of the second person.")
+    release_reason: str | None = None
     withdrawn_certificates: list[str] = Field(
         default_factory=list, description="Only in the answer to a revocation: certificates that it withdrew."
     )

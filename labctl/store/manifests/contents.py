@@ -214,7 +214,8 @@ RELEASE_REQUEST = Kind(
     "id",
     (
         Part(
-            "head", _T.release_requests, "id", "serial version by by_key reason at due_days override", since="0018",
+            "head", _T.release_requests, "id", "serial version by by_key reason at due_days override after_act",
+            since="0018",
         ),
     ),
     lambda row: f"request {row[0]} to release {row[1]} version {row[2]}",

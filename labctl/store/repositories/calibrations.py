@@ -20,6 +20,7 @@ from labctl.store.records import CalibrationRecord, CertificationRow, Judgement,
 from labctl.store.repositories.audit import append
 from labctl.store.repositories.documents.withdrawals import withdraw_of_version
 from labctl.store.repositories.drafts.marks import mark_fitted
+from labctl.store.repositories.releases import waits
 from labctl.store.repositories.units import SEEN
 from labctl.store.schema import tables
 from labctl.store.sealing.seals import seal
@@ -42,7 +43,7 @@ def _acts_query() -> sa.Select[*tuple[Any, ...]]:
     x = tables.certifications.c
     columns = (x.serial, x.version, x.act, x.by, x.reason, x.at, x.due_at)
     judgement = (x.verdict, x.verdict_recording, x.verdict_at, x.override, x.assessment)
-    persons = (x.by_key, x.released_by, x.released_key, x.release_reason)
+    persons = (x.by_key, x.released_by, x.released_key, x.release_reason, x.request_id)
     return sa.select(*columns, *judgement, *persons).where(x.serial == sa.bindparam("serial")).order_by(x.id.desc())
 
 
@@ -54,7 +55,9 @@ def _act(row: sa.Row[Any]) -> CertificationRow:
     if row.override is not None:
         detail: JudgementDetail = row.assessment or JudgementDetail()
         known = Judgement(row.verdict, row.verdict_recording, row.verdict_at, bool(row.override), detail)
-    release = None if row.released_by is None else Release(row.released_by, row.released_key, row.release_reason)
+    release = None
+    if row.released_by is not None:
+        release = Release(row.released_by, row.released_key, row.release_reason, row.request_id)
     return CertificationRow(
         row.serial, row.version, row.act, row.by, row.reason, row.at, row.due_at, known, row.by_key, release
     )
@@ -258,15 +261,20 @@ class Calibrations:
             )
         row = CertificationRow(serial, version, act, by, reason, at, due_at, judgement, by_key, release)
         with self._database.writing() as connection:
+            if release is not None and not waits(connection, release.request, serial, version):
+                raise Conflict(
+                    f"{serial} version {version} does not wait for this release any more; look at `labctl "
+                    f"certifications {serial}`"
+                )
             number = connection.scalar(
                 sa.insert(tables.certifications).values(
                     serial=serial, version=version, act=act, by=by, reason=reason, at=at, due_at=due_at,
                     by_key=by_key, **_judgement_columns(judgement), **_release_columns(release),
                 ).returning(tables.certifications.c.id)
             )  # fmt: skip
-            detail = {"by": by, "reason": reason, "due": due_at.isoformat() if due_at else None}
-            if judgement is not None:
-                detail |= _audited(judgement)
+            detail: dict[str, Any] = {"by": by, "reason": reason, "due": due_at.isoformat() if due_at else None}
+            detail |= {} if judgement is None else _audited(judgement)
+            detail |= {} if release is None else {"released_by": release.by, "release_reason": release.reason}
             append(connection, at, act, f"{serial} version {version}", detail, who=who or by)
             seal(connection, (CERTIFICATION.name, str(number)), at, act)
             if act == "revoke":

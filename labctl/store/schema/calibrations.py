@@ -68,6 +68,7 @@ release_requests = sa.Table(
     sa.Column("at", Instant, nullable=False),
     sa.Column("due_days", sa.Integer),
     sa.Column("override", sa.Boolean, nullable=False),
+    sa.Column("after_act", RowId, nullable=False),  #: newest act on the version then; 0: none. A later one ends it
     sa.ForeignKeyConstraint(["serial", "version"], ["calibrations.serial", "calibrations.version"]),
     sa.Index(None, "serial", "id"),
 )

@@ -87,7 +87,14 @@ class Certificates:
             with self._database.writing() as connection:
                 c = tables.certificates.c
                 number = connection.scalar(sa.insert(tables.certificates).values(**values).returning(c.id))
-                append(connection, row.at, "certificate", f"{row.serial} version {row.version}", detail, who=row.by)
+                append(
+                    connection,
+                    row.at,
+                    "certificate",
+                    f"{row.serial} version {row.version}",
+                    detail,
+                    who=row.by_key or row.by,
+                )
                 seal(connection, (CERTIFICATE.name, str(number)), row.at, "issued")
         except exc.IntegrityError as error:
             raise Conflict(
@@ -107,7 +114,7 @@ class Certificates:
         try:
             with self._database.writing() as connection:
                 subject = f"{row.serial} version {row.version}"
-                append(connection, said.at, "certificate withdraw", subject, detail, who=said.by)
+                append(connection, said.at, "certificate withdraw", subject, detail, who=said.by_key or said.by)
                 x = tables.certifications.c
                 last = sa.select(sa.func.max(x.id)).where(x.serial == row.serial, x.version == row.version)
                 said = replace(said, act=connection.scalar(last))

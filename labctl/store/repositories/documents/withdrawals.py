@@ -35,7 +35,14 @@ def withdraw_of_version(connection: sa.Connection, serial: str, version: int, sa
     for number in found:
         withdraw(connection, number, said, said.at)
         detail = {"number": number, "reason": said.reason, "by": said.by, "revoked": True}
-        append(connection, said.at, "certificate withdraw", f"{serial} version {version}", detail, who=said.by)
+        append(
+            connection,
+            said.at,
+            "certificate withdraw",
+            f"{serial} version {version}",
+            detail,
+            who=said.by_key or said.by,
+        )
     return found
 
 
