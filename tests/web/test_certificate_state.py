@@ -126,7 +126,7 @@ def test_a_revocation_names_certificates_and_who_fetched_the_version(
     dialog.get_by_label("Why").fill("was dropped")
     dialog.get_by_role("button", name="Revoke").click()
     said = page.get_by_text("Version 1 is revoked.")
-    expect(said).to_contain_text(f"Withdrawn: {FIRST}, {SECOND}. Tell those who fetched it: anonymous.")
+    expect(said).to_contain_text(f"Withdrawn: {FIRST}, {SECOND}. Notify those who fetched it: anonymous.")
 
 
 def test_a_version_that_waits_is_released_by_the_second_person(

@@ -129,7 +129,7 @@ def calibration_state(
 def fetches(serial: str, version: int, service: ServiceDep) -> list[FetchResponse]:
     """Every key by which the version was fetched, with the first and the last time, the newest fetch first.
 
-    They are those who have to be told when the version is revoked.
+    They are those who have to be notified when the version is revoked.
     """
     service.fetches.write()
     return fetched_by(service.store, serial, version)

@@ -75,6 +75,6 @@ async def release(serial: str, version: int, request: ReleaseRequest, service: S
 def revoke(serial: str, version: int, request: RevokeRequest, service: ServiceDep) -> CertificationResponse:
     """Revoke the version, and withdraw its certificates; the unit then has no certified calibration.
 
-    The answer names the certificates, and who fetched the version and has to be told. Needs an approver's key.
+    The answer names the certificates, and who fetched the version and has to be notified. Needs an approver's key.
     """
     return service.execute(REVOKE, ToVersion(serial, version, request))

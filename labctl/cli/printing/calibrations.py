@@ -97,7 +97,7 @@ def print_certification(answer: CertificationResponse | ReleaseRequestResponse) 
         console.print(f"  certificate {number} is withdrawn", markup=False, soft_wrap=True)
     for each in answer.fetched_by:
         when = f"{each.first_at:%Y-%m-%d %H:%M} to {each.last_at:%Y-%m-%d %H:%M} UTC"
-        console.print(f"  fetched by {each.who}, {when}: tell them", markup=False, soft_wrap=True)
+        console.print(f"  fetched by {each.who}, {when}: notify them", markup=False, soft_wrap=True)
 
 
 def _persons(answer: CertificationResponse) -> str:

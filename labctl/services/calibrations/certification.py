@@ -117,7 +117,7 @@ def _refuse_objections(known: AssessmentResponse, request: CertifyRequest) -> No
 def revoke(store: Store, serial: str, version: int, request: RevokeRequest, at: datetime) -> CertificationResponse:
     """Revoke the certification of a version, and withdraw its certificates. Raises NotFound, Conflict.
 
-    The answer names these, and who fetched the version and has to be told.
+    The answer names these, and who fetched the version and has to be notified.
     """
     known = store.units.get(serial).serial
     before = {row.number for row in store.certificates.of_unit(known) if row.withdrawal is not None}
@@ -130,8 +130,8 @@ def revoke(store: Store, serial: str, version: int, request: RevokeRequest, at: 
         for row in reversed(store.certificates.of_unit(known))
         if row.version == version and row.number not in before
     ]
-    told = {"withdrawn_certificates": withdrawn, "fetched_by": fetched_by(store, known, version)}
-    return certification_response(row).model_copy(update=told)
+    found = {"withdrawn_certificates": withdrawn, "fetched_by": fetched_by(store, known, version)}
+    return certification_response(row).model_copy(update=found)
 
 
 def refusal(known: AssessmentResponse) -> str:

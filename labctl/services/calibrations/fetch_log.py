@@ -1,4 +1,4 @@
-"""Who fetched a calibration over HTTP, so that a revocation can name those who have to be told.
+"""Who fetched a calibration over HTTP, so that a revocation can name those who have to be notified.
 
 A fetch costs the one who fetches no write: it is noted in memory, and written after the answer was sent. The first
 fetch by a key is written at once, later ones at most once in `LAST_KNOWN_TO`, and all when the service ends.

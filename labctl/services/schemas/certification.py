@@ -117,7 +117,7 @@ class WithdrawnResponse(ResponseModel):
 
 
 class CalibrationStateResponse(ResponseModel):
-    """Which state a version is in that somebody holds, found by the hash of its calibration."""
+    """State of a version whose file a program holds, found by the hash of its calibration."""
 
     serial: str
     version: int
@@ -159,5 +159,5 @@ class CertificationResponse(ResponseModel):
         default_factory=list, description="Only in the answer to a revocation: certificates that it withdrew."
     )
     fetched_by: list[FetchResponse] = Field(
-        default_factory=list, description="Only in the answer to a revocation: who has to be told."
+        default_factory=list, description="Only in the answer to a revocation: who has to be notified."
     )

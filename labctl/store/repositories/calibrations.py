@@ -263,7 +263,7 @@ class Calibrations:
         with self._database.writing() as connection:
             if release is not None and not waits(connection, release.request, serial, version):
                 raise Conflict(
-                    f"{serial} version {version} does not wait for this release any more; look at `labctl "
+                    f"{serial} version {version} does not wait for this release any more; read `labctl "
                     f"certifications {serial}`"
                 )
             number = connection.scalar(

@@ -64,7 +64,7 @@ export interface paths {
          * Who fetched a version
          * @description Every key by which the version was fetched, with the first and the last time, the newest fetch first.
          *
-         *     They are those who have to be told when the version is revoked.
+         *     They are those who have to be notified when the version is revoked.
          */
         get: operations["fetches_api_units__serial__calibrations__version__fetches_get"];
         put?: never;
@@ -467,7 +467,7 @@ export interface paths {
          * Revoke a version
          * @description Revoke the version, and withdraw its certificates; the unit then has no certified calibration.
          *
-         *     The answer names the certificates, and who fetched the version and has to be told. Needs an approver's key.
+         *     The answer names the certificates, and who fetched the version and has to be notified. Needs an approver's key.
          */
         post: operations["revoke_api_units__serial__calibrations__version__revoke_post"];
         delete?: never;
@@ -782,7 +782,7 @@ export interface paths {
          * Withdraw a certificate
          * @description Withdraw one certificate; the version stays in force. Its files are still served, with `X-Labctl-Withdrawn`.
          *
-         *     Whoever fetches the calibration is told too, until the version is certified again. 409 for a certificate that is
+         *     Callers that fetch the calibration are notified too, until the version is certified again. 409 for a certificate that is
          *     withdrawn already. Needs an approver's key.
          */
         post: operations["withdraw_api_certificates_withdraw_post"];
@@ -2439,7 +2439,7 @@ export interface components {
         };
         /**
          * CalibrationStateResponse
-         * @description Which state a version is in that somebody holds, found by the hash of its calibration.
+         * @description State of a version whose file a program holds, found by the hash of its calibration.
          */
         CalibrationStateResponse: {
             /** Serial */
@@ -3042,7 +3042,7 @@ export interface components {
             withdrawn_certificates: string[];
             /**
              * Fetched By
-             * @description Only in the answer to a revocation: who has to be told.
+             * @description Only in the answer to a revocation: who has to be notified.
              */
             fetched_by: components["schemas"]["FetchResponse"][];
         };

@@ -1,4 +1,4 @@
-"""Who fetched a calibration is recorded and named at its revocation; who fetches or holds a withdrawn one is told."""
+"""Who fetched a calibration is recorded and named at its revocation; who fetches or holds a withdrawn one is notified."""
 
 from __future__ import annotations
 

@@ -112,13 +112,13 @@ export async function askRevocation(serial, version) {
 }
 
 /**
- * What a revocation withdrew, and who has to be told; empty for nothing.
+ * What a revocation withdrew, and who has to be notified; empty for nothing.
  * @param {Certification} done
  */
 const consequences = ({ withdrawn_certificates: certificates, fetched_by: fetches }) =>
   [
     certificates.length ? `Withdrawn: ${certificates.join(", ")}.` : "",
-    fetches.length ? `Tell those who fetched it: ${fetches.map((each) => each.who).join(", ")}.` : "",
+    fetches.length ? `Notify those who fetched it: ${fetches.map((each) => each.who).join(", ")}.` : "",
   ]
     .filter(Boolean)
     .join(" ");
