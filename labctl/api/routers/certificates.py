@@ -48,8 +48,8 @@ def state(
 def withdraw(request: WithdrawRequest, service: ServiceDep) -> CertificateResponse:
     """Withdraw one certificate; the version stays in force. Its files are still served, with `X-Labctl-Withdrawn`.
 
-    Callers that fetch the calibration are notified too, until the version is certified again. 409 for a certificate that is
-    withdrawn already. Needs an approver's key.
+    Callers that fetch the calibration are notified too, until the version is certified again. 409 for a certificate
+    that is withdrawn already. Needs an approver's key.
     """
     return service.execute(WITHDRAW_CERTIFICATE, request)
 

@@ -76,7 +76,7 @@ def certificate_file(
 
 
 def public_certificate(store: Store, number: str, calibration: str) -> PublicCertificate:
-    """Return what every reader may know who has a certificate in hand: its number, and the hash of the calibration on it.
+    """Return what every reader of a certificate may know, who has its number and the hash of the calibration on it.
 
     `calibration` is that hash or its beginning, at least `address.HASH_DIGITS` digits. Raises NotFound where number
     and hash are not those of one certificate.

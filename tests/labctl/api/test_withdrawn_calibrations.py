@@ -1,4 +1,4 @@
-"""Who fetched a calibration is recorded and named at its revocation; who fetches or holds a withdrawn one is notified."""
+"""Who fetched a calibration is recorded and named at its revocation; a client that holds a withdrawn one raises."""
 
 from __future__ import annotations
 

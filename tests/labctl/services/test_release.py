@@ -65,7 +65,7 @@ def test_nothing_is_in_force_until_a_second_key_has_released_it(store: Store) ->
     assert list_certifications(store, SERIAL) == []
     (waiting,) = list_waiting(store, SERIAL)
     assert (waiting.by, waiting.by_key, waiting.reason) == ("Ada A.", "ada", ASKED.reason)
-    with acting(ADA), pytest.raises(ReleaseRefused, match="key 'ada' asked .* as Ada A.; a second person"):
+    with acting(ADA), pytest.raises(ReleaseRefused, match=r"key 'ada' asked .* as Ada A\.; a second person"):
         release(store, SERIAL, 1, ReleaseRequest(by="Somebody Else", reason="another name"), AT)
     assert version_in_force(store, SERIAL) is None
     with acting(BOB):
@@ -128,9 +128,7 @@ def test_objections_are_named_to_the_first_person(store: Store) -> None:
     assert list_waiting(store, SERIAL) == []
 
 
-def test_a_certificate_needs_the_release_and_names_both_persons(
-    store: Store, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_certificate_needs_the_release_and_names_both_persons(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
     store.calibrations.certify(SERIAL, 1, "certify", by="Ada", reason="alone", at=AT)
     with pytest.raises(CertificateRefused, match=r"certified by Ada alone, .* two persons"):
         issue(store, SERIAL, 1, request(), AT)

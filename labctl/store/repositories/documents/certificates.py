@@ -107,7 +107,9 @@ class Certificates:
     def withdraw(self, number: str, said: Withdrawal) -> CertificateRow:
         """Withdraw one certificate; its version stays in force. Raises NotFound, Conflict where it is withdrawn."""
         row = self.get(number)
-        again = Conflict(f"certificate {number} is withdrawn already; `labctl certificates {row.serial}` gives the reason")
+        again = Conflict(
+            f"certificate {number} is withdrawn already; `labctl certificates {row.serial}` gives the reason"
+        )
         if row.withdrawal is not None:
             raise again
         detail: dict[str, Any] = {"number": number, "reason": said.reason, "by": said.by}

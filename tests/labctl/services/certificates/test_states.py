@@ -9,6 +9,8 @@ from datetime import timedelta
 from pathlib import Path
 
 import pytest
+import sqlalchemy as sa
+from alembic import command
 
 from labctl.acting_user import Actor, acting
 from labctl.errors import Conflict, NotFound
@@ -20,7 +22,7 @@ from labctl.services.certificates.served import certificate_file, public_certifi
 from labctl.services.certificates.states import certificate_by_number, list_certificates
 from labctl.services.schemas.certification import RevokeRequest
 from labctl.services.schemas.documents.certificates import CertificateRequest, WithdrawRequest
-from labctl.store import Store, copy_database, open_store
+from labctl.store import Store, check, copy_database, migrate, migrate_database, open_store
 from labctl.withdrawal import HEADER, Withdrawn, read_withdrawn
 from tests.helpers.certificates import AT, SERIAL, add_version, request
 
@@ -169,8 +171,6 @@ def test_the_keys_identity_stands_beside_the_name(store: Store) -> None:
 
 
 def checked(store: Store, *statements: str) -> list[str]:
-    from labctl.store import check
-
     location = store.location
     store.close()
     with closing(sqlite3.connect(location)) as raw:
@@ -193,3 +193,23 @@ def test_the_check_notices_a_withdrawal_and_a_key_that_were_changed(store: Store
     )
     assert any(f"withdrawal of certificate {FIRST}: head changed" in text for text in found)
     assert any("persons changed" in text for text in found)
+
+
+def test_a_migration_withdraws_the_certificates_of_versions_that_were_revoked(store: Store) -> None:
+    """A database of schema 0017 knew no withdrawals: a certificate of a revoked version passed for a valid one."""
+    location = store.location
+    revoke(store, SERIAL, 1, RevokeRequest(by="Rita", reason="was dropped"), AT + DAY)
+    certify(store, 1, 2)
+    asked = request().model_copy(update={"amend": "issued again"})
+    assert issue(store, SERIAL, 1, asked, AT + 3 * DAY).number == SECOND
+    with store.calibrations._database.writing() as connection:
+        command.downgrade(migrate.configuration(connection), "0017")
+        manifests = sa.table("manifests", sa.column("kind"), sa.column("sequence"))
+        connection.execute(sa.delete(manifests).where(manifests.c.kind == "withdrawal"))  # 0017 never made one
+    store.close()
+    migrate_database(location, copy=False)
+    with open_store(location, write=True) as migrated:
+        assert states(migrated) == {FIRST: "withdrawn", SECOND: "valid"}
+        first = certificate_by_number(migrated, FIRST)
+        assert (first.state_reason, first.state_by, first.state_since) == ("was dropped", "Rita", AT + DAY)
+        assert calibration_file(migrated, SERIAL, 1, "json").withdrawn is None  # it was certified again
