@@ -35,3 +35,9 @@ def acting(who: Actor) -> Iterator[None]:
 def actor() -> Actor:
     """Return in whose name this thread or task acts now."""
     return _actor.get(ITSELF)
+
+
+def acting_key() -> str | None:
+    """Return the name of the API key by which this thread or task acts; None where a name is only claimed or typed."""
+    who = actor()
+    return who.name if who.via == "key" else None

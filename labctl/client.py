@@ -22,6 +22,7 @@ from httpx_sse import ServerSentEvent, connect_sse
 from instruments.clock import Clock, SystemClock
 from labctl.calibration import Calibration, read_calibration
 from labctl.certification import warn
+from labctl.errors import CalibrationWithdrawn
 from labctl.recording.files import recording_parts
 from labctl.service_connection import TIMEOUT_S, ServiceConnection, ServiceRefused, json_of, refusal
 from labctl.services.schemas.base import Request
@@ -34,14 +35,18 @@ from labctl.services.schemas.campaigns import (
     ReasonRequest,
     ResumeRequest,
 )
+from labctl.services.schemas.certification import CalibrationStateResponse
 from labctl.services.schemas.documents.fixed import FixedCoefficients
 from labctl.services.schemas.recordings import ImportResponse, RecordingResponse
 from labctl.services.schemas.schedule import ScheduledResponse
 from labctl.services.schemas.units import UnitResponse
+from labctl.withdrawal import HEADER, Withdrawn, read_withdrawn
 
 __all__ = [
     "CalibrationFile",
     "CalibrationRow",
+    "CalibrationStateResponse",
+    "CalibrationWithdrawn",
     "CampaignRequest",
     "CampaignResponse",
     "Client",
@@ -55,6 +60,7 @@ __all__ = [
     "ScheduledResponse",
     "ServiceRefused",
     "UnitResponse",
+    "Withdrawn",
 ]
 
 #: Address of `labctl serve` without options.
@@ -76,6 +82,7 @@ class CalibrationFile:
     state: str = ""  #: in-force, superseded, revoked or not-certified; empty: an older service does not say
     due: datetime | None = None  #: until when it is valid, aware UTC; None: no date
     warning: str = ""  #: that it is overdue or was revoked, in the service's words; empty: it is neither
+    withdrawn: Withdrawn | None = None  #: that it was revoked, or its certificate withdrawn; None: neither
 
     @property
     def calibration(self) -> Calibration:
@@ -137,26 +144,50 @@ class Client:
         *,
         file_format: str = "json",
         held: CalibrationFile | None = None,
+        accept_withdrawn: bool = False,
     ) -> CalibrationFile:
         """Fetch a calibration file: the certified version, or the one with number `version`.
 
         With `held`, the file that the caller already has, its ETag is sent along; the same object is returned when it
         is still current, and nothing is downloaded. Raises ServiceRefused with slug `not-certified` when the unit has
-        no certified version, `not-found` when it does not exist. Issues a CalibrationWarning for a calibration that is
-        overdue or was revoked; the file then has the text as `warning`.
+        no certified version, `not-found` when it does not exist, CalibrationWithdrawn when the version was revoked or
+        its certificate was withdrawn; with `accept_withdrawn` the file is returned, with the notice as `withdrawn`.
+        Issues a CalibrationWarning for a calibration that is overdue or was revoked; the file then has the text as
+        `warning`.
         """
         query = {"format": file_format} | ({} if version is None else {"version": str(version)})
         headers = {} if held is None else {"If-None-Match": held.etag}
         path = f"/api/units/{_part(serial)}/calibration"
         response = self._connection.request("GET", path, params=query, headers=headers)
         due, warning = response.headers.get("x-labctl-due"), _warning(response.headers.get("warning", ""))
+        given = response.headers.get(HEADER)
+        notice = None if given is None else read_withdrawn(given)
+        if notice is not None and not accept_withdrawn:
+            known = held is not None and response.status_code == httpx.codes.NOT_MODIFIED
+            content = held.content if known and held is not None else response.content
+            raise _withdrawn(f"calibration of {serial}", notice, content)
         warn(warning)
         if held is not None and response.status_code == httpx.codes.NOT_MODIFIED:
-            return held if warning == held.warning else replace(held, warning=warning)
+            same = (warning, notice) == (held.warning, held.withdrawn)
+            return held if same else replace(held, warning=warning, withdrawn=notice)
         return CalibrationFile(
             serial, response.content, response.headers["etag"], response.headers.get("content-type", ""),
             response.headers.get("x-labctl-state", ""), None if due is None else datetime.fromisoformat(due), warning,
+            notice,
         )  # fmt: skip
+
+    def check_calibration(self, serial: str, calibration_hash: str) -> CalibrationStateResponse:
+        """Ask in which state a calibration is now that was fetched before, by `Calibration.calibration_hash`.
+
+        Raises CalibrationWithdrawn when its version was revoked or its certificate was withdrawn, ServiceRefused with
+        slug `not-found` for a hash that the unit does not have.
+        """
+        path = f"/api/units/{_part(serial)}/calibration/state"
+        answer = self._connection.get(path, CalibrationStateResponse, calibration_hash=calibration_hash)
+        if (gone := answer.withdrawn) is not None:
+            notice = Withdrawn(gone.at, gone.by, gone.reason, gone.certificate)
+            raise _withdrawn(f"calibration of {serial} version {answer.version}", notice)
+        return answer
 
     def recordings(self) -> list[RecordingResponse]:
         """Return every recording, newest first."""
@@ -267,6 +298,11 @@ def _warning(field: str) -> str:
     """Return the text of a `Warning` field as the service writes it (RFC 7234, 5.5): 299 agent "text"."""
     found = re.fullmatch(r'299 \S+ "((?:[^"\\]|\\.)*)"', field)
     return re.sub(r"\\(.)", r"\1", found[1]) if found else field
+
+
+def _withdrawn(what: str, notice: Withdrawn, content: bytes | None = None) -> CalibrationWithdrawn:
+    text = f"{what} must not be used: {notice.text}; fetch the version in force, or have the unit calibrated again"
+    return CalibrationWithdrawn(text, notice, content)
 
 
 def _part(serial: str) -> str:

@@ -1,4 +1,4 @@
-"""Defaults: the database, keys, the user's name and the interval of calibrations."""
+"""Defaults: the database, keys, the user's name, the interval of calibrations, and who certifies."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 DATABASE_VARIABLE = "LABCTL_DATABASE"
 KEY_VARIABLE = "LABCTL_KEY"
 DUE_VARIABLE = "LABCTL_DUE_DAYS"
+TWO_PERSON_VARIABLE = "LABCTL_TWO_PERSON_RELEASE"
 SEAL_KEY_VARIABLE = "LABCTL_SEAL_KEY"
 SIGN_KEY_VARIABLE = "LABCTL_SIGN_KEY"
 SIGN_CERTIFICATE_VARIABLE = "LABCTL_SIGN_CERTIFICATE"

@@ -11,6 +11,7 @@ LabctlError              exit 2, HTTP 400
 ├── BenchUnconfirmed         a service has ended and its bench is not known to be safe      exit 1
 ├── NotFound             no such unit, recording, calibration, campaign            HTTP 404
 │   └── NotCertified     the unit has calibrations, but none is in force           HTTP 404, exit 1
+├── CalibrationWithdrawn     a calibration was revoked, or its certificate was withdrawn: do not use it    exit 1
 ├── NotEnoughData        the model asks for more than the recording holds; says how much more    HTTP 422
 ├── Conflict             another process holds it, or it is already so             HTTP 409
 │   ├── CertificationRefused   there are objections to a version; they can be overridden      HTTP 409
@@ -36,6 +37,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from labctl.json_types import JsonObject
+from labctl.withdrawal import Withdrawn
 
 
 class LabctlError(Exception):
@@ -161,6 +163,21 @@ class NotCertified(NotFound):
 
     exit_status = 1
     slug = "not-certified"
+
+
+class CalibrationWithdrawn(LabctlError):
+    """A calibration was revoked, or its certificate was withdrawn; raised by the client of a service.
+
+    `notice` has date, person and reason; `content` is the file that the service sent nevertheless, None from a check.
+    """
+
+    exit_status = 1
+    slug = "calibration-withdrawn"
+
+    def __init__(self, text: str, notice: Withdrawn | None = None, content: bytes | None = None) -> None:
+        super().__init__(text)
+        self.notice = notice
+        self.content = content
 
 
 class NotEnoughData(LabctlError):

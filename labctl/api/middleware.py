@@ -11,7 +11,7 @@ from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from labctl.acting_user import Actor, acting
-from labctl.api.access_policy import API, OPEN, READING, STOPS, UPLOADS, AccessPolicy, role_needed
+from labctl.api.access_policy import API, OPEN, PROVEN, READING, STOPS, UPLOADS, AccessPolicy, role_needed
 from labctl.api.connection_limits import RESERVED
 from labctl.api.problems import as_problem
 from labctl.errors import BadInput, LabctlError, NotAllowed, NotIdentified, Overloaded, TooLarge
@@ -89,7 +89,7 @@ class AccessMiddleware:
             caller = await self._caller(scope)
             require_role(caller, role_needed(scope["method"], scope["path"]))
         except NotAllowed:
-            if (scope["path"] in OPEN or is_page(scope["path"])) and scope["method"] in READING:
+            if (scope["path"] in OPEN | PROVEN or is_page(scope["path"])) and scope["method"] in READING:
                 return None
             raise
         return caller

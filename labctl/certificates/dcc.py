@@ -71,6 +71,9 @@ def _core(parent: ET.Element, given: Certificate) -> None:
     identifications = child(parent, "identifications")
     _identification(identifications, "calibrationLaboratory", given.calibration.hash, "SHA-256 of the calibration")
     _identification(identifications, "calibrationLaboratory", given.calibration.address, "Address of the calibration")
+    if given.state_address:
+        name = "Address of the state of this certificate"
+        _identification(identifications, "calibrationLaboratory", given.state_address, name)
     for each in given.manifests:
         name = f"SHA-256 of manifest {each.manifest}: {each.record}"
         _identification(identifications, "calibrationLaboratory", each.hash, name)
@@ -126,7 +129,7 @@ def _statements(parent: ET.Element, given: Certificate) -> None:
         _statement(parent, "Statement", text)
     _statement(parent, "Adjustment", given.adjustment)
     _statement(parent, "Results of external providers", given.external)
-    _statement(parent, "Authorisation", f"{given.authorised.name}, {given.authorised.at:%Y-%m-%d %H:%M} UTC: "
+    _statement(parent, "Authorisation", f"{given.authorised.persons}, {given.authorised.at:%Y-%m-%d %H:%M} UTC: "
                f"{given.authorised.reason}")  # fmt: skip
     if given.due is not None:
         made = _statement(parent, "Next calibration", "Agreed with the customer.", ref_type="basic_recalibration")

@@ -203,11 +203,20 @@ class StabilityResult(Part):
 
 
 class Authorisation(Part):
-    """Who authorised the results: the act of certification."""
+    """Who authorised the results: the act of certification, and its release where two persons have to agree."""
 
     name: str
     at: datetime
     reason: str
+    identity: str = ""  #: how it is known that it was this person; empty: issued before it was stated
+    released_by: str = ""  #: the second person; empty: none was needed
+    released_identity: str = ""
+
+    @property
+    def persons(self) -> str:
+        """Who authorised, with the identity of each."""
+        first = f"{self.name} ({self.identity})" if self.identity else self.name
+        return f"{first}, released by {self.released_by} ({self.released_identity})" if self.released_by else first
 
 
 class Replaced(Part):
@@ -250,6 +259,10 @@ class Certificate(Part):
     number: str
     issued_on: date
     issued_by: str
+    issued_by_identity: str = ""  #: as of the authorisation
+    state_address: str = (
+        ""  #: of the page that says which state the certificate is in; empty: issued before there was one
+    )
     replaces: Replaced | None
     laboratory: Laboratory
     customer: Customer
@@ -281,6 +294,11 @@ class Certificate(Part):
     def to_bytes(self) -> bytes:
         """Return its JSON, always the same bytes."""
         return canonical(self.model_dump(mode="json", by_alias=True)) + b"\n"
+
+
+def identity_of(key: str | None) -> str:
+    """Return how it is known that a person acted: by the API key of this name, or by nothing but the name."""
+    return f"key {key}" if key else "name as typed, no key"
 
 
 def hash_of_certificate(content: bytes) -> str:

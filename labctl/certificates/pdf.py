@@ -31,7 +31,7 @@ def pdf_of(given: Certificate, xml: bytes) -> bytes:
         "main.typ": template,
         "certificate.json": readable_certificate(given),
         "dcc.xml": xml,
-        "qr.svg": _qr(given.calibration.address),
+        "qr.svg": _qr(given.state_address or given.calibration.address),
     }
     issued = datetime.combine(given.issued_on, time(), UTC)
     try:

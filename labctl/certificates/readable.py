@@ -50,8 +50,8 @@ def _pages(given: Certificate) -> dict[str, object]:
         "specimen": next((text for text in given.statements if text.startswith("SPECIMEN")), ""),
         "facts": _facts(given),
         "issued": given.issued_on.isoformat(),
-        "issued_by": given.issued_by,
-        "authorised": f"{given.authorised.name}, {given.authorised.at:%Y-%m-%d %H:%M} UTC",
+        "issued_by": given.issued_by + (f" ({given.issued_by_identity})" if given.issued_by_identity else ""),
+        "authorised": f"{given.authorised.persons}, {given.authorised.at:%Y-%m-%d %H:%M} UTC",
         "authorised_name": given.authorised.name,
         "signature": _signature(given),
         "method": _method(given),
@@ -86,6 +86,7 @@ def _pages(given: Certificate) -> dict[str, object]:
         "statements": [text for text in given.statements if not text.startswith("SPECIMEN")],
         "hash": given.calibration.hash,
         "address": given.calibration.address,
+        "page": given.state_address,
         "manifests": [[f"Manifest {each.manifest}, {each.record}", each.hash] for each in given.manifests],
     }
 

@@ -55,6 +55,7 @@ app.add_typer(audit.app, name="audit")
 app.add_typer(seal_key.app, name="seal-key")
 app.add_typer(signing_key.app, name="signing-key")
 app.add_typer(certificate_list.app, name="certificates")
+app.add_typer(certificate.app, name="certificate")
 COMMANDS: dict[str, Callable[..., None]] = {
     "demo": server.demo,
     "serve": server.serve,
@@ -76,10 +77,10 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "datasheet": datasheet.datasheet,
     "units": trend.units,
     "certify": calibrations.certify,
+    "release": calibrations.release,
     "revoke": calibrations.revoke,
     "certifications": calibrations.certifications,
     "calibration": calibrations.calibration,
-    "certificate": certificate.certificate,
     "uncertainty": uncertainty.uncertainty,
     "compensate": calibrations.compensate,
     "backup": database.backup,

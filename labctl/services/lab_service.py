@@ -14,6 +14,7 @@ from instruments.clock import Clock
 from labctl.services.bench_access import BenchAccess
 from labctl.services.benches.bench_left import BenchLeft
 from labctl.services.benches.start_confirmation import start_questions
+from labctl.services.calibrations.fetch_log import FetchLog
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.event_stream import CampaignEventStream
 from labctl.services.campaigns.resumability import NO_BENCH, with_resume
@@ -73,6 +74,7 @@ class LabService:
         self.store = store
         self.computation = computation or InThreads(store)
         self.clock = clock
+        self.fetches = FetchLog(store)
         self.bench_access: BenchAccess = access or LocalBench(store, clock, runner)
         self._executor = LocalExecutor(CommandContext(lambda: store, clock, self.bench_access.control))
         self._event_stream = CampaignEventStream(store, self.status, self.bench_access.listen)
@@ -117,6 +119,7 @@ class LabService:
             self._drafts.end_soon()
             self.computation.close()
             self._drafts.close()
+            self.fetches.write()
             self.store.close()
 
     def execute(self, command: Command[RequestT, ResponseT], request: RequestT) -> ResponseT:

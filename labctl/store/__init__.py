@@ -29,9 +29,11 @@ from labctl.store.records import (
     MeanRow,
     NewUnit,
     RecordingRow,
+    Release,
     ServedCalibration,
     StepRow,
     Unit,
+    Withdrawal,
 )
 from labctl.store.repositories.audit import Audit, Broken, Head
 from labctl.store.repositories.benches import Benches, BenchRow
@@ -42,11 +44,13 @@ from labctl.store.repositories.campaigns import Campaigns, NewCampaign
 from labctl.store.repositories.documents.certificates import CertificateForms, CertificateRow, Certificates
 from labctl.store.repositories.drafts.records import DraftEvent, DraftRow, DraftState
 from labctl.store.repositories.drafts.repository import Drafts
+from labctl.store.repositories.fetches import Fetches, FetchRow
 from labctl.store.repositories.keys import Keys
 from labctl.store.repositories.leases import LeaseRow, Leases
 from labctl.store.repositories.manifests import ManifestRow, Manifests
 from labctl.store.repositories.recording_writer import Imports, ImportTicket
 from labctl.store.repositories.recordings import Recordings
+from labctl.store.repositories.releases import NewReleaseRequest, ReleaseRequestRow, ReleaseRequests
 from labctl.store.repositories.resume_points import ResumePoint, ResumePoints, Resumption
 from labctl.store.repositories.scheduled_starts import NewStart, StartEventRow, StartRow, Starts
 from labctl.store.repositories.units import Certifications, Units
@@ -78,6 +82,8 @@ __all__ = [
     "DraftState",
     "Drafts",
     "EventRow",
+    "FetchRow",
+    "Fetches",
     "Finding",
     "Head",
     "Holder",
@@ -94,12 +100,16 @@ __all__ = [
     "Migrated",
     "NewCalibration",
     "NewCampaign",
+    "NewReleaseRequest",
     "NewStart",
     "NewUnit",
     "Progress",
     "PublicKey",
     "RecordingRow",
     "Recordings",
+    "Release",
+    "ReleaseRequestRow",
+    "ReleaseRequests",
     "ResumePoint",
     "ResumePoints",
     "Resumption",
@@ -115,6 +125,7 @@ __all__ = [
     "StoreJournal",
     "Unit",
     "Units",
+    "Withdrawal",
     "Writer",
     "check",
     "copy_database",
@@ -146,6 +157,8 @@ class Store:
         self.calibrations = Calibrations(database)
         self.certifications = Certifications(database)
         self.certificates = Certificates(database)
+        self.release_requests = ReleaseRequests(database)
+        self.fetches = Fetches(database)
         self.drafts = Drafts(database)
         self.audit = Audit(database)
         self.keys = Keys(database)

@@ -158,6 +158,27 @@ class Judgement:
 
 
 @dataclass(frozen=True)
+class Withdrawal:
+    """Who withdrew a certificate, when and why."""
+
+    by: str
+    by_key: str | None  #: name of the API key that acted; None: `by` is as typed
+    reason: str
+    at: datetime
+    act: int | None = None  #: number of the newest act on its version then: its revocation, or a certification
+
+
+@dataclass(frozen=True)
+class Release:
+    """The second person of a certification."""
+
+    by: str
+    by_key: str
+    reason: str
+    request: int  #: number of the request that was released
+
+
+@dataclass(frozen=True)
 class CertificationRow:
     """One act of certifying or revoking."""
 
@@ -169,6 +190,8 @@ class CertificationRow:
     at: datetime
     due_at: datetime | None
     judgement: Judgement | None = None  #: None of a revocation, and of acts before verdicts were kept
+    by_key: str | None = None  #: name of the API key that acted; None: `by` is as typed
+    release: Release | None = None  #: None: no second person was needed
 
 
 @dataclass(frozen=True)
@@ -179,6 +202,9 @@ class ServedCalibration:
     hash: str
     act: CertificationRow | None
     in_force: bool  #: whether that act is the newest of the unit, and puts the version in force
+    certificate: str | None = None  #: number of the newest certificate of the version; None: it has none
+    withdrawal: Withdrawal | None = None  #: of that certificate
+    act_number: int | None = None
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from labctl.store import Store
 from labctl.store.connection.database import Database
 
 #: What an answer says beside its content.
-SAID = ("content-type", "etag", "x-labctl-state", "x-labctl-due", "warning")
+SAID = ("content-type", "etag", "x-labctl-state", "x-labctl-due", "x-labctl-withdrawn", "warning")
 
 
 def open_client(database: Path, bench: str = "single-axis-sim") -> TestClient:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from fastapi import APIRouter, Header, Query, Request, Response
+from starlette.background import BackgroundTask
 from starlette.concurrency import run_in_threadpool
 
 from labctl.api.computation import execute, follow, while_connected
@@ -12,8 +13,10 @@ from labctl.api.dependencies import ServiceDep, command_route
 from labctl.api.event_stream import EventStream
 from labctl.fitting.effects import read_formulas
 from labctl.services.calibrations import fitting as services
+from labctl.services.calibrations.fetch_log import ANONYMOUS, fetched_by
 from labctl.services.calibrations.revision import preview_unit
 from labctl.services.calibrations.served import calibration_file
+from labctl.services.calibrations.served import calibration_state as state_of
 from labctl.services.calibrations.surface import surface_of
 from labctl.services.calibrations.uncertainty import uncertainty_at
 from labctl.services.commands.registry import FIT, IMPROVE
@@ -23,6 +26,7 @@ from labctl.services.criticism.criticise import criticise_unit, residuals_unit
 from labctl.services.criticism.ladder import ladder as ladder_of
 from labctl.services.criticism.plots import pictures_unit
 from labctl.services.criticism.verification.of_version import verify_unit
+from labctl.services.schemas.admin import Caller
 from labctl.services.schemas.calibrations import (
     CalibrationRow,
     FitRequest,
@@ -33,6 +37,7 @@ from labctl.services.schemas.calibrations import (
     PreviewResponse,
     VersionResponse,
 )
+from labctl.services.schemas.certification import CalibrationStateResponse, FetchResponse
 from labctl.services.schemas.comparison import ComparisonResponse
 from labctl.services.schemas.criticism import (
     CriticismResponse,
@@ -63,6 +68,7 @@ Formulas = Annotated[
 @router.head("/calibration", include_in_schema=False)
 @router.get("/calibration", summary="The calibration in force", response_class=Response)
 async def calibration(
+    request: Request,
     serial: str,
     service: ServiceDep,
     version: Annotated[
@@ -81,6 +87,8 @@ async def calibration(
 
     The file changes only with its certification, which it contains. `X-Labctl-State` is in-force, superseded, revoked
     or not-certified, `X-Labctl-Due` the date until which it is valid; `Warning` says that it is overdue or revoked.
+    `X-Labctl-Withdrawn` says when, by whom and why the version was revoked or its certificate withdrawn. Who fetches is
+    recorded, by the name of the key.
     What a format does not carry of it, with its largest size, is in the header `X-Labctl-Lost`, one for each. JSON is a
     point read of tens of microseconds: it runs in the event loop, without a switch to a thread; others compute.
     """
@@ -95,7 +103,36 @@ async def calibration(
     response.headers.update(headers)
     for loss in file.losses:
         response.headers.append(LOST, loss.text)
+    caller: Caller = request.state.caller
+    who = caller.name if caller.via == "key" else ANONYMOUS
+    if request.method == "GET" and service.fetches.note(file.serial, file.version, who, service.clock.utc()):
+        response.background = BackgroundTask(service.fetches.write)
     return response
+
+
+@router.get("/calibration/state", summary="State of a calibration that was fetched")
+def calibration_state(
+    serial: str,
+    service: ServiceDep,
+    calibration_hash: Annotated[
+        str, Query(max_length=64, description="Hash of the calibration: `calibration_hash` of its file.")
+    ],
+) -> CalibrationStateResponse:
+    """Whether the calibration with this hash is in force, superseded or revoked, and whether it was withdrawn.
+
+    For programs that keep a calibration file and ask from time to time; 404 for a hash that the unit does not have.
+    """
+    return state_of(service.store, serial, calibration_hash)
+
+
+@router.get("/calibrations/{version}/fetches", summary="Who fetched a version")
+def fetches(serial: str, version: int, service: ServiceDep) -> list[FetchResponse]:
+    """Every key by which the version was fetched, with the first and the last time, the newest fetch first.
+
+    They are those who have to be notified when the version is revoked.
+    """
+    service.fetches.write()
+    return fetched_by(service.store, serial, version)
 
 
 @router.head("/calibrations", include_in_schema=False)

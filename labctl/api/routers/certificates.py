@@ -1,4 +1,4 @@
-"""Certificates of calibrations: issue one, fetch one as it was issued, list those of a unit."""
+"""Certificates of calibrations: issue, fetch as issued, list, withdraw, and ask for the state of one."""
 
 from __future__ import annotations
 
@@ -9,17 +9,54 @@ from fastapi import APIRouter, Header, Query, Response
 from labctl.api.access_policy import NEEDS_APPROVER
 from labctl.api.computation import execute
 from labctl.api.dependencies import ServiceDep, command_route
-from labctl.services.certificates.served import certificate_file, list_certificates
-from labctl.services.commands.registry import ISSUE_CERTIFICATE
+from labctl.services.certificates.served import certificate_file, public_certificate
+from labctl.services.certificates.states import list_certificates
+from labctl.services.commands.registry import ISSUE_CERTIFICATE, WITHDRAW_CERTIFICATE
 from labctl.services.commands.requests import ToVersion
-from labctl.services.schemas.documents.certificates import CertificateRequest, CertificateResponse
+from labctl.services.schemas.documents.certificates import (
+    CertificateRequest,
+    CertificateResponse,
+    PublicCertificate,
+    WithdrawRequest,
+)
 
-router = APIRouter(prefix="/api/units/{serial}", tags=["certificates"])
+router = APIRouter(tags=["certificates"])
+UNIT = "/api/units/{serial}"
 
 
-@router.get("/certificates", summary="Certificates of a unit")
+@router.get("/api/certificates/state", summary="State of a certificate")
+def state(
+    service: ServiceDep,
+    number: Annotated[str, Query(max_length=100, description="Number of the certificate.")],
+    calibration: Annotated[
+        str,
+        Query(
+            max_length=64,
+            description="Hash of the calibration as printed on the certificate, or its first 16 digits or more.",
+        ),
+    ],
+) -> PublicCertificate:
+    """Whether a certificate is valid, amended, superseded or withdrawn, since when and why, and what replaces it.
+
+    Needs no key: who knows both number and hash has the certificate. 404 where they do not belong together. It is what
+    the page behind the QR code shows.
+    """
+    return public_certificate(service.store, number, calibration)
+
+
+@command_route(router, WITHDRAW_CERTIFICATE, "Withdraw a certificate", dependencies=[NEEDS_APPROVER])
+def withdraw(request: WithdrawRequest, service: ServiceDep) -> CertificateResponse:
+    """Withdraw one certificate; the version stays in force. Its files are still served, with `X-Labctl-Withdrawn`.
+
+    Callers that fetch the calibration are notified too, until the version is certified again. 409 for a certificate
+    that is withdrawn already. Needs an approver's key.
+    """
+    return service.execute(WITHDRAW_CERTIFICATE, request)
+
+
+@router.get(UNIT + "/certificates", summary="Certificates of a unit")
 def certificates(serial: str, service: ServiceDep) -> list[CertificateResponse]:
-    """Every certificate of the unit, newest first, with what it replaces and what replaces it."""
+    """Every certificate of the unit, newest first, with its state, what it replaces and what replaces it."""
     return list_certificates(service.store, serial)
 
 
@@ -34,7 +71,9 @@ async def issue(serial: str, version: int, request: CertificateRequest, service:
     return await execute(service, ISSUE_CERTIFICATE, ToVersion(serial, version, request))
 
 
-@router.get("/calibrations/{version}/certificate", summary="A certificate as it was issued", response_class=Response)
+@router.get(
+    UNIT + "/calibrations/{version}/certificate", summary="A certificate as it was issued", response_class=Response
+)
 def certificate(
     serial: str,
     version: int,
@@ -47,9 +86,13 @@ def certificate(
     ] = None,
     if_none_match: Annotated[str | None, Header()] = None,
 ) -> Response:
-    """The certificate as a file, always the same bytes; the ETag is the hash of its JSON and the format."""
+    """The certificate as a file, always the same bytes; the ETag is the hash of its JSON and the format.
+
+    `X-Labctl-State` is valid, amended, superseded or withdrawn; `X-Labctl-Withdrawn` says when, by whom and why, and
+    `X-Labctl-Replaced-By` is the number of the certificate that replaces it.
+    """
     file = certificate_file(service.store, serial, version, format, number)
-    headers = {"ETag": f'"{file.etag}"', "Content-Disposition": f'inline; filename="{file.name}"'}
+    headers = file.headers()
     if if_none_match and headers["ETag"] in if_none_match:
         return Response(status_code=304, headers=headers)
     return Response(file.content, media_type=file.media_type, headers=headers)

@@ -93,7 +93,8 @@ def certify(
 ) -> None:
     """Certify a version: put it in force. Certifying an older version again is a rollback.
 
-    Refused where its verdict, its errors or its data give objections, unless --override.
+    Refused where its verdict, its errors or its data give objections, unless --override. With
+    $LABCTL_TWO_PERSON_RELEASE = 1, the version is in force once a second person has released it.
     """
     from labctl.services.commands.open import execute
     from labctl.services.commands.registry import CERTIFY
@@ -111,10 +112,29 @@ def certify(
         print_certification(answer)
 
 
+def release(
+    serial: Serial, version: Version, by: By, reason: Reason, as_json: Json = False, database: Database = None
+) -> None:
+    """Release a version as the second person, with another API key than the first: it is in force then."""
+    from labctl.services.commands.open import execute
+    from labctl.services.commands.registry import RELEASE
+    from labctl.services.commands.requests import ToVersion
+    from labctl.services.schemas.certification import ReleaseRequest
+
+    with one_clear_line():
+        answer = execute(database, RELEASE, ToVersion(serial, version, ReleaseRequest(by=by, reason=reason)))
+    if as_json:
+        print_json(answer)
+    else:
+        from labctl.cli.printing.calibrations import print_certification
+
+        print_certification(answer)
+
+
 def revoke(
     serial: Serial, version: Version, by: By, reason: Reason, as_json: Json = False, database: Database = None
 ) -> None:
-    """Revoke the certification of a version."""
+    """Revoke the certification of a version; its certificates are withdrawn, and who fetched it is listed."""
     from labctl.services.commands.open import execute
     from labctl.services.commands.registry import REVOKE
     from labctl.services.commands.requests import ToVersion
@@ -134,16 +154,17 @@ def certifications(serial: Serial, as_json: Json = False, database: Database = N
     """List what was certified and revoked, newest first, with the verdict at that time and the overridden
     objections."""
     from labctl.services.calibrations.certification import list_certifications
+    from labctl.services.calibrations.release import list_waiting
     from labctl.services.commands.open import open_readonly
 
     with one_clear_line(), open_readonly(database) as store:
-        rows = list_certifications(store, serial)
+        rows, waiting = list_certifications(store, serial), list_waiting(store, serial)
     if as_json:
         print_json(rows)
     else:
         from labctl.cli.printing.calibrations import print_certifications
 
-        print_certifications(rows)
+        print_certifications(rows, waiting)
 
 
 def calibration(
@@ -173,6 +194,9 @@ def calibration(
             sys.stdout.buffer.write(file.content)
         else:
             out.write_bytes(file.content)
+    if file.withdrawn is not None:
+        said = f"labctl: calibration of {file.what} must not be used: {file.withdrawn.text}"
+        stderr.print(said, style="bold red", markup=False, soft_wrap=True)
     for loss in file.losses:
         typer.echo(f"format {format_} cannot express: {loss.text}", err=True)
 

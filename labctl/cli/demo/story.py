@@ -14,7 +14,7 @@ from labctl.cli.demo.runner import DemoRunner, maybe_silent
 from labctl.errors import BadInput
 from labctl.fitting.estimation.error_metrics import first_of_smallest
 from labctl.json_types.models import ErrorFiguresJson
-from labctl.services.calibrations.certification import certify
+from labctl.services.calibrations.certification import put_in_force
 from labctl.services.schemas.certification import CertifyRequest
 from labctl.store import open_store
 
@@ -47,7 +47,8 @@ def _certify_best(demo: DemoRunner, serial: str) -> None:
     rows = sorted(demo.store.calibrations.of_unit(serial), key=lambda row: row.version)
     points = sum(len(demo.store.recordings.data_sets(number)) for number in rows[0].recordings)
     best = rows[first_of_smallest([_least_known(row.answer["error"]) for row in rows], points)]
-    act = certify(demo.store, serial, best.version, request, VirtualClock().utc())
+    # no second person: the demo certifies units of its own
+    act = put_in_force(demo.store, serial, best.version, request, VirtualClock().utc(), None)
     demo.say(f"{serial} version {act.version} ({best.model}): verdict {act.verdict or f'none, {act.verdict_reason}'}")
     for each in act.objections:
         demo.say(f"  overridden: {each.text}")

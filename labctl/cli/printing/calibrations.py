@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 from labctl.cli.output import console, format_number, print_warnings, table
 from labctl.cli.printing.joint import print_joint
 from labctl.fitting.numeric.rounding import rounded_to_uncertainty
+from labctl.services.schemas.certification import CertificationResponse, ReleaseRequestResponse
 
 if TYPE_CHECKING:
     from labctl.json_types.models import Coefficients, Entry, HeldJson
     from labctl.json_types.poses import PosesJson
     from labctl.services.schemas.calibrations import FitResponse
-    from labctl.services.schemas.certification import CertificationResponse
 
 
 def print_fit(answer: FitResponse) -> None:
@@ -81,21 +81,49 @@ def print_poses(poses: PosesJson) -> None:
     console.print(f"not determined: {poses['not_determined']}", style="dim", markup=False, soft_wrap=True)
 
 
-def print_certification(answer: CertificationResponse) -> None:
-    """Print an act of certifying or revoking, and what was known of the version."""
+def print_certification(answer: CertificationResponse | ReleaseRequestResponse) -> None:
+    """Print an act of certifying or revoking and what was known of the version, or that it waits for its release."""
+    if isinstance(answer, ReleaseRequestResponse):
+        console.print(_waits(answer), markup=False, soft_wrap=True)
+        return
     done = "is now the calibration in force" if answer.act == "certify" else "is no longer in force"
-    console.print(f"{answer.serial} version {answer.version} {done} ({answer.by}: {answer.reason})", markup=False)
+    console.print(
+        f"{answer.serial} version {answer.version} {done} ({_persons(answer)}: {answer.reason})", markup=False
+    )
     if answer.act == "certify":
         console.print(f"  verdict: {_verdict(answer)}", markup=False, soft_wrap=True)
     _print_objections(answer)
+    for number in answer.withdrawn_certificates:
+        console.print(f"  certificate {number} is withdrawn", markup=False, soft_wrap=True)
+    for each in answer.fetched_by:
+        when = f"{each.first_at:%Y-%m-%d %H:%M} to {each.last_at:%Y-%m-%d %H:%M} UTC"
+        console.print(f"  fetched by {each.who}, {when}: notify them", markup=False, soft_wrap=True)
 
 
-def print_certifications(rows: Sequence[CertificationResponse]) -> None:
-    """Print acts, newest first."""
+def _persons(answer: CertificationResponse) -> str:
+    """Return who acted, with the key of each person."""
+    first = f"{answer.by}, key {answer.by_key}" if answer.by_key else answer.by
+    if answer.released_by is None:
+        return first
+    return f"{first}; released by {answer.released_by}, key {answer.released_key} ({answer.release_reason})"
+
+
+def _waits(request: ReleaseRequestResponse) -> str:
+    return (
+        f"{request.serial} version {request.version} waits for a second person, with another key than "
+        f"{request.by_key} ({request.by}: {request.reason}); `labctl release {request.serial} {request.version}` "
+        "puts it in force"
+    )
+
+
+def print_certifications(rows: Sequence[CertificationResponse], waiting: Sequence[ReleaseRequestResponse] = ()) -> None:
+    """Print what waits for a second person, and acts, newest first."""
+    for request in waiting:
+        console.print(_waits(request), style="yellow", markup=False, soft_wrap=True)
     if not rows:
         console.print("nothing has been certified yet")
     for row in rows:
-        said = f"{row.at:%Y-%m-%d %H:%M} UTC  {row.act} version {row.version}  {row.by}: {row.reason}"
+        said = f"{row.at:%Y-%m-%d %H:%M} UTC  {row.act} version {row.version}  {_persons(row)}: {row.reason}"
         console.print(said, markup=False, soft_wrap=True)
         if row.act == "certify":
             console.print(f"  verdict: {_verdict(row)}", markup=False, soft_wrap=True)

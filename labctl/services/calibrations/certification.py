@@ -5,18 +5,22 @@ from __future__ import annotations
 from datetime import datetime, timedelta
 from typing import Literal, cast
 
-from labctl.acting_user import actor
+from labctl.acting_user import acting_key
 from labctl.errors import BadInput, CertificationRefused
 from labctl.json_types.calibrations import JudgementDetail
 from labctl.services.calibrations.assessment import LEAST_REASON_CHARACTERS, LEAST_REASON_WORDS, assess
 from labctl.services.calibrations.due import interval_days
+from labctl.services.calibrations.fetch_log import fetched_by
+from labctl.services.calibrations.release import ask_for_release, key_of_person, needs_second_person, waiting_request
 from labctl.services.schemas.certification import (
     AssessmentResponse,
     CertificationResponse,
     CertifyRequest,
+    ReleaseRequest,
+    ReleaseRequestResponse,
     RevokeRequest,
 )
-from labctl.store import CertificationRow, Judgement, Store
+from labctl.store import CertificationRow, Judgement, Release, Store
 
 #: What is kept of an assessment beside its verdict.
 KEPT = ("verdict_reason", "verdict_text", "error", "objections")
@@ -30,8 +34,12 @@ def list_certifications(store: Store, serial: str) -> list[CertificationResponse
 def certification_response(row: CertificationRow) -> CertificationResponse:
     act: Literal["certify", "revoke"] = "certify" if row.act == "certify" else "revoke"
     response = CertificationResponse(
-        serial=row.serial, version=row.version, act=act, by=row.by, reason=row.reason, at=row.at, due=row.due_at
-    )
+        serial=row.serial, version=row.version, act=act, by=row.by, by_key=row.by_key, reason=row.reason,
+        at=row.at, due=row.due_at,
+    )  # fmt: skip
+    if (second := row.release) is not None:
+        update = {"released_by": second.by, "released_key": second.by_key, "release_reason": second.reason}
+        response = response.model_copy(update=update)
     known = row.judgement
     if known is None:
         return response
@@ -47,48 +55,83 @@ def version_in_force(store: Store, serial: str) -> int | None:
     return history[0].version if history and history[0].act == "certify" else None
 
 
-def certify(store: Store, serial: str, version: int, request: CertifyRequest, at: datetime) -> CertificationResponse:
-    """Put a version in force, and keep the verdict on it.
+def certify(
+    store: Store, serial: str, version: int, request: CertifyRequest, at: datetime
+) -> CertificationResponse | ReleaseRequestResponse:
+    """Put a version in force, and keep the verdict on it; where two persons have to agree, ask for the second one.
 
     Raises NotFound; CertificationRefused where there are objections and `request` does not override that;
-    BadInput for an override whose reason is no sentence.
+    BadInput for an override whose reason is no sentence; ReleaseRefused without a key where two persons are needed.
     """
     if request.override:
         _refuse_short(request.reason)
+    store.units.get(serial)
+    if needs_second_person():
+        _refuse_objections(assess(store, serial, version), request)
+        return ask_for_release(store, serial, version, request, at)
+    return put_in_force(store, serial, version, request, at, acting_key())
+
+
+def release(store: Store, serial: str, version: int, request: ReleaseRequest, at: datetime) -> CertificationResponse:
+    """Put in force, as the second person, what a first one asked for. What is known of the version is assessed again.
+
+    Raises NotFound where nothing waits, ReleaseRefused for the first person and without a key, CertificationRefused.
+    """
+    key = key_of_person(f"releasing {serial} version {version}")
+    asked = waiting_request(store, store.units.get(serial).serial, version, key)
+    first = CertifyRequest(by=asked.by, reason=asked.reason, due_days=asked.due_days, override=asked.override)
+    second = Release(request.by, key, request.reason, asked.id)
+    return put_in_force(store, serial, version, first, at, asked.by_key, second)
+
+
+def put_in_force(
+    store: Store,
+    serial: str,
+    version: int,
+    request: CertifyRequest,
+    at: datetime,
+    by_key: str | None,
+    second: Release | None = None,
+) -> CertificationResponse:
+    """Put a version in force in the name of one person, or of two; keep the verdict on it. Raises as `certify` does."""
     days, due_from = interval_days(store, store.units.get(serial).serial, version, request.due_days)
     known = assess(store, serial, version)
-    if known.objections and not request.override:
-        raise CertificationRefused(refusal(known))
+    _refuse_objections(known, request)
     judgement = Judgement(
         known.verdict, known.verdict_recording, at if known.verdict else None, bool(known.objections),
         cast(JudgementDetail, {**known.model_dump(mode="json", include=set(KEPT)), "due_from": due_from}),
     )  # fmt: skip
     due = None if days is None else at + timedelta(days=days)
-    return _set_in_force(store, serial, version, "certify", request, at, due, judgement)
+    row = store.calibrations.certify(
+        serial, version, "certify", by=request.by, reason=request.reason, at=at, due_at=due, judgement=judgement,
+        who=acting_key() or request.by, by_key=by_key, release=second,
+    )  # fmt: skip
+    return certification_response(row)
+
+
+def _refuse_objections(known: AssessmentResponse, request: CertifyRequest) -> None:
+    if known.objections and not request.override:
+        raise CertificationRefused(refusal(known))
 
 
 def revoke(store: Store, serial: str, version: int, request: RevokeRequest, at: datetime) -> CertificationResponse:
-    """Revoke the certification of a version. Raises NotFound, Conflict."""
-    store.units.get(serial)
-    return _set_in_force(store, serial, version, "revoke", request, at)
+    """Revoke the certification of a version, and withdraw its certificates. Raises NotFound, Conflict.
 
-
-def _set_in_force(
-    store: Store,
-    serial: str,
-    version: int,
-    act: Literal["certify", "revoke"],
-    request: RevokeRequest,
-    at: datetime,
-    due: datetime | None = None,
-    judgement: Judgement | None = None,
-) -> CertificationResponse:
-    caller = actor()
+    The answer names these, and who fetched the version and has to be notified.
+    """
+    known = store.units.get(serial).serial
+    before = {row.number for row in store.certificates.of_unit(known) if row.withdrawal is not None}
+    key = acting_key()
     row = store.calibrations.certify(
-        serial, version, act, by=request.by, reason=request.reason, at=at, due_at=due, judgement=judgement,
-        who=caller.name if caller.via == "key" else request.by,
-    )  # fmt: skip
-    return certification_response(row)
+        serial, version, "revoke", by=request.by, reason=request.reason, at=at, who=key or request.by, by_key=key
+    )
+    withdrawn = [
+        row.number
+        for row in reversed(store.certificates.of_unit(known))
+        if row.version == version and row.number not in before
+    ]
+    found = {"withdrawn_certificates": withdrawn, "fetched_by": fetched_by(store, known, version)}
+    return certification_response(row).model_copy(update=found)
 
 
 def refusal(known: AssessmentResponse) -> str:

@@ -6,15 +6,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from functools import lru_cache
+from typing import Final
 
 from labctl.calibration import with_certification
 from labctl.certification import Certification, State
+from labctl.errors import NotFound
 from labctl.exports import Loss
+from labctl.services.calibrations.certification import version_in_force
 from labctl.services.calibrations.exporting import exported
+from labctl.services.schemas.certification import CalibrationStateResponse, WithdrawnResponse
 from labctl.store import ServedCalibration, Store
+from labctl.withdrawal import HEADER, Withdrawn, quoted
 
 #: State of a version that was never certified.
-NOT_CERTIFIED = "not-certified"
+NOT_CERTIFIED: Final = "not-certified"
 #: Calibration files with their certifications in memory; one has some 20 kB.
 MOST_FILES = 256
 
@@ -26,12 +31,19 @@ class CalibrationFile:
     content: bytes
     media_type: str
     etag: str
-    what: str  #: unit and version
+    serial: str
+    version: int
     certification: Certification | None
     losses: tuple[Loss, ...] = ()  #: what the format does not carry
+    withdrawn: Withdrawn | None = None  #: it was revoked, or its certificate was withdrawn
+
+    @property
+    def what(self) -> str:
+        """Unit and version."""
+        return f"{self.serial} version {self.version}"
 
     def headers(self, now: datetime) -> dict[str, str]:
-        """Return the HTTP headers beside the bytes at an aware time: tag, state, due date, and a warning."""
+        """Return the HTTP headers beside the bytes at an aware time: tag, state, due date, warning and notice."""
         known = self.certification
         found = {"ETag": f'"{self.etag}"', "Cache-Control": "no-cache", "X-Labctl-State": NOT_CERTIFIED}
         if known is None:
@@ -40,7 +52,9 @@ class CalibrationFile:
         if known.due is not None and known.state != "revoked":
             found["X-Labctl-Due"] = f"{known.due.astimezone(UTC):%Y-%m-%dT%H:%M:%SZ}"
         if text := known.warning(self.what, now):
-            found["Warning"] = f"299 labctl {_quoted(text)}"
+            found["Warning"] = f"299 labctl {quoted(text)}"
+        if self.withdrawn is not None:
+            found[HEADER] = self.withdrawn.header()
         return found
 
 
@@ -57,13 +71,49 @@ def calibration_file(
         document, hash_ = store.calibrations.document(serial, version)  # says why there is none
         found = ServedCalibration(document, hash_, None, in_force=False)
     known = _certification(found)
-    number = version if found.act is None else found.act.version
+    number = found.act.version if found.act else version or store.calibrations.certified_version(serial)
     content, tag = (found.document, found.hash) if known is None else _certified(found.document, known)
-    what = f"{serial} version {number}"
     if format_name == "json" and not options:
-        return CalibrationFile(content, "application/json", tag, what, known)
+        return CalibrationFile(content, "application/json", tag, serial, number, known, withdrawn=notice_of(found))
     file = exported(store, content, format_name, options)
-    return CalibrationFile(file.content, file.media_type, f"{tag}-{file.tag}", what, known, file.losses)
+    return CalibrationFile(
+        file.content, file.media_type, f"{tag}-{file.tag}", serial, number, known, file.losses, notice_of(found)
+    )
+
+
+def calibration_state(store: Store, serial: str, calibration_hash: str) -> CalibrationStateResponse:
+    """Return which state a version is in, by the hash of its calibration. Raises NotFound."""
+    known = store.units.get(serial).serial
+    version = store.calibrations.version_of(known, calibration_hash)
+    found = store.certifications.served(known, version) if version is not None else None
+    if version is None or found is None:
+        raise NotFound(
+            f"unit {serial!r} has no calibration with the hash {calibration_hash[:64]!r}; give `calibration_hash` of a "
+            "calibration file (64 hexadecimal digits)"
+        )
+    certification, gone = _certification(found), notice_of(found)
+    return CalibrationStateResponse(
+        serial=known, version=version, calibration_hash=found.hash,
+        state=certification.state if certification else NOT_CERTIFIED,
+        due=certification.due if certification else None,
+        withdrawn=gone and WithdrawnResponse(at=gone.at, by=gone.by, reason=gone.reason, certificate=gone.certificate),
+        in_force=version_in_force(store, known),
+    )  # fmt: skip
+
+
+def notice_of(found: ServedCalibration) -> Withdrawn | None:
+    """Return the notice for those who fetch a version: it was revoked, or its certificate was withdrawn.
+
+    A certification after the withdrawal ends the notice: a person has then vouched for the version again.
+    """
+    act, gone = found.act, found.withdrawal
+    if act is None:
+        return None
+    if act.act == "revoke":
+        return Withdrawn(act.at, act.by, act.reason)
+    if gone is not None and gone.act == found.act_number:  # not by dates: a clock may have been set back
+        return Withdrawn(gone.at, gone.by, gone.reason, found.certificate or "")
+    return None
 
 
 def _certification(found: ServedCalibration) -> Certification | None:
@@ -75,9 +125,3 @@ def _certification(found: ServedCalibration) -> Certification | None:
 
 #: Files of certified versions, with their hashes, as they were served last.
 _certified = lru_cache(maxsize=MOST_FILES)(with_certification)
-
-
-def _quoted(text: str) -> str:
-    """Return a quoted string of an HTTP field (RFC 9110, 5.6.4): visible ASCII, what else there is becomes `?`."""
-    plain = "".join(char if " " <= char <= "~" else "?" for char in text)
-    return '"' + plain.replace("\\", "\\\\").replace('"', '\\"') + '"'

@@ -7,6 +7,7 @@ from datetime import datetime
 from importlib.metadata import version as package_version
 
 from instruments.standards import Standard
+from labctl.acting_user import acting_key
 from labctl.calibration import read_calibration
 from labctl.certificates.document import (
     Authorisation,
@@ -19,12 +20,13 @@ from labctl.certificates.document import (
     StabilityResult,
     StandardUsed,
     StateOfItem,
+    identity_of,
 )
 from labctl.errors import BadInput, NotEnoughData
 from labctl.services.calibrations.stability import stability_of, years_until
 from labctl.services.calibrations.uncertainty import widening_of
 from labctl.services.certificates import measured
-from labctl.services.certificates.address import address_of
+from labctl.services.certificates.address import address_of, page_of
 from labctl.services.certificates.conformity import conformity
 from labctl.services.certificates.evidence import errors_of
 from labctl.services.certificates.facts import Facts
@@ -33,7 +35,7 @@ from labctl.services.certificates.missing import MissingFacts
 from labctl.services.certificates.statements import statements, until
 from labctl.services.criticism.measurements import Measurements
 from labctl.services.schemas.documents.certificates import CertificateRequest
-from labctl.store import CertificateRow, Store
+from labctl.store import CertificateRow, CertificationRow, Store
 
 NONE = "None."
 
@@ -51,8 +53,10 @@ def assembled(
     stability = _stability(store, facts, act.due_at) if order.state_due and act.due_at else None
     return Certificate(
         number=number,
+        state_address=page_of(facts.laboratory.url, number, facts.row.hash),
         issued_on=at.date(),
         issued_by=request.by,
+        issued_by_identity=identity_of(acting_key()),
         replaces=Replaced(number=kept.number, hash=kept.hash, reason=request.amend or "") if kept else None,
         laboratory=facts.laboratory,
         customer=order.customer,
@@ -77,7 +81,7 @@ def assembled(
         due=None if stability is None else stability.until,
         stability=stability,
         external=order.external or NONE,
-        authorised=Authorisation(name=act.by, at=act.at, reason=act.reason),
+        authorised=_authorisation(act),
         calibration=CalibrationFacts(
             version=facts.row.version, hash=facts.row.hash, address=address_of(facts.laboratory.url, facts.row)
         ),
@@ -97,6 +101,15 @@ def _stability(store: Store, facts: Facts, until: datetime) -> StabilityResult:
     return StabilityResult(
         until=until.date(), years=years, per_year_dps=known.per_year_dps, intervals=known.intervals,
         drift_dps=known.expanded_dps(years),
+    )  # fmt: skip
+
+
+def _authorisation(act: CertificationRow) -> Authorisation:
+    """Return who authorised the results; the person who released them too, where two persons have to agree."""
+    second = act.release
+    return Authorisation(
+        name=act.by, at=act.at, reason=act.reason, identity=identity_of(act.by_key),
+        released_by=second.by if second else "", released_identity=identity_of(second.by_key) if second else "",
     )  # fmt: skip
 
 

@@ -5,20 +5,23 @@ from __future__ import annotations
 from datetime import date, datetime
 
 from instruments.standards import Standard
+from labctl.acting_user import acting_key
 from labctl.certificates.document import hash_of_certificate
 from labctl.errors import Conflict
+from labctl.services.calibrations.release import needs_second_person
 from labctl.services.certificates.assembly import assembled
 from labctl.services.certificates.facts import Facts, facts_of
 from labctl.services.certificates.found import Found
 from labctl.services.certificates.missing import MissingFacts
 from labctl.services.certificates.signature import forms_of, signing_key, to_be_signed
+from labctl.services.certificates.states import certificate_by_number
 from labctl.services.schemas.documents.certificates import (
     CertificateOrder,
     CertificateRequest,
     CertificateResponse,
-    SignatoryResponse,
+    WithdrawRequest,
 )
-from labctl.store import CertificateRow, Store
+from labctl.store import CertificateRow, Store, Withdrawal
 
 
 class CertificateRefused(Conflict):
@@ -35,7 +38,7 @@ def issue(store: Store, serial: str, version: int, request: CertificateRequest, 
     """
     kept = store.certificates.newest(store.units.get(serial).serial, version)
     if kept is not None and request.amend is None:
-        return response(_unchanged(kept, request))
+        return certificate_by_number(store, _unchanged(kept, request).number)
     if kept is None and request.amend is not None:
         raise CertificateRefused(f"{serial} version {version} has no certificate to amend; issue one without --amend")
     order = CertificateOrder.model_validate(kept.order) if kept and not _given(request) else request.order
@@ -47,10 +50,16 @@ def issue(store: Store, serial: str, version: int, request: CertificateRequest, 
         forms = forms_of(certificate, key, at)
     row = CertificateRow(
         certificate.number, serial, version, kept.number if kept else None, request.amend or "", request.by, at,
-        hash_of_certificate(forms.document), order.model_dump(mode="json", exclude_defaults=True),
-        None if certificate.signed_by is None else certificate.signed_by.model_dump(mode="json"),
+        hash_of_certificate(forms.document), order.model_dump(mode="json", exclude_defaults=True), acting_key(),
+        signed_by=None if certificate.signed_by is None else certificate.signed_by.model_dump(mode="json"),
     )  # fmt: skip
-    return response(store.certificates.add(row, forms))
+    return certificate_by_number(store, store.certificates.add(row, forms).number)
+
+
+def withdraw(store: Store, request: WithdrawRequest, at: datetime) -> CertificateResponse:
+    """Withdraw a certificate at an aware time; its forms stay as they were issued. Raises NotFound, Conflict."""
+    store.certificates.withdraw(request.number, Withdrawal(request.by, acting_key(), request.reason, at))
+    return certificate_by_number(store, request.number)
 
 
 def _given(request: CertificateRequest) -> dict[str, object]:
@@ -61,6 +70,13 @@ def _given(request: CertificateRequest) -> dict[str, object]:
 def _unchanged(kept: CertificateRow, request: CertificateRequest) -> CertificateRow:
     """Return what was issued; raises Conflict where the request states other facts of the order."""
     given = _given(request)
+    if given and kept.withdrawal is not None:
+        gone = kept.withdrawal
+        raise CertificateRefused(
+            f"certificate {kept.number} of {kept.serial} version {kept.version} was withdrawn at "
+            f"{gone.at:%Y-%m-%d %H:%M} UTC by {gone.by} ({gone.reason}); to issue a new certificate in its place, give "
+            "the reason with --amend REASON (over HTTP: `amend`)"
+        )
     if given and given != kept.order:
         other = ", ".join(sorted(name for name in {*given, *kept.order} if given.get(name) != kept.order.get(name)))
         raise CertificateRefused(
@@ -71,7 +87,8 @@ def _unchanged(kept: CertificateRow, request: CertificateRequest) -> Certificate
 
 
 def refuse(facts: Facts, found: Found) -> None:
-    """Raise MissingFacts, or CertificateRefused for a revoked version and a standard outside its dates."""
+    """Raise MissingFacts, or CertificateRefused for a version that was revoked, or certified by one person where two
+    are needed, and for a standard outside its dates."""
     if missing := [*facts.missing(), *found.missing()]:
         raise MissingFacts.of(facts.what, missing)
     act = facts.authorised
@@ -79,6 +96,11 @@ def refuse(facts: Facts, found: Found) -> None:
         raise CertificateRefused(
             f"{facts.what} was revoked at {act.at:%Y-%m-%d %H:%M} UTC by {act.by} ({act.reason}); certify "
             "another version, and issue the certificate of that version"
+        )
+    if act is not None and act.release is None and needs_second_person():
+        raise CertificateRefused(
+            f"{facts.what} was certified by {act.by} alone, at {act.at:%Y-%m-%d %H:%M} UTC, and two persons have to "
+            f"certify a version here; certify it again, and have it released (`labctl release`)"
         )
     _refuse_dates(facts)
 
@@ -103,12 +125,3 @@ def _refuse_dates(facts: Facts) -> None:
 
 def _off(standard: Standard, first: date, last: date) -> bool:
     return standard.is_overdue(last) or (standard.calibrated is not None and standard.calibrated > first)
-
-
-def response(row: CertificateRow, replaced_by: str | None = None) -> CertificateResponse:
-    """Return a certificate as an answer."""
-    return CertificateResponse(
-        serial=row.serial, version=row.version, number=row.number, issued_at=row.at, by=row.by, hash=row.hash,
-        replaces=row.replaces, reason=row.reason, replaced_by=replaced_by,
-        signed_by=None if row.signed_by is None else SignatoryResponse.model_validate(row.signed_by),
-    )  # fmt: skip

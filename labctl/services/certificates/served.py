@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from typing import Literal, get_args
 
 from labctl.errors import BadInput, NotFound
-from labctl.services.certificates.issue import response
-from labctl.services.schemas.documents.certificates import CertificateResponse
+from labctl.services.certificates.address import HASH_DIGITS
+from labctl.services.certificates.states import certificate_by_number, list_certificates
+from labctl.services.schemas.documents.certificates import CertificateResponse, PublicCertificate
 from labctl.store import Store
+from labctl.withdrawal import HEADER, Withdrawn
 
 CertificateFormat = Literal["pdf", "xml", "json"]
 MEDIA_TYPES = {"pdf": "application/pdf", "xml": "application/xml", "json": "application/json"}
@@ -22,6 +25,27 @@ class CertificateFile:
     media_type: str
     name: str
     etag: str  #: hash of the certificate's JSON, and the format
+    issued: CertificateResponse  #: with its state
+
+    def headers(self) -> dict[str, str]:
+        """Return the HTTP headers beside the bytes: tag, name, and the state, which the bytes cannot say."""
+        now = self.issued
+        found = {
+            "ETag": f'"{self.etag}"', "Content-Disposition": f'inline; filename="{self.name}"',
+            "Cache-Control": "no-cache", "X-Labctl-State": now.state,
+        }  # fmt: skip
+        if (withdrawn := notice_of(now)) is not None:
+            found[HEADER] = withdrawn.header()
+        if (instead := now.replaced_by or now.superseded_by) is not None:
+            found["X-Labctl-Replaced-By"] = instead
+        return found
+
+
+def notice_of(now: CertificateResponse) -> Withdrawn | None:
+    """Return the notice of a certificate that is withdrawn; None for every other one."""
+    if now.state != "withdrawn" or now.state_since is None:
+        return None
+    return Withdrawn(now.state_since, now.state_by, now.state_reason, now.number)
 
 
 def format_of(name: str) -> CertificateFormat:
@@ -37,7 +61,7 @@ def certificate_file(
 ) -> CertificateFile:
     """Return a form of the certificate of a version, by its number also one that was replaced. Raises NotFound."""
     chosen = format_of(format_name)
-    rows = [row for row in store.certificates.of_unit(store.units.get(serial).serial) if row.version == version]
+    rows = [row for row in list_certificates(store, serial) if row.version == version]
     found = next((row for row in rows if number in (None, row.number)), None)
     if found is None:
         store.calibrations.get(serial, version)
@@ -48,11 +72,26 @@ def certificate_file(
     forms = store.certificates.forms(found.number)
     content = {"pdf": forms.pdf, "xml": forms.xml, "json": forms.document}[chosen]
     plain = "".join(char if char.isalnum() or char in "._-" else "_" for char in found.number)
-    return CertificateFile(content, MEDIA_TYPES[chosen], f"{plain}.{chosen}", f"{found.hash}-{chosen}")
+    return CertificateFile(content, MEDIA_TYPES[chosen], f"{plain}.{chosen}", f"{found.hash}-{chosen}", found)
 
 
-def list_certificates(store: Store, serial: str) -> list[CertificateResponse]:
-    """Return every certificate of a unit, newest first. Raises NotFound."""
-    rows = store.certificates.of_unit(store.units.get(serial).serial)
-    by = {row.replaces: row.number for row in rows if row.replaces}
-    return [response(row, by.get(row.number)) for row in rows]
+def public_certificate(store: Store, number: str, calibration: str) -> PublicCertificate:
+    """Return what every reader of a certificate may know, who has its number and the hash of the calibration on it.
+
+    `calibration` is that hash or its beginning, at least `address.HASH_DIGITS` digits. Raises NotFound where number
+    and hash are not those of one certificate.
+    """
+    none = NotFound(
+        "this laboratory issued no certificate with this number and this hash of the calibration; compare both with "
+        f"the paper (of the hash at least the first {HASH_DIGITS} digits)"
+    )
+    try:
+        now = certificate_by_number(store, number)
+    except NotFound:
+        raise none from None
+    _, hash_ = store.calibrations.document(now.serial, now.version)
+    if len(calibration) < HASH_DIGITS or not hash_.startswith(calibration.lower()):
+        raise none
+    issued = json.loads(store.certificates.forms(number).document)
+    said = now.model_dump(include=set(PublicCertificate.model_fields))
+    return PublicCertificate(**said, calibration_hash=hash_, laboratory=issued["laboratory"]["name"])

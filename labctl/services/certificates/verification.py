@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Literal
 from labctl.certificates.document import TITLE
 from labctl.certificates.signing import libraries
 from labctl.errors import BadInput
-from labctl.services.certificates.issue import response
 from labctl.services.certificates.served import CertificateFormat
+from labctl.services.certificates.states import certificate_by_number
 from labctl.services.schemas.documents.signatures import SignatureResponse, VerifiedFileResponse
 from labctl.store import Store
 
@@ -45,20 +45,15 @@ def verify_file(store: Store, path: Path, ca: Path | None) -> VerifiedFileRespon
     against = in_register == "differs" or not all(each.valid for each in found)
     against = against or any(each.trust == "not trusted" for each in found)
     vouched = in_register == "same" or any(each.trust == "trusted" for each in found)
-    replaced_by = None if row is None else _replaced_by(store, row.serial, row.number)
     return VerifiedFileResponse(
         format=form,
         sha256=hashlib.sha256(content).hexdigest(),
         number=number,
         in_register=in_register,
-        certificate=None if row is None else response(row, replaced_by),
+        certificate=None if row is None else certificate_by_number(store, row.number),
         signatures=[_answer(each) for each in found],
         ok=vouched and not against,
     )
-
-
-def _replaced_by(store: Store, serial: str, number: str) -> str | None:
-    return next((each.number for each in store.certificates.of_unit(serial) if each.replaces == number), None)
 
 
 def _format_of(content: bytes, path: Path) -> CertificateFormat:

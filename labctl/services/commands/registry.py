@@ -34,8 +34,14 @@ from labctl.services.schemas.admin import BackupNote, KeyRequest, KeyResponse, N
 from labctl.services.schemas.benches import BenchCheckResponse, BenchStatus, CheckRequest, ClearRequest
 from labctl.services.schemas.calibrations import FitRequest, FitResponse, ImproveRequest, ImproveResponse
 from labctl.services.schemas.campaigns import CampaignResponse, ConfirmRequest, ReasonRequest
-from labctl.services.schemas.certification import CertificationResponse, CertifyRequest, RevokeRequest
-from labctl.services.schemas.documents.certificates import CertificateRequest, CertificateResponse
+from labctl.services.schemas.certification import (
+    CertificationResponse,
+    CertifyRequest,
+    ReleaseRequest,
+    ReleaseRequestResponse,
+    RevokeRequest,
+)
+from labctl.services.schemas.documents.certificates import CertificateRequest, CertificateResponse, WithdrawRequest
 from labctl.services.schemas.recordings import (
     ExampleRequest,
     ImportResponse,
@@ -73,8 +79,14 @@ def _improve(context: CommandContext, asked: ToNewestOrVersion[ImproveRequest]) 
     return revision.improve_unit(context.store, asked.serial, change, context.now())
 
 
-def _certify(context: CommandContext, asked: ToVersion[CertifyRequest]) -> CertificationResponse:
+def _certify(
+    context: CommandContext, asked: ToVersion[CertifyRequest]
+) -> CertificationResponse | ReleaseRequestResponse:
     return certification.certify(context.store, asked.serial, asked.version, asked.body, context.now())
+
+
+def _release(context: CommandContext, asked: ToVersion[ReleaseRequest]) -> CertificationResponse:
+    return certification.release(context.store, asked.serial, asked.version, asked.body, context.now())
 
 
 def _revoke(context: CommandContext, asked: ToVersion[RevokeRequest]) -> CertificationResponse:
@@ -83,6 +95,10 @@ def _revoke(context: CommandContext, asked: ToVersion[RevokeRequest]) -> Certifi
 
 def _issue_certificate(context: CommandContext, asked: ToVersion[CertificateRequest]) -> CertificateResponse:
     return certificates.issue(context.store, asked.serial, asked.version, asked.body, context.now())
+
+
+def _withdraw_certificate(context: CommandContext, asked: WithdrawRequest) -> CertificateResponse:
+    return certificates.withdraw(context.store, asked, context.now())
 
 
 def _start_campaign(context: CommandContext, asked: CampaignStart) -> CampaignResponse | ScheduledResponse:
@@ -184,10 +200,17 @@ IMPROVE = Command(
     newest=Newest("version", _UNIT, "version", otherwise=1),
     computes=True,
 )
-CERTIFY = Command(
+CERTIFY: Command[ToVersion[CertifyRequest], CertificationResponse | ReleaseRequestResponse] = Command(
     method="POST",
     path=_UNIT + "/{version}/certify",
     handler=_certify,
+    responses={200: CertificationResponse, 202: ReleaseRequestResponse},
+    computes=True,
+)
+RELEASE = Command(
+    method="POST",
+    path=_UNIT + "/{version}/release",
+    handler=_release,
     responses={200: CertificationResponse},
     computes=True,
 )
@@ -200,6 +223,12 @@ ISSUE_CERTIFICATE = Command(
     handler=_issue_certificate,
     responses={201: CertificateResponse},
     computes=True,
+)
+WITHDRAW_CERTIFICATE = Command(
+    method="POST",
+    path="/api/certificates/withdraw",
+    handler=_withdraw_certificate,
+    responses={200: CertificateResponse},
 )
 START_CAMPAIGN: Command[CampaignStart, CampaignResponse | ScheduledResponse] = Command(
     method="POST",

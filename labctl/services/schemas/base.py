@@ -6,6 +6,9 @@ from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
+#: Description of `by_key` and its like in responses.
+BY_KEY = "Name of the API key that acted; null: none did, the person's name is as typed."
+
 
 class ResponseModel(BaseModel):
     """A response of the services: the same JSON on the command line and over HTTP. Keys may be added, none renamed."""

@@ -7,7 +7,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from labctl.services.schemas.base import Request, ResponseModel
+from labctl.services.schemas.base import BY_KEY, Request, ResponseModel
 
 DueSource = Literal["user", "recipe", "configuration"]
 DUE_FROM = "Source of the number of days; null: no number is given, and there is no due date."
@@ -39,6 +39,27 @@ class CertifyRequest(RevokeRequest):
     override: bool = Field(
         default=False, description="Certify although there are objections; the reason must then be a sentence."
     )
+
+
+class ReleaseRequest(Request):
+    """Who releases, as the second person, what a first one asked to certify, and why."""
+
+    by: str = Field(min_length=1)
+    reason: str = Field(min_length=1)
+
+
+class ReleaseRequestResponse(ResponseModel):
+    """A version that waits for its release by a second person; it is not in force yet."""
+
+    serial: str
+    version: int
+    by: str
+    by_key: str = Field(description="Name of the API key of the first person; the second needs another one.")
+    reason: str
+    at: datetime
+    due_days: int | None
+    override: bool
+    waits_for_release: Literal[True] = True
 
 
 class Objection(ResponseModel):
@@ -78,6 +99,37 @@ class AssessmentResponse(ResponseModel):
     due_from: DueSource | None = Field(description=DUE_FROM)
 
 
+class FetchResponse(ResponseModel):
+    """Who fetched a version over HTTP: one entry for each key, and one for all who sent none."""
+
+    who: str = Field(description="Name of the API key; anonymous: no key was sent.")
+    first_at: datetime
+    last_at: datetime = Field(description="The last fetch; if the service was killed, up to an hour too early.")
+
+
+class WithdrawnResponse(ResponseModel):
+    """When, by whom and why a version or its certificate was withdrawn."""
+
+    at: datetime
+    by: str
+    reason: str
+    certificate: str = Field(description="Number of the certificate; empty: the version was revoked.")
+
+
+class CalibrationStateResponse(ResponseModel):
+    """State of a version whose file a program holds, found by the hash of its calibration."""
+
+    serial: str
+    version: int
+    calibration_hash: str
+    state: Literal["in-force", "superseded", "revoked", "not-certified"]
+    due: datetime | None = Field(description="Date until which the certification is valid; null: no date.")
+    withdrawn: WithdrawnResponse | None = Field(
+        description="The version was revoked, or its certificate was withdrawn after the version was certified last."
+    )
+    in_force: int | None = Field(description="Version of the unit that is in force; null: none.")
+
+
 class CertificationResponse(ResponseModel):
     """A certification or its revocation; without a verdict's keys for a revocation and before verdicts were kept."""
 
@@ -85,6 +137,7 @@ class CertificationResponse(ResponseModel):
     version: int
     act: Literal["certify", "revoke"]
     by: str
+    by_key: str | None = Field(default=None, description=BY_KEY)
     reason: str
     at: datetime
     due: datetime | None = None
@@ -99,3 +152,12 @@ class CertificationResponse(ResponseModel):
         default=None, description="Whether the version was certified although there were objections."
     )
     objections: list[Objection] = Field(default_factory=list)
+    released_by: str | None = Field(default=None, description="The second person; null: none was needed.")
+    released_key: str | None = Field(default=None, description="Name of the API key of the second person.")
+    release_reason: str | None = None
+    withdrawn_certificates: list[str] = Field(
+        default_factory=list, description="Only in the answer to a revocation: certificates that it withdrew."
+    )
+    fetched_by: list[FetchResponse] = Field(
+        default_factory=list, description="Only in the answer to a revocation: who has to be notified."
+    )

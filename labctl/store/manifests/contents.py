@@ -7,7 +7,7 @@ a record becomes a part of its own.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import sqlalchemy as sa
 
@@ -28,7 +28,8 @@ class Part:
     columns: str
     order: str = ""
     only: Callable[[], sa.ColumnElement[bool]] = sa.true
-    since: str = ""  #: schema that added it: a record that was sealed before had no such rows
+    since: str = "0017"  #: schema that has these columns
+    was_empty: bool = False  #: whether a record that was sealed before that schema had no such rows
 
     def query(self, record: int | str) -> sa.Select[*tuple[object, ...]]:
         """Return the query of its rows, as they are stored, in an order that does not depend on the database."""
@@ -50,6 +51,11 @@ class Kind:
     at_rest: Callable[[], sa.ColumnElement[bool]] = sa.true  #: whether nothing of the record is still to come
     whole: Callable[[], sa.ColumnElement[bool]] = field(default=sa.true)  #: whether it is there for others at all
     has_blocks: bool = False
+    since: str = "0017"  #: schema that has the table
+
+    def as_of(self, schema: str) -> Kind:
+        """Return the kind with the parts that a schema has."""
+        return replace(self, parts=tuple(part for part in self.parts if part.since <= schema))
 
     @property
     def is_numbered(self) -> bool:
@@ -108,7 +114,7 @@ RECORDING = Kind(
         ),
         Part(
             "verification marks", _T.data_sets, "recording_id", "number verification", "number",
-            lambda: _T.data_sets.c.verification, since="0018",
+            lambda: _T.data_sets.c.verification, since="0018", was_empty=True,
         ),
         Part("set temperatures", _T.data_sets, "recording_id", "number chamber_setpoint_c", "number"),
         Part("means", _T.data_set_means, "recording_id", _MEANS, "number channel", _not_of_temperature),
@@ -173,6 +179,10 @@ CERTIFICATION = Kind(
         Part(
             "verdict", _T.certifications, "id", "verdict verdict_recording verdict_at override assessment",
         ),
+        Part(
+            "persons", _T.certifications, "id", "by_key request_id released_by released_key release_reason",
+            since="0019",
+        ),
     ),
     lambda row: f"certification {row[0]} ({row[3]} of {row[1]} version {row[2]})",
     "id serial version act",
@@ -187,10 +197,36 @@ CERTIFICATE = Kind(
         Part("document", _T.certificates, "id", "document"),
         Part("XML", _T.certificates, "id", "xml"),
         Part("PDF", _T.certificates, "id", "pdf"),
+        Part("persons", _T.certificates, "id", "by_key", since="0019"),
     ),
     lambda row: f"certificate {row[0]}",
     "number",
 )
+
+WITHDRAWAL = Kind(
+    "withdrawal",
+    _T.certificate_withdrawals,
+    "id",
+    (Part("head", _T.certificate_withdrawals, "id", "number by by_key reason at certification_id", since="0019"),),
+    lambda row: f"withdrawal of certificate {row[0]}",
+    "number",
+    since="0019",
+)
+
+RELEASE_REQUEST = Kind(
+    "release request",
+    _T.release_requests,
+    "id",
+    (
+        Part(
+            "head", _T.release_requests, "id", "serial version by by_key reason at due_days override after_act",
+            since="0019",
+        ),
+    ),
+    lambda row: f"request {row[0]} to release {row[1]} version {row[2]}",
+    "id serial version",
+    since="0019",
+)  # fmt: skip
 
 KEY = Kind(
     "key",
@@ -206,5 +242,6 @@ KEY = Kind(
 )
 
 KINDS: Mapping[str, Kind] = {
-    kind.name: kind for kind in (CAMPAIGN, RECORDING, CALIBRATION, CERTIFICATION, CERTIFICATE, KEY)
+    kind.name: kind
+    for kind in (CAMPAIGN, RECORDING, CALIBRATION, CERTIFICATION, CERTIFICATE, KEY, WITHDRAWAL, RELEASE_REQUEST)
 }

@@ -39,18 +39,11 @@ class BlockParts:
         return {BLOCK_PARTS[group]: made.digest().as_json() for group, made in self._made.items()}
 
 
-def parts_of(
-    connection: sa.Connection, kind: Kind, record: str, *, blocks: bool = True, schema: str | None = None
-) -> Parts:
-    """Return the digest of every part of a record; those of blocks, unless left out, by what is kept of them.
-
-    `schema` is that of the database, where a migration has not come to the newest yet.
-    """
+def parts_of(connection: sa.Connection, kind: Kind, record: str, *, blocks: bool = True) -> Parts:
+    """Return the digest of every part of a record; those of blocks, unless left out, by what is kept of them."""
     key = kind.key_of(record)
     found: dict[str, JsonObject] = {}
     for part in kind.parts:
-        if schema is not None and part.since > schema:
-            continue
         rows: Iterable[sa.Row[*tuple[object, ...]]] = connection.execute(
             part.query(key).execution_options(yield_per=AT_ONCE)
         )
@@ -84,8 +77,8 @@ def _digests_of_block(connection: sa.Connection, recording: int, number: int, se
     return block_digests(sample_codec.unpack(sample_codec.Block(*connection.execute(query).one())))
 
 
-#: Parts that a later schema added, and what each is of a record that was sealed before.
-_LATER = frozenset(part.name for kind in KINDS.values() for part in kind.parts if part.since)
+#: Parts of which a record that was sealed before they existed had no rows, and what each was then.
+_LATER = frozenset(part.name for kind in KINDS.values() for part in kind.parts if part.was_empty)
 _NOTHING: JsonObject = digest_of_rows(()).as_json()
 
 

@@ -16,9 +16,11 @@ from labctl.json_types.models import KeptAnswer
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.manifests.contents import CALIBRATION, CERTIFICATION
-from labctl.store.records import CalibrationRecord, CertificationRow, Judgement
+from labctl.store.records import CalibrationRecord, CertificationRow, Judgement, Release, Withdrawal
 from labctl.store.repositories.audit import append
+from labctl.store.repositories.documents.withdrawals import withdraw_of_version
 from labctl.store.repositories.drafts.marks import mark_fitted
+from labctl.store.repositories.releases import waits
 from labctl.store.repositories.units import SEEN
 from labctl.store.schema import tables
 from labctl.store.sealing.seals import seal
@@ -41,7 +43,8 @@ def _acts_query() -> sa.Select[*tuple[Any, ...]]:
     x = tables.certifications.c
     columns = (x.serial, x.version, x.act, x.by, x.reason, x.at, x.due_at)
     judgement = (x.verdict, x.verdict_recording, x.verdict_at, x.override, x.assessment)
-    return sa.select(*columns, *judgement).where(x.serial == sa.bindparam("serial")).order_by(x.id.desc())
+    persons = (x.by_key, x.released_by, x.released_key, x.release_reason, x.request_id)
+    return sa.select(*columns, *judgement, *persons).where(x.serial == sa.bindparam("serial")).order_by(x.id.desc())
 
 
 _ACTS = _acts_query()
@@ -52,7 +55,12 @@ def _act(row: sa.Row[Any]) -> CertificationRow:
     if row.override is not None:
         detail: JudgementDetail = row.assessment or JudgementDetail()
         known = Judgement(row.verdict, row.verdict_recording, row.verdict_at, bool(row.override), detail)
-    return CertificationRow(row.serial, row.version, row.act, row.by, row.reason, row.at, row.due_at, known)
+    release = None
+    if row.released_by is not None:
+        release = Release(row.released_by, row.released_key, row.release_reason, row.request_id)
+    return CertificationRow(
+        row.serial, row.version, row.act, row.by, row.reason, row.at, row.due_at, known, row.by_key, release
+    )
 
 
 def _judgement_columns(judgement: Judgement | None) -> dict[str, Any]:
@@ -61,6 +69,15 @@ def _judgement_columns(judgement: Judgement | None) -> dict[str, Any]:
     return {
         "verdict": judgement.verdict, "verdict_recording": judgement.recording, "verdict_at": judgement.at,
         "override": judgement.override, "assessment": dict(judgement.detail),
+    }  # fmt: skip
+
+
+def _release_columns(release: Release | None) -> dict[str, Any]:
+    if release is None:
+        return {}
+    return {
+        "released_by": release.by, "released_key": release.by_key, "release_reason": release.reason,
+        "request_id": release.request,
     }  # fmt: skip
 
 
@@ -166,6 +183,12 @@ class Calibrations:
             )
         return rows[0]
 
+    def version_of(self, serial: str, hash_: str) -> int | None:
+        """Return the version of a unit whose calibration has a hash; None where none has."""
+        c = tables.calibrations.c
+        with self._database.reading() as connection:
+            return connection.scalar(sa.select(c.version).where(c.serial == serial, c.hash == hash_))
+
     def of_unit(self, serial: str) -> list[CalibrationRecord]:
         """Return every version of a unit, newest first."""
         return self._rows(tables.calibrations.c.serial == serial)
@@ -219,11 +242,14 @@ class Calibrations:
         due_at: datetime | None = None,
         who: str | None = None,
         judgement: Judgement | None = None,
+        by_key: str | None = None,
+        release: Release | None = None,
     ) -> CertificationRow:
-        """Put a version in force, or take the one in force out of it. Raises NotFound, Conflict.
+        """Put a version in force, or take the one in force out of it, with its certificates. Raises NotFound, Conflict.
 
         `by` is the person who answers for it; `who` is the one who did it, where that is known otherwise than from
-        `by`; `judgement` is what was known of the version.
+        `by`; `by_key` is the API key that acted; `judgement` is what was known of the version; `release` is who
+        released what `by` asked for.
         """
         self.get(serial, version)
         last = self._last_act(serial)
@@ -233,19 +259,26 @@ class Calibrations:
                 f"{serial} version {version} is not in force (in force: {in_force or 'none'}); give the version in "
                 "force"
             )
-        row = CertificationRow(serial, version, act, by, reason, at, due_at, judgement)
+        row = CertificationRow(serial, version, act, by, reason, at, due_at, judgement, by_key, release)
         with self._database.writing() as connection:
+            if release is not None and not waits(connection, release.request, serial, version):
+                raise Conflict(
+                    f"{serial} version {version} does not wait for this release any more; read `labctl "
+                    f"certifications {serial}`"
+                )
             number = connection.scalar(
                 sa.insert(tables.certifications).values(
                     serial=serial, version=version, act=act, by=by, reason=reason, at=at, due_at=due_at,
-                    **_judgement_columns(judgement),
+                    by_key=by_key, **_judgement_columns(judgement), **_release_columns(release),
                 ).returning(tables.certifications.c.id)
             )  # fmt: skip
-            detail = {"by": by, "reason": reason, "due": due_at.isoformat() if due_at else None}
-            if judgement is not None:
-                detail |= _audited(judgement)
+            detail: dict[str, Any] = {"by": by, "reason": reason, "due": due_at.isoformat() if due_at else None}
+            detail |= {} if judgement is None else _audited(judgement)
+            detail |= {} if release is None else {"released_by": release.by, "release_reason": release.reason}
             append(connection, at, act, f"{serial} version {version}", detail, who=who or by)
             seal(connection, (CERTIFICATION.name, str(number)), at, act)
+            if act == "revoke":
+                withdraw_of_version(connection, serial, version, Withdrawal(by, by_key, reason, at, number))
         return row
 
     def document(self, serial: str, version: int | None) -> tuple[bytes, str]:

@@ -9,7 +9,7 @@ import sqlalchemy as sa
 
 from labctl.errors import NotFound
 from labctl.store.connection.database import Database
-from labctl.store.records import CertificationRow, ServedCalibration, Unit
+from labctl.store.records import CertificationRow, ServedCalibration, Unit, Withdrawal
 from labctl.store.schema import tables
 
 
@@ -76,12 +76,31 @@ _ACT = (_X.version.label("act_version"), _X.act, _X.by, _X.reason, _X.at, _X.due
 _LAST = sa.select(sa.func.max(_X.id)).where(_X.serial == sa.bindparam("serial")).correlate(None).scalar_subquery()
 
 
+_Z, _W = tables.certificates.c, tables.certificate_withdrawals.c
+_CERTIFICATE = (
+    _Z.number.label("certificate"), _W.by.label("w_by"), _W.by_key.label("w_key"), _W.reason.label("w_reason"),
+    _W.at.label("w_at"), _W.certification_id.label("w_act"),
+)  # fmt: skip
+
+
+def _with_certificate(joined: sa.FromClause) -> sa.Join:
+    """Join the newest certificate of each version of calibrations, and its withdrawal, where there are any."""
+    inner = tables.certificates.alias()
+    newest = (
+        sa.select(sa.func.max(inner.c.id))
+        .where(inner.c.serial == _C.serial, inner.c.version == _C.version)
+        .correlate(tables.calibrations)
+        .scalar_subquery()
+    )
+    known = joined.outerjoin(tables.certificates, _Z.id == newest)
+    return known.outerjoin(tables.certificate_withdrawals, _W.number == _Z.number)
+
+
 def _served_in_force() -> sa.Select[*tuple[Any, ...]]:
     of = sa.and_(_X.serial == _C.serial, _X.version == _C.version)
     return (
-        sa.select(_C.document, _C.hash, _X.id.label("act_id"), _X.id.label("last_id"), *_ACT)
-        .select_from(tables.calibrations)
-        .join(tables.certifications, of)
+        sa.select(_C.document, _C.hash, _X.id.label("act_id"), _X.id.label("last_id"), *_ACT, *_CERTIFICATE)
+        .select_from(_with_certificate(tables.calibrations.join(tables.certifications, of)))
         .where(_X.id == _LAST, _X.act == "certify")
     )
 
@@ -94,9 +113,8 @@ def _served_version() -> sa.Select[*tuple[Any, ...]]:
         .scalar_subquery()
     )
     return (
-        sa.select(_C.document, _C.hash, _X.id.label("act_id"), _LAST.label("last_id"), *_ACT)
-        .select_from(tables.calibrations)
-        .outerjoin(tables.certifications, _X.id == newest)
+        sa.select(_C.document, _C.hash, _X.id.label("act_id"), _LAST.label("last_id"), *_ACT, *_CERTIFICATE)
+        .select_from(_with_certificate(tables.calibrations.outerjoin(tables.certifications, _X.id == newest)))
         .where(_C.serial == sa.bindparam("serial"), _C.version == sa.bindparam("version"))
     )
 
@@ -122,7 +140,10 @@ class Certifications:
             return None
         act = None if row.act_id is None else _act(serial, row)
         in_force = act is not None and act.act == "certify" and row.act_id == row.last_id
-        return ServedCalibration(bytes(row.document), str(row.hash), act, in_force)
+        gone = None
+        if row.w_by is not None:
+            gone = Withdrawal(row.w_by, row.w_key, row.w_reason, row.w_at, row.w_act)
+        return ServedCalibration(bytes(row.document), str(row.hash), act, in_force, row.certificate, gone, row.act_id)
 
     def in_force(self) -> dict[str, CertificationRow]:
         """Return serial number -> the act that put its version in force, for every unit that has a version in force."""

@@ -5,9 +5,15 @@ from __future__ import annotations
 from labctl.store.schema.api_keys import api_keys
 from labctl.store.schema.audit import audit, audit_head
 from labctl.store.schema.benches import benches, leases
-from labctl.store.schema.calibrations import calibration_recordings, calibrations, certifications
+from labctl.store.schema.calibrations import (
+    calibration_fetches,
+    calibration_recordings,
+    calibrations,
+    certifications,
+    release_requests,
+)
 from labctl.store.schema.campaigns import campaigns, events, steps
-from labctl.store.schema.certificates import certificates
+from labctl.store.schema.certificates import certificate_withdrawals, certificates
 from labctl.store.schema.drafts import drafts
 from labctl.store.schema.manifests import block_digests, manifest_head, manifests
 from labctl.store.schema.recordings import data_set_means, data_sets, environment, recordings, sample_blocks
@@ -22,9 +28,11 @@ __all__ = [
     "audit_head",
     "benches",
     "block_digests",
+    "calibration_fetches",
     "calibration_recordings",
     "calibrations",
     "campaigns",
+    "certificate_withdrawals",
     "certificates",
     "certifications",
     "data_set_means",
@@ -37,6 +45,7 @@ __all__ = [
     "manifests",
     "metadata",
     "recordings",
+    "release_requests",
     "sample_blocks",
     "scheduled_starts",
     "start_events",

@@ -18,20 +18,22 @@ from labctl.store.sealing.seals import seal
 
 #: Blocks and records that are read at a time.
 AT_ONCE = 64
-
-
-#: The schema that the migration which calls `seal_all` makes.
+#: The schema at which the first manifests are made.
 SCHEMA = "0017"
 
 
 def seal_all(connection: sa.Connection) -> None:
-    """Seal every record that is at rest, a block at a time, in the transaction of `connection`."""
+    """Seal every record that is at rest, a block at a time, in the transaction of `connection`.
+
+    Tables and columns of later schemas are not there yet.
+    """
     at = SystemClock().utc()
     reason = f"sealed by migration on {at:%Y-%m-%d}"
     chain.begin(connection)
     _digest_blocks(connection)
     for kind in KINDS.values():
-        _seal_kind(connection, kind, at, reason)
+        if kind.since <= SCHEMA:
+            _seal_kind(connection, kind.as_of(SCHEMA), at, reason)
     if connection.execute(sa.select(tables.audit.c.id).limit(1)).first() is not None:
         chain.note_audit_row(connection, at)
     chain.finish(connection)
@@ -46,10 +48,10 @@ def _seal_kind(connection: sa.Connection, kind: Kind, at: datetime, reason: str)
 
 def _parts(connection: sa.Connection, kind: Kind, record: str) -> Parts:
     try:
-        return parts_of(connection, kind, record, schema=SCHEMA)
+        return parts_of(connection, kind, record)
     except StoreError as error:  # a block that is damaged already prevents no migration; the check reports it
         return {
-            **parts_of(connection, kind, record, blocks=False, schema=SCHEMA),
+            **parts_of(connection, kind, record, blocks=False),
             "readings": {"unreadable": str(error)},
         }
 

@@ -17,10 +17,56 @@ export interface paths {
          *
          *     The file changes only with its certification, which it contains. `X-Labctl-State` is in-force, superseded, revoked
          *     or not-certified, `X-Labctl-Due` the date until which it is valid; `Warning` says that it is overdue or revoked.
+         *     `X-Labctl-Withdrawn` says when, by whom and why the version was revoked or its certificate withdrawn. Who fetches is
+         *     recorded, by the name of the key.
          *     What a format does not carry of it, with its largest size, is in the header `X-Labctl-Lost`, one for each. JSON is a
          *     point read of tens of microseconds: it runs in the event loop, without a switch to a thread; others compute.
          */
         get: operations["calibration_api_units__serial__calibration_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/units/{serial}/calibration/state": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * State of a calibration that was fetched
+         * @description Whether the calibration with this hash is in force, superseded or revoked, and whether it was withdrawn.
+         *
+         *     For programs that keep a calibration file and ask from time to time; 404 for a hash that the unit does not have.
+         */
+        get: operations["calibration_state_api_units__serial__calibration_state_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/units/{serial}/calibrations/{version}/fetches": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Who fetched a version
+         * @description Every key by which the version was fetched, with the first and the last time, the newest fetch first.
+         *
+         *     They are those who have to be notified when the version is revoked.
+         */
+        get: operations["fetches_api_units__serial__calibrations__version__fetches_get"];
         put?: never;
         post?: never;
         delete?: never;
@@ -342,6 +388,26 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/units/{serial}/release-requests": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Versions that wait for a second person
+         * @description Versions that a first person asked to certify, and that a second one has to release, newest first.
+         */
+        get: operations["release_requests_api_units__serial__release_requests_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/units/{serial}/calibrations/{version}/certify": {
         parameters: {
             query?: never;
@@ -356,9 +422,32 @@ export interface paths {
          * @description Put a version in force: who, why, and when the next calibration is due. An older version again is a rollback.
          *
          *     The verdict is stored with the certification. 409 where there are objections, unless `override` is set and the
-         *     reason is a sentence. Needs an approver's key.
+         *     reason is a sentence. Where two persons have to agree ($LABCTL_TWO_PERSON_RELEASE): 202, nothing is in force until
+         *     another key releases it. Needs an approver's key.
          */
         post: operations["certify_api_units__serial__calibrations__version__certify_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/units/{serial}/calibrations/{version}/release": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Release a version as the second person
+         * @description Put in force what a first person asked to certify. What is known of the version is assessed again.
+         *
+         *     404 where nothing waits, 409 for the key that asked. Needs an approver's key.
+         */
+        post: operations["release_api_units__serial__calibrations__version__release_post"];
         delete?: never;
         options?: never;
         head?: never;
@@ -376,7 +465,9 @@ export interface paths {
         put?: never;
         /**
          * Revoke a version
-         * @description Revoke the version; the unit then has no certified calibration. Needs an approver's key.
+         * @description Revoke the version, and withdraw its certificates; the unit then has no certified calibration.
+         *
+         *     The answer names the certificates, and who fetched the version and has to be notified. Needs an approver's key.
          */
         post: operations["revoke_api_units__serial__calibrations__version__revoke_post"];
         delete?: never;
@@ -655,6 +746,52 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/certificates/state": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * State of a certificate
+         * @description Whether a certificate is valid, amended, superseded or withdrawn, since when and why, and what replaces it.
+         *
+         *     Needs no key: who knows both number and hash has the certificate. 404 where they do not belong together. It is what
+         *     the page behind the QR code shows.
+         */
+        get: operations["state_api_certificates_state_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/certificates/withdraw": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Withdraw a certificate
+         * @description Withdraw one certificate; the version stays in force. Its files are still served, with `X-Labctl-Withdrawn`.
+         *
+         *     Callers that fetch the calibration are notified too, until the version is certified again. 409 for a certificate
+         *     that is withdrawn already. Needs an approver's key.
+         */
+        post: operations["withdraw_api_certificates_withdraw_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/units/{serial}/certificates": {
         parameters: {
             query?: never;
@@ -664,7 +801,7 @@ export interface paths {
         };
         /**
          * Certificates of a unit
-         * @description Every certificate of the unit, newest first, with what it replaces and what replaces it.
+         * @description Every certificate of the unit, newest first, with its state, what it replaces and what replaces it.
          */
         get: operations["certificates_api_units__serial__certificates_get"];
         put?: never;
@@ -685,6 +822,9 @@ export interface paths {
         /**
          * A certificate as it was issued
          * @description The certificate as a file, always the same bytes; the ETag is the hash of its JSON and the format.
+         *
+         *     `X-Labctl-State` is valid, amended, superseded or withdrawn; `X-Labctl-Withdrawn` says when, by whom and why, and
+         *     `X-Labctl-Replaced-By` is the number of the certificate that replaces it.
          */
         get: operations["certificate_api_units__serial__calibrations__version__certificate_get"];
         put?: never;
@@ -2298,6 +2438,35 @@ export interface components {
             heldout_rms_dps: number | null;
         };
         /**
+         * CalibrationStateResponse
+         * @description State of a version whose file a program holds, found by the hash of its calibration.
+         */
+        CalibrationStateResponse: {
+            /** Serial */
+            serial: string;
+            /** Version */
+            version: number;
+            /** Calibration Hash */
+            calibration_hash: string;
+            /**
+             * State
+             * @enum {string}
+             */
+            state: "in-force" | "superseded" | "revoked" | "not-certified";
+            /**
+             * Due
+             * @description Date until which the certification is valid; null: no date.
+             */
+            due: string | null;
+            /** @description The version was revoked, or its certificate was withdrawn after the version was certified last. */
+            withdrawn: components["schemas"]["WithdrawnResponse"] | null;
+            /**
+             * In Force
+             * @description Version of the unit that is in force; null: none.
+             */
+            in_force: number | null;
+        };
+        /**
          * CampaignPlanResponse
          * @description The plan of a campaign, and how far it is.
          */
@@ -2708,7 +2877,7 @@ export interface components {
         };
         /**
          * CertificateResponse
-         * @description A certificate that was issued.
+         * @description A certificate that was issued, and its state now.
          */
         CertificateResponse: {
             /** Serial */
@@ -2724,6 +2893,11 @@ export interface components {
             issued_at: string;
             /** By */
             by: string;
+            /**
+             * By Key
+             * @description Name of the API key that acted; null: none did, the person's name is as typed.
+             */
+            by_key: string | null;
             /**
              * Hash
              * @description SHA-256 of the certificate in its JSON form.
@@ -2741,11 +2915,50 @@ export interface components {
             reason: string;
             /**
              * Replaced By
-             * @description Number of the later certificate that replaces this certificate; null: this certificate is valid.
+             * @description Number of the certificate of the same version that was issued in place of this one; null: none.
              */
             replaced_by: string | null;
             /** @description Who signed the PDF (PAdES) and the DCC (XAdES); null: they have no signature. */
             signed_by: components["schemas"]["SignatoryResponse"] | null;
+            /**
+             * Superseded By
+             * @description Number of the certificate of the version that was certified last; null: it is of this version.
+             */
+            superseded_by: string | null;
+            /**
+             * State
+             * @description withdrawn: by its number, or with its version; amended: another certificate of the version replaces it (`replaced_by`); superseded: another version was certified later and has a certificate (`superseded_by`); valid: none of these.
+             * @default valid
+             * @enum {string}
+             */
+            state: "valid" | "amended" | "superseded" | "withdrawn";
+            /**
+             * State Since
+             * @description When it came into this state.
+             */
+            state_since: string | null;
+            /**
+             * State Reason
+             * @description Why it is in this state; empty for a valid certificate.
+             * @default
+             */
+            state_reason: string;
+            /**
+             * State By
+             * @description Name of the person whose act brought it into this state.
+             * @default
+             */
+            state_by: string;
+            /**
+             * State By Key
+             * @description Name of the API key that acted; null: none did, the person's name is as typed.
+             */
+            state_by_key: string | null;
+            /**
+             * Valid Instead
+             * @description Number of the unit's valid certificate; null: it is this one, or none is valid.
+             */
+            valid_instead: string | null;
         };
         /**
          * CertificationResponse
@@ -2763,6 +2976,11 @@ export interface components {
             act: "certify" | "revoke";
             /** By */
             by: string;
+            /**
+             * By Key
+             * @description Name of the API key that acted; null: none did, the person's name is as typed.
+             */
+            by_key: string | null;
             /** Reason */
             reason: string;
             /**
@@ -2807,6 +3025,28 @@ export interface components {
             override: boolean | null;
             /** Objections */
             objections: components["schemas"]["Objection"][];
+            /**
+             * Released By
+             * @description The second person; null: none was needed.
+             */
+            released_by: string | null;
+            /**
+             * Released Key
+             * @description Name of the API key of the second person.
+             */
+            released_key: string | null;
+            /** Release Reason */
+            release_reason: string | null;
+            /**
+             * Withdrawn Certificates
+             * @description Only in the answer to a revocation: certificates that it withdrew.
+             */
+            withdrawn_certificates: string[];
+            /**
+             * Fetched By
+             * @description Only in the answer to a revocation: who has to be notified.
+             */
+            fetched_by: components["schemas"]["FetchResponse"][];
         };
         /**
          * CertifiedErrors
@@ -3676,7 +3916,7 @@ export interface components {
             compared: components["schemas"]["ComparedModel"][];
             /**
              * Smallest Heldout
-             * @description Model with the smallest held-out error; null: no model has a held-out error.
+             * @description Model with the smallest held-out error, or the first that is listed of those whose errors are not clearly larger; null: no model has a held-out error.
              */
             smallest_heldout: string | null;
             /**
@@ -4078,6 +4318,28 @@ export interface components {
             rms_dps: number;
             /** Z */
             z: number;
+        };
+        /**
+         * FetchResponse
+         * @description Who fetched a version over HTTP: one entry for each key, and one for all who sent none.
+         */
+        FetchResponse: {
+            /**
+             * Who
+             * @description Name of the API key; anonymous: no key was sent.
+             */
+            who: string;
+            /**
+             * First At
+             * Format: date-time
+             */
+            first_at: string;
+            /**
+             * Last At
+             * Format: date-time
+             * @description The last fetch; if the service was killed, up to an hour too early.
+             */
+            last_at: string;
         };
         /**
          * FindingResponse
@@ -5929,6 +6191,52 @@ export interface components {
             within_s: number | null;
         };
         /**
+         * PublicCertificate
+         * @description What the page behind the QR code of a certificate says: its state, and what to compare with the paper.
+         */
+        PublicCertificate: {
+            /** Number */
+            number: string;
+            /**
+             * Hash
+             * @description SHA-256 of the certificate in its JSON form.
+             */
+            hash: string;
+            /**
+             * Calibration Hash
+             * @description SHA-256 of the calibration, as printed on the certificate.
+             */
+            calibration_hash: string;
+            /** Serial */
+            serial: string;
+            /** Version */
+            version: number;
+            /** Laboratory */
+            laboratory: string;
+            /**
+             * Issued At
+             * Format: date-time
+             */
+            issued_at: string;
+            /**
+             * State
+             * @enum {string}
+             */
+            state: "valid" | "amended" | "superseded" | "withdrawn";
+            /** State Since */
+            state_since: string | null;
+            /** State Reason */
+            state_reason: string;
+            /** State By */
+            state_by: string;
+            /** Replaced By */
+            replaced_by: string | null;
+            /** Superseded By */
+            superseded_by: string | null;
+            /** Valid Instead */
+            valid_instead: string | null;
+        };
+        /**
          * PulseResponse
          * @description What a caller without a key may know: that the service answers, and its version.
          */
@@ -6135,6 +6443,50 @@ export interface components {
         ReferenceJson: {
             /** Temperature C */
             temperature_c: number;
+        };
+        /**
+         * ReleaseRequest
+         * @description Who releases, as the second person, what a first one asked to certify, and why.
+         */
+        ReleaseRequest: {
+            /** By */
+            by: string;
+            /** Reason */
+            reason: string;
+        };
+        /**
+         * ReleaseRequestResponse
+         * @description A version that waits for its release by a second person; it is not in force yet.
+         */
+        ReleaseRequestResponse: {
+            /** Serial */
+            serial: string;
+            /** Version */
+            version: number;
+            /** By */
+            by: string;
+            /**
+             * By Key
+             * @description Name of the API key of the first person; the second needs another one.
+             */
+            by_key: string;
+            /** Reason */
+            reason: string;
+            /**
+             * At
+             * Format: date-time
+             */
+            at: string;
+            /** Due Days */
+            due_days: number | null;
+            /** Override */
+            override: boolean;
+            /**
+             * Waits For Release
+             * @default true
+             * @constant
+             */
+            waits_for_release: true;
         };
         /**
          * Remainder
@@ -7634,6 +7986,47 @@ export interface components {
             experiment: string;
         };
         /**
+         * WithdrawRequest
+         * @description Withdraw a certificate; it stays withdrawn, and its bytes stay what they are.
+         */
+        WithdrawRequest: {
+            /**
+             * Number
+             * @description Number of the certificate.
+             */
+            number: string;
+            /**
+             * By
+             * @description Name of the person who withdraws it.
+             */
+            by: string;
+            /**
+             * Reason
+             * @description Why; the list, the file and the page say it.
+             */
+            reason: string;
+        };
+        /**
+         * WithdrawnResponse
+         * @description When, by whom and why a version or its certificate was withdrawn.
+         */
+        WithdrawnResponse: {
+            /**
+             * At
+             * Format: date-time
+             */
+            at: string;
+            /** By */
+            by: string;
+            /** Reason */
+            reason: string;
+            /**
+             * Certificate
+             * @description Number of the certificate; empty: the version was revoked.
+             */
+            certificate: string;
+        };
+        /**
          * WorstDataSet
          * @description A data set far from the model.
          */
@@ -7682,6 +8075,72 @@ export interface operations {
                     [name: string]: unknown;
                 };
                 content?: never;
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    calibration_state_api_units__serial__calibration_state_get: {
+        parameters: {
+            query: {
+                /** @description Hash of the calibration: `calibration_hash` of its file. */
+                calibration_hash: string;
+            };
+            header?: never;
+            path: {
+                serial: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CalibrationStateResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    fetches_api_units__serial__calibrations__version__fetches_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                serial: string;
+                version: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["FetchResponse"][];
+                };
             };
             /** @description Validation Error */
             422: {
@@ -8265,6 +8724,37 @@ export interface operations {
             };
         };
     };
+    release_requests_api_units__serial__release_requests_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                serial: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ReleaseRequestResponse"][];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
     certify_api_units__serial__calibrations__version__certify_post: {
         parameters: {
             query?: never;
@@ -8278,6 +8768,51 @@ export interface operations {
         requestBody: {
             content: {
                 "application/json": components["schemas"]["CertifyRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CertificationResponse"];
+                };
+            };
+            /** @description Accepted */
+            202: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["ReleaseRequestResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    release_api_units__serial__calibrations__version__release_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                serial: string;
+                version: number;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["ReleaseRequest"];
             };
         };
         responses: {
@@ -8686,6 +9221,73 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["CatalogueResponse"];
+                };
+            };
+        };
+    };
+    state_api_certificates_state_get: {
+        parameters: {
+            query: {
+                /** @description Number of the certificate. */
+                number: string;
+                /** @description Hash of the calibration as printed on the certificate, or its first 16 digits or more. */
+                calibration: string;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["PublicCertificate"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    withdraw_api_certificates_withdraw_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["WithdrawRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CertificateResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
                 };
             };
         };

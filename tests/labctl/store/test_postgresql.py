@@ -6,7 +6,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import Any
 
@@ -15,12 +15,18 @@ import pytest
 import sqlalchemy as sa
 
 from labctl.errors import DatabaseUnreachable, StoreError
+from labctl.services.calibrations.certification import revoke
+from labctl.services.calibrations.served import calibration_file
 from labctl.services.campaigns.execution import run_here
+from labctl.services.certificates.issue import issue
+from labctl.services.certificates.states import list_certificates
 from labctl.services.schemas.campaigns import StartRequest
-from labctl.store import Store, open_store
+from labctl.services.schemas.certification import RevokeRequest
+from labctl.store import FetchRow, NewReleaseRequest, Release, Store, check, open_store
 from labctl.store.connection import postgresql_server
 from labctl.store.connection.database import Database
 from labctl.store.schema import tables
+from tests.helpers import certificates
 from tests.helpers.postgresql import Cluster, running_cluster
 
 pytestmark = pytest.mark.timeout(300)
@@ -232,3 +238,26 @@ def test_a_writer_that_hangs_is_told_and_then_ended_by_the_server(url: str, monk
     assert subjects(patient) == ["row 2"]
     for store in (hasty, patient, hanging):
         store.close()
+
+
+def test_the_life_of_a_certificate_is_the_same_on_a_server(url: str) -> None:
+    with open_store(url, write=True) as store:
+        certificates.add_version(store)
+        number = issue(store, certificates.SERIAL, 1, certificates.request(), AT).number
+        for last_s in (5, 1):
+            row = FetchRow(certificates.SERIAL, 1, "robot", AT, AT + timedelta(seconds=last_s))
+            store.fetches.record([row])
+        answer = revoke(store, certificates.SERIAL, 1, RevokeRequest(by="Rita", reason="was dropped"), AT)
+        assert answer.withdrawn_certificates == [number]
+        assert [each.last_at for each in answer.fetched_by] == [AT + timedelta(seconds=5)]
+        (row_of_list,) = list_certificates(store, certificates.SERIAL)
+        assert (row_of_list.state, row_of_list.state_reason) == ("withdrawn", "was dropped")
+        assert calibration_file(store, certificates.SERIAL, 1, "json").withdrawn is not None
+        new = NewReleaseRequest(certificates.SERIAL, 1, "Ada", "ada", "again", AT, 30, override=True)
+        asked = store.release_requests.add(new)
+        assert store.release_requests.waiting(certificates.SERIAL) == [asked]
+        second = Release("Bob", "bob", "checked", asked.id)
+        store.calibrations.certify(certificates.SERIAL, 1, "certify", by="Ada", reason="r", at=AT, release=second)
+        assert store.release_requests.waiting(certificates.SERIAL) == []
+        assert store.calibrations.history(certificates.SERIAL)[0].release == second
+    assert check(url).findings == ()

@@ -1,18 +1,40 @@
-"""`labctl certificate`: issue the certificate of a version, or write the one that was issued."""
+"""`labctl certificate`: issue the certificate of a version, or write the one that was issued; withdraw one."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import Database, Json, Serial
-from labctl.cli.output import console, print_json
+from labctl.cli.output import console, print_json, stderr
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.documents.certificates import CertificateOrder
+    from labctl.services.schemas.documents.certificates import CertificateOrder, CertificateResponse
+
+#: The command that is meant where none is named.
+USUAL = "issue"
+
+
+class _IssueUnlessNamed(TyperGroup):
+    """Takes `labctl certificate SERIAL ...` for `labctl certificate issue SERIAL ...`."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Put the usual command in front of arguments that begin with none, and do not ask for help alone."""
+        if args and args[0] not in (*self.commands, "--help"):
+            args = [USUAL, *args]
+        return super().parse_args(ctx, args)
+
+
+app = typer.Typer(
+    cls=_IssueUnlessNamed,
+    no_args_is_help=True,
+    help="Issue a certificate, or withdraw one. `labctl certificate SERIAL --out FILE` is short for "
+    "`labctl certificate issue SERIAL --out FILE`.",
+)
 
 Order = Annotated[
     Path | None,
@@ -41,7 +63,8 @@ Amend = Annotated[
 ]
 
 
-def certificate(
+@app.command(USUAL)
+def issue(
     serial: Serial,
     out: Annotated[
         Path,
@@ -82,11 +105,55 @@ def certificate(
             out.write_bytes(certificate_file(store, serial, number, chosen, answer.number).content)
     if as_json:
         print_json(answer)
+        _say_state(answer)
         return
     issued = f"issued {answer.issued_at:%Y-%m-%d} by {answer.by}"
     issued += f", replaces {answer.replaces}" if answer.replaces else ""
     issued += f", signed by {answer.signed_by.subject}" if answer.signed_by else ""
     console.print(f"certificate {answer.number} of {serial} version {number}, {issued} -> {out}", markup=False)
+    _say_state(answer)
+
+
+@app.command("withdraw")
+def withdraw(
+    number: Annotated[str, typer.Argument(metavar="NUMBER", help="Number of the certificate.")],
+    reason: Annotated[
+        str, typer.Option("--reason", metavar="TEXT", help="Why; the list, the served file and the page say it.")
+    ],
+    by: Annotated[
+        str | None,
+        typer.Option(
+            "--by", metavar="NAME", help="Name of the person who withdraws it; default: the user who is logged in."
+        ),
+    ] = None,
+    as_json: Json = False,
+    database: Database = None,
+) -> None:
+    """Withdraw a certificate. Its files stay as they were issued; the list, the page behind its QR code and the headers
+    of HTTP say that it is withdrawn. `labctl revoke` withdraws every certificate of a version."""
+    from labctl.acting_user import actor
+    from labctl.cli.printing.certificates import state_text
+    from labctl.services.commands.open import execute
+    from labctl.services.commands.registry import WITHDRAW_CERTIFICATE
+    from labctl.services.schemas.documents.certificates import WithdrawRequest
+
+    with one_clear_line():
+        request = WithdrawRequest(number=number, by=by or actor().name, reason=reason)
+        answer = execute(database, WITHDRAW_CERTIFICATE, request)
+    if as_json:
+        print_json(answer)
+        return
+    said = f"certificate {answer.number} of {answer.serial} version {answer.version} is {state_text(answer)}"
+    console.print(said, markup=False, soft_wrap=True)
+
+
+def _say_state(answer: CertificateResponse) -> None:
+    """Print on standard error that a certificate is not valid any more; its file cannot say so."""
+    from labctl.cli.printing.certificates import state_text
+
+    if answer.state != "valid":
+        said = f"labctl: certificate {answer.number} is {state_text(answer)}"
+        stderr.print(said, style="bold red", markup=False, soft_wrap=True)
 
 
 def read_order(path: Path | None) -> CertificateOrder:

@@ -29,8 +29,9 @@ REGISTER = {
 
 @app.command("list")
 def certificates(serial: Serial, as_json: Json = False, database: Database = None) -> None:
-    """List the certificates of a unit, newest first, with what replaces them and who signed them."""
-    from labctl.services.certificates.served import list_certificates
+    """List the certificates of a unit, newest first, with the state of each: valid, amended, superseded, withdrawn."""
+    from labctl.cli.printing.certificates import list_line
+    from labctl.services.certificates.states import list_certificates
     from labctl.services.commands.open import open_readonly
 
     with one_clear_line(), open_readonly(database) as store:
@@ -39,11 +40,7 @@ def certificates(serial: Serial, as_json: Json = False, database: Database = Non
         print_json(rows)
         return
     for row in rows:
-        said = f"{row.number}  version {row.version}, issued {row.issued_at:%Y-%m-%d} by {row.by}"
-        said += f", signed by {row.signed_by.subject}" if row.signed_by else ""
-        said += f", replaces {row.replaces}: {row.reason}" if row.replaces else ""
-        said += f"; replaced by {row.replaced_by}" if row.replaced_by else ""
-        console.print(said, markup=False)
+        console.print(list_line(row), markup=False, soft_wrap=True)
 
 
 @app.command("verify")
@@ -79,10 +76,12 @@ def verify(
 
 
 def _print(file: Path, answer: VerifiedFileResponse) -> None:
+    from labctl.cli.printing.certificates import state_text
+
     number = f"certificate {answer.number}" if answer.number else "a file without a certificate's number"
     console.print(f"{file}: {number}, {REGISTER[answer.in_register]}", markup=False, soft_wrap=True)
-    if answer.certificate is not None and answer.certificate.replaced_by:
-        console.print(f"replaced by {answer.certificate.replaced_by}", markup=False, soft_wrap=True)
+    if answer.certificate is not None and answer.certificate.state != "valid":
+        console.print(state_text(answer.certificate), markup=False, soft_wrap=True)
     for each in answer.signatures:
         console.print(_signature(each), markup=False, soft_wrap=True)
     if not answer.signatures:

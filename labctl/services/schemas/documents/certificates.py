@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from datetime import date, datetime
+from typing import Literal
 
 from pydantic import Field
 
 from instruments.laboratory import LINE, Laboratory
 from labctl.certificates.document import Customer, DecisionRule, Use
-from labctl.services.schemas.base import Request, ResponseModel
+from labctl.services.schemas.base import BY_KEY, Request, ResponseModel
 
 TEXT = 2000
+CertificateState = Literal["valid", "amended", "superseded", "withdrawn"]
 
 
 class OrderedItem(Request):
@@ -106,14 +108,23 @@ class SignatoryResponse(ResponseModel):
     fingerprint: str = Field(description="SHA-256 of the certificate (X.509) in DER form.")
 
 
+class WithdrawRequest(Request):
+    """Withdraw a certificate; it stays withdrawn, and its bytes stay what they are."""
+
+    number: str = Field(min_length=1, max_length=100, pattern=LINE, description="Number of the certificate.")
+    by: str = Field(min_length=1, max_length=200, pattern=LINE, description="Name of the person who withdraws it.")
+    reason: str = Field(min_length=1, max_length=TEXT, description="Why; the list, the file and the page say it.")
+
+
 class CertificateResponse(ResponseModel):
-    """A certificate that was issued."""
+    """A certificate that was issued, and its state now."""
 
     serial: str
     version: int
     number: str
     issued_at: datetime
     by: str
+    by_key: str | None = Field(default=None, description=BY_KEY)
     hash: str = Field(description="SHA-256 of the certificate in its JSON form.")
     replaces: str | None = Field(
         description="Number of the earlier certificate that this certificate replaces; null: none."
@@ -121,8 +132,44 @@ class CertificateResponse(ResponseModel):
     reason: str = Field(description="Why this certificate replaces an earlier one; empty: it replaces none.")
     replaced_by: str | None = Field(
         default=None,
-        description="Number of the later certificate that replaces this certificate; null: this certificate is valid.",
+        description="Number of the certificate of the same version that was issued in place of this one; null: none.",
     )
     signed_by: SignatoryResponse | None = Field(
         default=None, description="Who signed the PDF (PAdES) and the DCC (XAdES); null: they have no signature."
     )
+    superseded_by: str | None = Field(
+        default=None,
+        description="Number of the certificate of the version that was certified last; null: it is of this version.",
+    )
+    state: CertificateState = Field(
+        default="valid",
+        description="withdrawn: by its number, or with its version; amended: another certificate of the version "
+        "replaces it (`replaced_by`); superseded: another version was certified later and has a certificate "
+        "(`superseded_by`); valid: none of these.",
+    )
+    state_since: datetime | None = Field(default=None, description="When it came into this state.")
+    state_reason: str = Field(default="", description="Why it is in this state; empty for a valid certificate.")
+    state_by: str = Field(default="", description="Name of the person whose act brought it into this state.")
+    state_by_key: str | None = Field(default=None, description=BY_KEY)
+    valid_instead: str | None = Field(
+        default=None, description="Number of the unit's valid certificate; null: it is this one, or none is valid."
+    )
+
+
+class PublicCertificate(ResponseModel):
+    """What the page behind the QR code of a certificate says: its state, and what to compare with the paper."""
+
+    number: str
+    hash: str = Field(description="SHA-256 of the certificate in its JSON form.")
+    calibration_hash: str = Field(description="SHA-256 of the calibration, as printed on the certificate.")
+    serial: str
+    version: int
+    laboratory: str
+    issued_at: datetime
+    state: CertificateState
+    state_since: datetime | None
+    state_reason: str
+    state_by: str
+    replaced_by: str | None
+    superseded_by: str | None
+    valid_instead: str | None

@@ -3,19 +3,22 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Any
 
 import sqlalchemy as sa
 from sqlalchemy import exc
 
-from labctl.errors import Conflict
+from labctl.errors import Conflict, NotFound
 from labctl.json_types import JsonDocument
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.manifests.contents import CERTIFICATE
+from labctl.store.records import Withdrawal
 from labctl.store.repositories.audit import append
+from labctl.store.repositories.documents.withdrawals import withdraw
 from labctl.store.schema import tables
 from labctl.store.sealing.seals import seal
 
@@ -33,6 +36,8 @@ class CertificateRow:
     at: datetime
     hash: str
     order: JsonDocument
+    by_key: str | None = None  #: name of the API key that issued it; None: `by` is as typed
+    withdrawal: Withdrawal | None = None
     signed_by: JsonDocument | None = None  #: who signed PDF and DCC, as the document says; None: no signature
 
 
@@ -43,6 +48,14 @@ class CertificateForms:
     document: bytes
     xml: bytes
     pdf: bytes
+
+
+_W = tables.certificate_withdrawals.c
+_WITHDRAWAL = (_W.by, _W.by_key, _W.reason, _W.at, _W.certification_id)
+
+
+def _withdrawal(columns: Sequence[Any]) -> Withdrawal | None:
+    return None if columns[0] is None else Withdrawal(*columns)
 
 
 class Certificates:
@@ -67,7 +80,7 @@ class Certificates:
         values = {
             "number": row.number, "serial": row.serial, "version": row.version, "replaces": row.replaces,
             "reason": row.reason, "by": row.by, "at": row.at, "hash": row.hash, "order": dict(row.order),
-            "document": forms.document, "xml": forms.xml, "pdf": forms.pdf,
+            "document": forms.document, "xml": forms.xml, "pdf": forms.pdf, "by_key": row.by_key,
         }  # fmt: skip
         detail: dict[str, Any] = {
             "number": row.number, "hash": row.hash, "replaces": row.replaces, "reason": row.reason, "by": row.by,
@@ -76,7 +89,14 @@ class Certificates:
             with self._database.writing() as connection:
                 c = tables.certificates.c
                 number = connection.scalar(sa.insert(tables.certificates).values(**values).returning(c.id))
-                append(connection, row.at, "certificate", f"{row.serial} version {row.version}", detail, who=row.by)
+                append(
+                    connection,
+                    row.at,
+                    "certificate",
+                    f"{row.serial} version {row.version}",
+                    detail,
+                    who=row.by_key or row.by,
+                )
                 seal(connection, (CERTIFICATE.name, str(number)), row.at, "issued")
         except exc.IntegrityError as error:
             raise Conflict(
@@ -85,17 +105,52 @@ class Certificates:
             ) from error
         return row
 
+    @transaction
+    def withdraw(self, number: str, said: Withdrawal) -> CertificateRow:
+        """Withdraw one certificate; its version stays in force. Raises NotFound, Conflict where it is withdrawn."""
+        row = self.get(number)
+        again = Conflict(
+            f"certificate {number} is withdrawn already; `labctl certificates {row.serial}` gives the reason"
+        )
+        if row.withdrawal is not None:
+            raise again
+        detail: dict[str, Any] = {"number": number, "reason": said.reason, "by": said.by}
+        try:
+            with self._database.writing() as connection:
+                subject = f"{row.serial} version {row.version}"
+                append(connection, said.at, "certificate withdraw", subject, detail, who=said.by_key or said.by)
+                x = tables.certifications.c
+                last = sa.select(sa.func.max(x.id)).where(x.serial == row.serial, x.version == row.version)
+                said = replace(said, act=connection.scalar(last))
+                withdraw(connection, number, said, said.at)
+        except exc.IntegrityError as error:
+            raise again from error
+        return replace(row, withdrawal=said)
+
     def of_unit(self, serial: str) -> list[CertificateRow]:
         """Return every certificate of a unit, newest first."""
-        c = tables.certificates.c
-        with self._database.reading() as connection:
-            return [_row(row) for row in connection.execute(_ROWS.where(c.serial == serial).order_by(c.id.desc()))]
+        return self._rows(tables.certificates.c.serial == serial)
 
     def of_number(self, number: str) -> CertificateRow | None:
         """Return the certificate of a number; None: none has it."""
+        return next(iter(self._rows(tables.certificates.c.number == number)), None)
+
+    def get(self, number: str) -> CertificateRow:
+        """Return a certificate by its number. Raises NotFound."""
+        if (row := self.of_number(number)) is None:
+            raise NotFound(
+                f"there is no certificate {number!r} in this database; `labctl certificates SERIAL` lists those of a "
+                "unit"
+            )
+        return row
+
+    def _rows(self, which: sa.ColumnElement[bool]) -> list[CertificateRow]:
+        c, w = tables.certificates.c, tables.certificate_withdrawals.c
+        joined = tables.certificates.outerjoin(tables.certificate_withdrawals, w.number == c.number)
+        columns = (c.number, c.serial, c.version, c.replaces, c.reason, c.by, c.at, c.hash, c.order, c.by_key)
+        query = sa.select(*columns, c.document, *_WITHDRAWAL).select_from(joined).where(which).order_by(c.id.desc())
         with self._database.reading() as connection:
-            row = connection.execute(_ROWS.where(tables.certificates.c.number == number)).first()
-        return None if row is None else _row(row)
+            return [_row(row) for row in connection.execute(query).all()]
 
     def newest(self, serial: str, version: int) -> CertificateRow | None:
         """Return the certificate of a version that none replaces; None: none was issued."""
@@ -109,13 +164,7 @@ class Certificates:
         return CertificateForms(bytes(row.document), bytes(row.xml), bytes(row.pdf))
 
 
-_C = tables.certificates.c
-_ROWS = sa.select(
-    _C.number, _C.serial, _C.version, _C.replaces, _C.reason, _C.by, _C.at, _C.hash, _C.order, _C.document
-)  # fmt: skip
-
-
-def _row(found: sa.Row[*tuple[Any, ...]]) -> CertificateRow:
-    number, serial, version, replaces, reason, by, at, digest, order, document = found
+def _row(found: Sequence[Any]) -> CertificateRow:
+    own, document = found[: -len(_WITHDRAWAL) - 1], found[-len(_WITHDRAWAL) - 1]
     signed_by = json.loads(bytes(document)).get("signed_by")
-    return CertificateRow(number, serial, version, replaces, reason, by, at, digest, order, signed_by)
+    return replace(CertificateRow(*own), withdrawal=_withdrawal(found[-len(_WITHDRAWAL) :]), signed_by=signed_by)

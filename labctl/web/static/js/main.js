@@ -49,6 +49,7 @@ route(
   "/noise",
   withPlots(() => import("./pages/noise.js")),
 );
+route("/certificates", () => import("./pages/certificate.js"));
 route("/effects", () => import("./pages/effects.js"));
 route(
   "/effects/:id",

@@ -17,9 +17,16 @@ import {
 import { draftsCard } from "../campaigns/drafts.js";
 import { query, updateQuery } from "../core/router.js";
 import { ladderFigure } from "../explore/error_ladder.js";
-import { askCertification, askRevocation, certificationTable } from "../unit/certification.js";
+import {
+  askCertification,
+  askRevocation,
+  certificationTable,
+  fetchTable,
+  waitingNotice,
+} from "../unit/certification.js";
 import { coefficients, comparison } from "../unit/coefficients.js";
 import { certificateFiles } from "../unit/certificate.js";
+import { certificateTable } from "../unit/certificate_state.js";
 import { datasheetCard } from "../unit/datasheet.js";
 import { exportFiles } from "../unit/export_files.js";
 import { inForce } from "../unit/in_force.js";
@@ -34,11 +41,12 @@ import { versionFacts } from "../unit/version_facts.js";
 /** @param {PageContext} context */
 export async function page({ params, signal }) {
   const path = { serial: params.serial };
-  const [unit, rows, history, issued] = await Promise.all([
+  const [unit, rows, history, issued, waiting] = await Promise.all([
     get("/api/units/{serial}", { path, signal }),
     get("/api/units/{serial}/calibrations", { path, signal }),
     get("/api/units/{serial}/certifications", { path, signal }),
     get("/api/units/{serial}/certificates", { path, signal }),
+    get("/api/units/{serial}/release-requests", { path, signal }),
   ]);
   const force = history.find((act) => act.version === unit.certified_version && act.act === "certify");
   const explore = `/explore?unit=${encodeURIComponent(unit.serial)}`;
@@ -51,6 +59,7 @@ export async function page({ params, signal }) {
       h("a", { class: "button primary", href: explore }, "Explore"),
     ),
     h("section", { class: "card", "aria-label": "In force" }, inForce(unit, rows, force)),
+    waitingNotice(waiting),
     unit.draft && !unit.draft.certified ? draftsCard([unit.draft]) : null,
     rows.length
       ? [
@@ -63,6 +72,7 @@ export async function page({ params, signal }) {
           h("p", {}, "No calibration yet."),
           h("p", {}, h("a", { class: "button primary", href: explore }, "Fit a model")),
         ),
+    issued.length ? card("Certificates", certificateTable(issued)) : null,
     unit.recordings.length ? datasheetCard(unit.serial, signal) : null,
     h(
       "div",
@@ -140,6 +150,7 @@ function versions(unit, rows, issued, explore) {
               { class: "row tight", style: "gap: .2rem" },
               act(row),
               h("details", {}, h("summary", {}, "Files"), exportFiles(unit, row.version)),
+              fetchedBy(unit.serial, row.version),
               certificateFiles(unit.serial, row.version, issued),
             ),
         },
@@ -148,6 +159,21 @@ function versions(unit, rows, issued, explore) {
       { label: "Calibrations", selected: (row) => row.certified },
     ),
   );
+}
+
+/**
+ * Who fetched a version, read when it is opened.
+ * @param {string} serial
+ * @param {number} version
+ */
+function fetchedBy(serial, version) {
+  const place = h("div");
+  const ontoggle = () =>
+    loadInto(place, "Reading who fetched it", async () => {
+      const rows = await get("/api/units/{serial}/calibrations/{version}/fetches", { path: { serial, version } });
+      return rows.length ? fetchTable(rows) : h("p", { class: "muted" }, "No fetch was recorded.");
+    });
+  return h("details", { ontoggle }, h("summary", {}, "Fetched by"), place);
 }
 
 /**

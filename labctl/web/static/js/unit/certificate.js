@@ -6,6 +6,7 @@ import { button, notice } from "../core/components.js";
 import { dialog } from "../core/dialog.js";
 import { Problem } from "../core/http/errors.js";
 import { show } from "../core/router.js";
+import { stateChip } from "./certificate_state.js";
 
 /** @import { Certificate } from "../../../types/api.js" */
 /** @import { Answers, Field } from "../../../types/pages.js" */
@@ -49,18 +50,23 @@ const FIELDS = [
 ];
 
 /**
- * The files of the valid certificate of a version, or the button that issues one.
+ * The files of the newest certificate of a version with its state, or the button that issues one.
  * @param {string} serial
  * @param {number} version
  * @param {readonly Certificate[]} issued newest first
  */
 export function certificateFiles(serial, version, issued) {
-  const valid = issued.find((each) => each.version === version);
-  if (!valid) return button("Issue certificate", () => askCertificate(serial, version), { kind: "tiny" });
+  const newest = issued.find((each) => each.version === version);
+  if (!newest) return button("Issue certificate", () => askCertificate(serial, version), { kind: "tiny" });
   return h(
     "div",
-    { class: "stack", role: "group", "aria-label": `Certificate ${valid.number}` },
-    h("span", { class: "muted small" }, `Certificate ${valid.number}`),
+    { class: "stack", role: "group", "aria-label": `Certificate ${newest.number}` },
+    h(
+      "span",
+      { class: "row tight" },
+      h("span", { class: "muted small" }, `Certificate ${newest.number}`),
+      newest.state === "valid" ? null : stateChip(newest.state),
+    ),
     h(
       "div",
       { class: "row tight" },
@@ -69,13 +75,13 @@ export function certificateFiles(serial, version, issued) {
           title,
           async () => {
             const path = "/api/units/{serial}/calibrations/{version}/certificate";
-            await download(path, `${valid.number}.${format}`, { path: { serial, version }, query: { format } });
+            await download(path, `${newest.number}.${format}`, { path: { serial, version }, query: { format } });
           },
           { kind: "tiny" },
         ),
       ),
     ),
-    button("Amend", () => askCertificate(serial, version, valid), { kind: "tiny quiet" }),
+    button("Amend", () => askCertificate(serial, version, newest), { kind: "tiny quiet" }),
   );
 }
 

@@ -3,11 +3,11 @@
 import { get, post } from "../core/http/api.js";
 import { h } from "../core/elements.js";
 import { instant, number } from "../core/format.js";
-import { chip, factList, notice, table } from "../core/components.js";
+import { button, chip, factList, notice, table, toast } from "../core/components.js";
 import { dialog } from "../core/dialog.js";
 import { show } from "../core/router.js";
 
-/** @import { Assessment, Certification } from "../../../types/api.js" */
+/** @import { Assessment, Certification, Fetch, ReleaseRequest } from "../../../types/api.js" */
 /** @import { Field } from "../../../types/pages.js" */
 
 /** @type {Record<string, [text: string, kind: string]>} */
@@ -98,16 +98,94 @@ export async function askRevocation(serial, version) {
       { name: "reason", label: "Why" },
     ],
     {
-      text: "The unit then has no calibration in force. The revocation is written to the audit trail.",
+      text: "The unit then has no calibration in force, and every certificate of the version is withdrawn for good. The revocation is written to the audit trail.",
       confirm: "Revoke",
       kind: "danger",
     },
   );
   if (!answers) return;
   const body = { by: answers.by, reason: answers.reason };
-  await post("/api/units/{serial}/calibrations/{version}/revoke", { path: { serial, version }, body });
+  const done = await post("/api/units/{serial}/calibrations/{version}/revoke", { path: { serial, version }, body });
+  await show();
+  const said = consequences(done);
+  if (said) toast("warn", `Version ${version} is revoked. ${said}`, { stays: true });
+}
+
+/**
+ * What a revocation withdrew, and who has to be notified; empty for nothing.
+ * @param {Certification} done
+ */
+const consequences = ({ withdrawn_certificates: certificates, fetched_by: fetches }) =>
+  [
+    certificates.length ? `Withdrawn: ${certificates.join(", ")}.` : "",
+    fetches.length ? `Notify those who fetched it: ${fetches.map((each) => each.who).join(", ")}.` : "",
+  ]
+    .filter(Boolean)
+    .join(" ");
+
+/** @param {readonly Fetch[]} rows */
+export const fetchTable = (rows) =>
+  table(
+    [
+      { title: "Key", cell: (row) => row.who },
+      { title: "First fetched", cell: (row) => instant(row.first_at) },
+      { title: "Last fetched", cell: (row) => instant(row.last_at) },
+    ],
+    rows,
+    { label: "Who fetched it" },
+  );
+
+/**
+ * Versions that wait for a second person, null without any.
+ * @param {readonly ReleaseRequest[]} waiting
+ */
+export const waitingNotice = (waiting) =>
+  waiting.length
+    ? notice(
+        "warn",
+        waiting.map((each) =>
+          h(
+            "div",
+            { class: "row" },
+            h(
+              "p",
+              {},
+              h("strong", {}, `Version ${each.version} waits for a second person. `),
+              `${each.by} (key ${each.by_key}): ${each.reason}`,
+            ),
+            button("Release", () => askRelease(each), { kind: "tiny" }),
+          ),
+        ),
+      )
+    : null;
+
+/** @param {ReleaseRequest} waiting */
+async function askRelease({ serial, version, by_key }) {
+  const fields = [
+    { name: "by", label: "Who" },
+    { name: "reason", label: "Why" },
+  ];
+  const answers = await dialog(`Release version ${version}`, fields, {
+    text: `You release it as the second person, with another key than ${by_key}. It is in force then.`,
+    confirm: "Release",
+  });
+  if (!answers) return;
+  const body = { by: answers.by, reason: answers.reason };
+  await post("/api/units/{serial}/calibrations/{version}/release", { path: { serial, version }, body });
   await show();
 }
+
+/**
+ * Who acted: the name, and the key of each person; without a key the name is as typed.
+ * @param {Certification} act
+ */
+export const persons = (act) =>
+  [
+    act.by_key ? `${act.by} (key ${act.by_key})` : act.by,
+    act.released_by ? `released by ${act.released_by} (key ${act.released_key})` : "",
+  ]
+    .filter(Boolean)
+    .join(", ");
 
 /**
  * What is known of a version: verdict, errors, objections.
@@ -162,7 +240,7 @@ export function certificationTable(history) {
                 act.override ? chip("overridden", "bad") : null,
               ),
       },
-      { title: "Who", cell: (act) => act.by },
+      { title: "Who", cell: persons },
       { title: "Why", prose: true, cell: (act) => act.reason },
     ],
     history,

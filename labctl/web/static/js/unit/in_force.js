@@ -4,7 +4,7 @@ import { h } from "../core/elements.js";
 import { day, instant, number } from "../core/format.js";
 import { factList, modelName, notice } from "../core/components.js";
 import { exportFiles } from "./export_files.js";
-import { overridden, verdictChip } from "./certification.js";
+import { overridden, persons, verdictChip } from "./certification.js";
 
 /** @import { CalibrationRow, Certification, Unit } from "../../../types/api.js" */
 
@@ -32,7 +32,7 @@ export function inForce(unit, rows, force) {
     { class: "stack" },
     factList([
       ["In force", `version ${unit.certified_version}`, null, row ? modelName(row.model) : null],
-      ["Certified by", force?.by ?? "–", null, force ? instant(force.at) : null],
+      ["Certified by", force ? persons(force) : "–", null, force ? instant(force.at) : null],
       [
         "Due",
         force?.due ? day(force.due) : "no date",

@@ -1,0 +1,25 @@
+"""Certificates in words: a line of the list, and the state of one."""
+
+from __future__ import annotations
+
+from labctl.services.schemas.documents.certificates import CertificateResponse
+
+
+def list_line(row: CertificateResponse) -> str:
+    """Return the line of a certificate in the list of a unit."""
+    said = f"{row.number}  version {row.version}, issued {row.issued_at:%Y-%m-%d} by {row.by}"
+    said += f", signed by {row.signed_by.subject}" if row.signed_by else ""
+    said += f", replaces {row.replaces}: {row.reason}" if row.replaces else ""
+    return f"{said}; {state_text(row)}"
+
+
+def state_text(answer: CertificateResponse) -> str:
+    """Return the state of a certificate in words."""
+    if answer.state == "valid" or answer.state_since is None:
+        return answer.state
+    why = f" ({answer.state_reason})" if answer.state_reason else ""
+    instead = answer.replaced_by or answer.superseded_by
+    return (
+        f"{answer.state} since {answer.state_since:%Y-%m-%d %H:%M} UTC by {answer.state_by}{why}"
+        f"{f'; replaced by {instead}' if instead else ''}"
+    )
