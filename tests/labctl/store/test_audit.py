@@ -262,6 +262,8 @@ ACTS: dict[str, tuple[str, Callable[[TestClient], Any]]] = {
 ELSEWHERE = {
     "/api/campaigns/{campaign}/drafts": "tests/labctl/services/drafts/test_drafts.py",
     "/api/units/{serial}/calibrations/{version}/certificate": "tests/labctl/services/certificates/test_issue.py",
+    "/api/certificates/withdraw": "tests/labctl/services/certificates/test_states.py",
+    "/api/units/{serial}/calibrations/{version}/release": "tests/labctl/services/test_release.py",
 }
 
 
