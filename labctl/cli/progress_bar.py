@@ -20,7 +20,7 @@ class CampaignProgress:
     def __init__(self, *, quiet: bool = False, title: str = "") -> None:
         self._title = title
         self._progress = Progress(
-            TextColumn("{task.description}"),
+            TextColumn("{task.description}", markup=False),
             BarColumn(bar_width=28),
             TaskProgressColumn(),
             TimeElapsedColumn(),

@@ -215,10 +215,10 @@ def compensate(
         print_json(answer)
         return
     if answer.warning:
-        stderr.print(f"labctl: {answer.warning}", style="bold red", markup=False)
-    console.print(f"{answer.rows} readings -> {target}", markup=False)
+        stderr.print(f"labctl: {answer.warning}", style="bold red")
+    console.print(f"{answer.rows} readings -> {target}")
     if answer.left_out:
-        console.print(answer.left_out, style="yellow", markup=False)
+        console.print(answer.left_out, style="yellow")
     if answer.outside:
         console.print(
             f"{answer.outside} rows lie outside the calibrated range and are flagged in column `outside`",

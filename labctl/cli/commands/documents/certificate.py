@@ -85,7 +85,7 @@ def certificate(
         return
     issued = f"issued {answer.issued_at:%Y-%m-%d} by {answer.by}"
     issued += f", replaces {answer.replaces}" if answer.replaces else ""
-    console.print(f"certificate {answer.number} of {serial} version {number}, {issued} -> {out}", markup=False)
+    console.print(f"certificate {answer.number} of {serial} version {number}, {issued} -> {out}")
 
 
 def certificates(serial: Serial, as_json: Json = False, database: Database = None) -> None:
@@ -102,7 +102,7 @@ def certificates(serial: Serial, as_json: Json = False, database: Database = Non
         said = f"{row.number}  version {row.version}, issued {row.issued_at:%Y-%m-%d} by {row.by}"
         said += f", replaces {row.replaces}: {row.reason}" if row.replaces else ""
         said += f"; replaced by {row.replaced_by}" if row.replaced_by else ""
-        console.print(said, markup=False)
+        console.print(said)
 
 
 def read_order(path: Path | None) -> CertificateOrder:

@@ -69,13 +69,12 @@ def _print(answer: ReproductionResponse) -> None:
         shown.add_row(number.place, number.quantity, number.unit, number.of, *_cells(number))
     console.print(shown)
     for line in answer.story:
-        console.print(line, markup=False)
+        console.print(line)
     for part in answer.missing:
-        console.print(f"not made: {part.what}: {part.why}; record {part.record}", style="yellow", markup=False)
+        console.print(f"not made: {part.what}: {part.why}; record {part.record}", style="yellow")
     console.print(
         f"{len(answer.figures)} figures, {len(answer.contradictions)} contradictions of the paper -> "
         + ", ".join(str(Path(answer.folder) / name) for name in answer.files),
-        markup=False,
     )
 
 
