@@ -1,4 +1,4 @@
-"""Starts that no service could begin in time: the limit of an entry, and the default of a bench that is not simulated."""
+"""Starts that no service could begin in time: the limit of an entry, and the default of a real bench."""
 
 from __future__ import annotations
 
