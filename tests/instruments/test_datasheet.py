@@ -87,7 +87,16 @@ def test_a_wrong_convention_of_a_bench_file_is_named(tmp_path: Path, stated: str
 
 
 @pytest.mark.parametrize(
-    "name", ["by-hand-sim", "servo-sim", "single-axis-sim", "triaxial-sim", "yang-paper-sim", "gyrostar-sim"]
+    "name",
+    [
+        "by-hand-sim",
+        "servo-sim",
+        "single-axis-sim",
+        "triaxial-sim",
+        "yang-paper-sim",
+        "ojeda-paper-sim",
+        "gyrostar-sim",
+    ],
 )
 def test_every_figure_of_a_shipped_bench_has_a_convention(name: str) -> None:
     units: tuple[GyroSettings, ...] = load_bench(name).gyros

@@ -63,10 +63,19 @@ def reproduce(
 
 def _print(answer: ReproductionResponse) -> None:
     shown = table(
-        answer.title, "place", "quantity", "unit", "made from", "printed", "reproduced", "difference", numbers=3
+        answer.title,
+        "place",
+        "quantity",
+        "unit",
+        "made from",
+        "origin",
+        "printed",
+        "reproduced",
+        "difference",
+        numbers=3,
     )
     for number in answer.numbers:
-        shown.add_row(number.place, number.quantity, number.unit, number.of, *_cells(number))
+        shown.add_row(number.place, number.quantity, number.unit, number.of, number.origin, *_cells(number))
     console.print(shown)
     for line in answer.story:
         console.print(line)
