@@ -144,7 +144,7 @@ def run(units: int = UNITS) -> str:
         cells = [f"{100 * np.mean(_inside(chosen, (place,))):.1f}" for place in PLACES]
         of_units = _inside(chosen, tuple(PLACES)).mean(axis=0)  # one unit has one power-on for all places
         middle, half = float(of_units.mean()), 1.96 * float(of_units.std(ddof=1)) / np.sqrt(units)
-        total = f"{100 * middle:.1f} ({100 * (middle - half):.1f} to {100 * (middle + half):.1f})"
+        total = f"{100 * middle:.1f} ({100 * (middle - half):.1f} to {min(100 * (middle + half), 100):.1f})"
         lines.append(f"| {row} | " + " | ".join([*cells, total]) + " |")
     return "\n".join(lines)
 
