@@ -17,6 +17,7 @@ from typing import Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, SerializeAsAny, model_validator
 
+from instruments.datasheet import Convention, undeclared
 from instruments.laboratory import Laboratory
 from instruments.standards import Standard
 from instruments.toml_documents import read_toml
@@ -95,6 +96,14 @@ class GyroSettings(DeviceSettings):
     max_c: float = 85.0
     sample_rate_hz: float | None = None
     datasheet: dict[str, float] = Field(default_factory=dict)
+    #: What the figures of `datasheet` are; a figure without an entry is what the maker's own sheet states.
+    datasheet_conventions: dict[str, Convention] = Field(default_factory=dict)
+
+    @model_validator(mode="after")
+    def _conventions_of_figures(self) -> GyroSettings:
+        if text := undeclared(self.datasheet, self.datasheet_conventions):
+            raise ValueError(f"datasheet_conventions: {text}")
+        return self
 
 
 class ReferenceSettings(DeviceSettings):

@@ -65,7 +65,7 @@ def made(rng: np.random.Generator, day: int, bias_dps: float, scale: float, quad
     }  # fmt: skip
     info = RecordingInfo(
         serial="J", axes=("z",), kind="points", started_at=STARTED + timedelta(days=day), technology="mems",
-        datasheet={"bias_stability_dps": 2 * DRIFT_DPS},
+        datasheet={"bias_stability_dps": DRIFT_DPS},
     )  # fmt: skip
     return Recording(info, columns)
 

@@ -110,7 +110,7 @@ def info_of(case: Case, stated: Statement) -> RecordingInfo:
     )
     return RecordingInfo(
         serial="VECTOR", axes=case.outputs, kind="points", started_at=datetime(2026, 1, 5, tzinfo=UTC),
-        max_rate_dps=case.plan.reach_dps, standards=standards, datasheet={"bias_stability_dps": 2 * stated.turn_on_dps},
+        max_rate_dps=case.plan.reach_dps, standards=standards, datasheet={"bias_stability_dps": stated.turn_on_dps},
     )  # fmt: skip
 
 

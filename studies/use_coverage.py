@@ -3,11 +3,14 @@
 Simulated units, each with its own laws of temperature and rate, are calibrated in three powered runs, or in one with a
 data sheet, by models that are adequate and by models that are not; on a later day, after another power-on and with
 another drift, the corrected rate is compared with the truth in the middle, at the edges and at a corner of the range.
+The data sheet states one figure by each of its conventions, and the power-ons are drawn from what that one says.
 """
 
 from __future__ import annotations
 
+import os
 from collections import defaultdict
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -15,6 +18,7 @@ from datetime import UTC, datetime
 import numpy as np
 from numpy.typing import NDArray
 
+from instruments.datasheet import Convention
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.estimation.fit import fit_preset
@@ -23,12 +27,20 @@ from labctl.fitting.models.presets import preset_for
 from labctl.fitting.uncertainty import rate_uncertainty, use_evidence
 from labctl.recording import Recording, RecordingInfo
 
-UNITS = 200
+UNITS = int(os.environ.get("LABCTL_STUDY_USE_UNITS", "200"))
+WORKERS = int(os.environ.get("LABCTL_STUDY_USE_WORKERS", "2"))
 #: The first seed: none of these units was used while the uncertainty was made.
 FIRST_SEED = 1_001
 RATES = np.array([-100, -80, -60, -40, -20, 0, 20, 40, 60, 80, 100], dtype=np.float64)
 WARM_C = np.arange(-20.0, 61.0, 10.0)
 WHITE_DPS, DRIFT_DPS, DRIFT_TAU_S, TURN_ON_DPS = 3e-4, 1e-3, 1800.0, 2e-3
+#: What the figure of a data sheet is drawn as: one error of a unit of figure 1.
+CONVENTIONS: dict[Convention, Callable[[np.random.Generator], float]] = {
+    "1 sigma": lambda rng: rng.normal(),
+    "maximum": lambda rng: rng.uniform(-1, 1),
+    "peak to peak": lambda rng: rng.uniform(-0.5, 0.5),
+    "typical": lambda rng: rng.normal() / 0.67449,  # half of the units are within the figure
+}
 ADEQUATE = ("bias", "bias_temperature:3", "scale_factor", "scale_factor_temperature:2", "scale_factor_odd")
 #: What the model leaves out of the unit's law.
 MODELS = {
@@ -70,7 +82,7 @@ def drift(t_s: NDArray[np.float64], rng: np.random.Generator) -> NDArray[np.floa
     return found
 
 
-def campaign(unit: Unit, runs: int, rng: np.random.Generator) -> Recording:
+def campaign(unit: Unit, runs: int, rng: np.random.Generator, convention: Convention = "1 sigma") -> Recording:
     """Return means of one minute over all temperatures and rates, the temperatures shared among powered runs."""
     parts = []
     for run in range(1, runs + 1):
@@ -78,7 +90,7 @@ def campaign(unit: Unit, runs: int, rng: np.random.Generator) -> Recording:
         warm = np.repeat(levels, len(RATES)) + rng.normal(0, 0.02, len(levels) * len(RATES))
         rate = np.concatenate([rng.permutation(RATES) for _ in levels])
         t_s = 75.0 * np.arange(len(rate)) + 5400.0 * np.repeat(np.arange(len(levels)), len(RATES)) + 1e6 * run
-        noise = rng.normal(0, WHITE_DPS, len(rate)) + drift(t_s, rng) + rng.normal(0, TURN_ON_DPS)
+        noise = rng.normal(0, WHITE_DPS, len(rate)) + drift(t_s, rng) + TURN_ON_DPS * CONVENTIONS[convention](rng)
         parts.append((t_s, np.full(len(rate), run), rate, warm, rate + unit.error_dps(rate, warm) + noise))
     t_s, number, rate, warm, output = (np.concatenate(column) for column in zip(*parts, strict=True))
     n = len(rate)
@@ -86,27 +98,30 @@ def campaign(unit: Unit, runs: int, rng: np.random.Generator) -> Recording:
         "dataset": np.arange(1, n + 1), "t_s": t_s, "run": number, "position": np.full(n, "z"), "table_rate_dps": rate,
         "temperature_c": warm, "gyro_z": output, "gyro_z_std": np.full(n, 10 * WHITE_DPS), "n": np.full(n, 100),
     }  # fmt: skip
-    sheet = {"bias_stability_dps": 2 * float(np.hypot(TURN_ON_DPS, 0.0))}
+    sheet = {"bias_stability_dps": TURN_ON_DPS}
     info = RecordingInfo(serial="USE", axes=("z",), kind="points", started_at=datetime(2026, 1, 5, tzinfo=UTC))
-    return Recording(info.model_copy(update={"datasheet": sheet}), columns)
+    stated = {"datasheet": sheet, "datasheet_conventions": {"bias_stability_dps": convention}}
+    return Recording(info.model_copy(update=stated), columns)
 
 
 def scores(seed: int) -> dict[tuple[str, str], list[float]]:
-    """Return (model and runs, place) -> errors on later days over U / 2, of one unit."""
+    """Return (model and case, place) -> errors on later days over U, of one unit."""
     rng = np.random.default_rng(seed)
     unit, found = Unit.drawn(rng), defaultdict(list)
-    for runs in (3, 1):
-        data = fit_data_of(campaign(unit, runs, rng))
-        later = rng.normal(0, TURN_ON_DPS) + rng.normal(0, DRIFT_DPS)
-        for name, effects in MODELS.items():
+    cases: list[tuple[int, Convention]] = [(3, "1 sigma"), *((1, convention) for convention in CONVENTIONS)]
+    for runs, convention in cases:
+        data = fit_data_of(campaign(unit, runs, rng, convention))
+        later = TURN_ON_DPS * CONVENTIONS[convention](rng) + rng.normal(0, DRIFT_DPS)
+        told = f"{runs} runs" if runs > 1 else f"data sheet: {convention}"
+        for name, effects in MODELS.items() if convention == "1 sigma" else (("adequate", ADEQUATE),):
             preset = preset_for(None, list(effects))
             fitted, evidence = fit_preset(data, preset).fitted, use_evidence(data, preset)
             for place, (rate, warm) in PLACES.items():
                 output = np.array([rate]) + unit.error_dps(np.array([rate]), np.array([warm])) + later
                 corrected = _corrected(fitted, output, warm)
-                claimed = rate_uncertainty(fitted, rate, warm, evidence=evidence, name="unit")["z"].combined_dps
+                claimed = rate_uncertainty(fitted, rate, warm, evidence=evidence, name="unit")["z"].expanded_dps
                 assert claimed is not None
-                found[f"{name}, {runs} run{'s' * (runs > 1)}", place].append((corrected - rate) / claimed)
+                found[f"{name}, {told}", place].append((corrected - rate) / claimed)
     return dict(found)
 
 
@@ -118,7 +133,7 @@ def _corrected(fitted: FittedModel, output: NDArray[np.float64], warm: float) ->
 def run(units: int = UNITS) -> str:
     """Return the share of errors within U, by model and place."""
     pooled: dict[tuple[str, str], list[float]] = defaultdict(list)
-    with ProcessPoolExecutor(max_workers=2) as pool:
+    with ProcessPoolExecutor(max_workers=WORKERS) as pool:
         for found in pool.map(scores, range(FIRST_SEED, FIRST_SEED + units), chunksize=5):
             for key, values in found.items():
                 pooled[key] += values
@@ -126,11 +141,14 @@ def run(units: int = UNITS) -> str:
     lines = [f"| {head} |", "| --- " * (len(PLACES) + 2) + "|"]
     for row in [*sorted({model for model, _ in pooled}), "all"]:
         chosen = {key: values for key, values in pooled.items() if row in {key[0], "all"}}
-        cells = [_share(chosen, (place,)) for place in PLACES]
-        lines.append(f"| {row} | " + " | ".join([*cells, _share(chosen, tuple(PLACES))]) + " |")
+        cells = [f"{100 * np.mean(_inside(chosen, (place,))):.1f}" for place in PLACES]
+        of_units = _inside(chosen, tuple(PLACES)).mean(axis=0)  # one unit has one power-on for all places
+        middle, half = float(of_units.mean()), 1.96 * float(of_units.std(ddof=1)) / np.sqrt(units)
+        total = f"{100 * middle:.1f} ({100 * (middle - half):.1f} to {min(100 * (middle + half), 100):.1f})"
+        lines.append(f"| {row} | " + " | ".join([*cells, total]) + " |")
     return "\n".join(lines)
 
 
-def _share(found: dict[tuple[str, str], list[float]], places: tuple[str, ...]) -> str:
-    scores_of = np.concatenate([values for (_, place), values in found.items() if place in places])
-    return f"{100 * np.mean(np.abs(scores_of) <= 2):.1f}"
+def _inside(found: dict[tuple[str, str], list[float]], places: tuple[str, ...]) -> NDArray[np.bool_]:
+    """Return whether the errors are within U, (cases, units)."""
+    return np.abs([values for (_, place), values in found.items() if place in places]) <= 1

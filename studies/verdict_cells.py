@@ -132,7 +132,7 @@ def _is_absorbed(case: Case) -> bool:
         assert before.white_var is not None
         white = before.white_var[axis]
         scale = np.repeat(np.sqrt(white)[None, :], len(before.output[axis]), axis=0)
-        drift = expected_drift_dps(before.info.technology or "", before.info.datasheet.get("bias_stability_dps"))
+        drift = expected_drift_dps(before.info.technology or "", before.info.stability_dps)
         difference = after.output[axis] - before.output[axis]
         z_squared += eliminate_base(design, difference, white, scale, [Noise(drift, 0.0, 0.0)])[0].chi2
     return bool(z_squared < LEAST_Z**2)

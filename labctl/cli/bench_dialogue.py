@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import typer
+from rich.text import Text
 
 from labctl.cli.output import console
 from labctl.services.benches.new_bench import parse_setting
@@ -30,6 +31,6 @@ def not_asking(section: str, key: str, what: str, proposal: object) -> object:  
 
 def print_search(line: FoundResponse) -> None:
     """Print what was found at one address."""
-    mark = "[green]found[/]  " if line.driver else "[yellow]nothing[/]"
-    console.print(f"{mark}  {line.address}  ", end="")
-    console.print(f"{line.text}  [{line.driver}]" if line.driver else line.text, markup=False, soft_wrap=True)
+    mark = Text("found  ", "green") if line.driver else Text("nothing", "yellow")
+    console.print(mark, f"  {line.address}  ", sep="", end="")
+    console.print(f"{line.text}  [{line.driver}]" if line.driver else line.text, soft_wrap=True)

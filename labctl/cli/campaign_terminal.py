@@ -30,4 +30,4 @@ def campaign_terminal(*, quiet: bool) -> OpenTerminal:
 
 def _say(text: str) -> None:
     """Print a remark on standard error, beside the answer."""
-    stderr.print(f"labctl: {text}", markup=False)
+    stderr.print(f"labctl: {text}")

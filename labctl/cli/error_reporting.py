@@ -69,10 +69,10 @@ def _exit_with_all(error: BadFile) -> typer.Exit:
         return _exit(str(error), error.exit_status)
     found = _exit(f"{error.path}: {len(error.problems)} problems; nothing was imported:", error.exit_status)
     for problem in error.problems:
-        stderr.print(f"  - {' '.join(problem.split())}", markup=False)
+        stderr.print(f"  - {' '.join(problem.split())}")
     return found
 
 
 def _exit(text: str, status: int) -> typer.Exit:
-    stderr.print(f"labctl: {' '.join(text.split())}", markup=False)
+    stderr.print(f"labctl: {' '.join(text.split())}")
     return typer.Exit(status)

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
-from rich.markup import escape
 
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.output import console, stderr, table
@@ -115,28 +114,26 @@ def show(found: MappedFile) -> None:
     """Print what a log would become: its map, what was guessed, its first rows, and columns without use."""
     log = found.log
     word = "proposed map" if found.proposed else "map"
-    console.print(f"{found.table.path.name}: {found.title}, {found.table.rows} rows; {word}:", markup=False)
+    console.print(f"{found.table.path.name}: {found.title}, {found.table.rows} rows; {word}:")
     mapped = table("", "column of the recording", "from", "unit", "scale")
     for target, column in found.column_map.columns.items():
         raw = found.table.columns.get(str(column.source))
         unit = column.unit or (raw.unit if raw is not None else "")
-        mapped.add_row(
-            target, escape(str(column.source)), escape(unit) or "–", "" if column.scale is None else f"{column.scale:g}"
-        )
+        mapped.add_row(target, str(column.source), unit or "–", "" if column.scale is None else f"{column.scale:g}")
     console.print(mapped)
     for guess in found.guesses:
-        console.print(f"guessed: {guess}", markup=False, style="yellow")
+        console.print(f"guessed: {guess}", style="yellow")
     names = list(found.table.columns)[:SHOWN_COLUMNS]
-    rows = table("first rows", *(escape(name) for name in names))
+    rows = table("first rows", *(name for name in names))
     for row in found.table.shown_rows()[:SHOWN_ROWS]:
-        rows.add_row(*(escape(cell) for cell in row[: len(names)]))
+        rows.add_row(*(cell for cell in row[: len(names)]))
     console.print(rows)
     if log is not None:
         info = log.recording.info
         sets = len(set(log.recording.columns["dataset"].tolist()))
         console.print(
             f"serial {info.serial}; motion {log.motion}; data sets by {found.column_map.datasets.by}: {sets}; "
-            f"began {info.started_at:%Y-%m-%d %H:%M:%S} UTC", markup=False
+            f"began {info.started_at:%Y-%m-%d %H:%M:%S} UTC"
         )  # fmt: skip
         if log.unused:
-            console.print(f"not used: {', '.join(log.unused)}", markup=False)
+            console.print(f"not used: {', '.join(log.unused)}")

@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING
 from pydantic import BaseModel, JsonValue
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 if TYPE_CHECKING:
     from labctl.services.schemas.warnings import DataWarning
 
-#: Without a terminal, lines are not cut to its width.
-console = Console(highlight=False, width=None if sys.stdout.isatty() else 160)
-stderr = Console(stderr=True, highlight=False, soft_wrap=True)
+#: Without a terminal, lines are not cut to its width. Texts are printed as they are: a word in brackets is no markup.
+console = Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else 160)
+stderr = Console(stderr=True, highlight=False, markup=False, soft_wrap=True)
 
 
 #: A reader of standard error that takes nothing for so long is given up, s.
@@ -35,11 +36,16 @@ def give_up_blocked_stderr() -> None:
         os.close(nothing)
 
 
+def print_heading(name: str, rest: str = "") -> None:
+    """Print a line that begins with a name in bold."""
+    console.print(Text.assemble((name, "bold"), rest))
+
+
 def print_warnings(warnings: Iterable[DataWarning]) -> None:
     """Print the warnings of an answer, each on one line."""
     for warning in warnings:
         word = "wrong" if warning.severity == "certain" else "check"
-        console.print(f"{word}: {warning.text}", style="bold red", markup=False, soft_wrap=True)
+        console.print(f"{word}: {warning.text}", style="bold red", soft_wrap=True)
 
 
 def print_json(answer: BaseModel | Sequence[BaseModel] | Mapping[str, JsonValue], *, one_line: bool = False) -> None:

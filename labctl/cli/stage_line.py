@@ -27,7 +27,7 @@ def stage_line() -> Iterator[None]:
 
     def show(stage: str) -> None:
         clear()
-        stderr.print(f"{stage} ...", style="dim", end="", markup=False)
+        stderr.print(f"{stage} ...", style="dim", end="")
 
     try:
         with reporting_to(show):

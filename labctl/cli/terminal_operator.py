@@ -54,14 +54,13 @@ class TerminalOperator:
     def _put(operator: HumanOperator, prompt: Prompt, note: Callable[[str], None]) -> None:
         if sys.stdin.isatty():  # an Enter from before the question is no answer to it
             termios.tcflush(sys.stdin.fileno(), termios.TCIFLUSH)
-        stderr.print(f"{prompt.text}. {_how_to_answer(prompt)}", markup=False)
+        stderr.print(f"{prompt.text}. {_how_to_answer(prompt)}")
         line = sys.stdin.readline()
         if not line:  # end of input: no person is at the terminal
             limit = "" if prompt.within_s is None else f" within {prompt.within_s:g} s"
             stderr.print(
                 "labctl: the input of this terminal has ended, so no answer can be typed here; the "
                 f"campaign waits{limit}",
-                markup=False,
             )
             return
         try:
@@ -76,7 +75,7 @@ class TerminalOperator:
             said = "to be asked again" if again else f"cannot be done; {why}" if why else "done"
             note(f"{prompt.id}: {said}; {prompt.text}")
         except (StalePrompt, StoreError) as error:
-            stderr.print(f"labctl: {error}", markup=False)
+            stderr.print(f"labctl: {error}")
 
 
 def _how_to_answer(prompt: Prompt) -> str:
@@ -96,8 +95,8 @@ def ask_bench_clear(questions: Mapping[str, str]) -> str:
     termios.tcflush(sys.stdin.fileno(), termios.TCIFLUSH)  # an answer from before the question is none
     stderr.print("This bench is not simulated: the table turns and the chamber heats when the campaign starts.")
     for question in questions.values():
-        stderr.print(f"{question} Type yes, or anything else to stop.", markup=False)
+        stderr.print(f"{question} Type yes, or anything else to stop.")
         if sys.stdin.readline().strip().lower() not in {"yes", "y"}:
             return ""
-    stderr.print("Your name:", end=" ", markup=False)
+    stderr.print("Your name:", end=" ")
     return sys.stdin.readline().strip()

@@ -6,6 +6,7 @@ from typing import NotRequired
 
 from typing_extensions import TypedDict
 
+from instruments.datasheet import Convention
 from labctl.json_types.budget import BenchConditionsJson, UncertaintyJson
 from labctl.json_types.models import (
     AxisNoiseJson,
@@ -52,6 +53,8 @@ class AxisEvidenceJson(TypedDict):
     repeatability_dps: float | None
     repeatability_freedom: int | None
     repeatability_source: str
+    repeatability_convention: NotRequired[Convention]  #: of the figure of a data sheet
+    repeatability_text: NotRequired[str]  #: of a data sheet: its figure, the convention, and what follows from it
     across_dps: NotRequired[dict[str, list[float]]]  #: rates about the other body axes about which the unit was turned
     correlation: NotRequired[dict[str, float]]  #: of its residuals with those of the other outputs
 

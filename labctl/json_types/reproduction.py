@@ -52,6 +52,7 @@ class PaperNumber(TypedDict):
     reproduced: float | None
     difference: float | None
     why: str
+    origin: str  #: measured, simulated, built in or computed
 
 
 class PaperPage(TypedDict):

@@ -9,9 +9,21 @@ FIGURE_4_RATES_DPS = (60.0, 75.0, 90.0)
 #: Eq. 1: readings, and seconds, of a static bias.
 STATIC_READINGS, STATIC_S = 100, 10.0
 
+#: Middle of the temperatures of the paper, deg C.
+MIDDLE_C = 35.0
+
 _PRINTED = (
+    Printed("sheet_range", "Table I", "input rate, plus and minus", "deg/s", 100.0),
+    Printed("sheet_resolution", "Table I", "resolution", "deg/s", 0.004),
+    Printed("sheet_bit", "Table I", "scale per bit (printed in deg/s)", "deg", 0.000305),
+    Printed("sheet_nonlinearity", "Table I", "nonlinearity, RMS, of full scale", "%", 0.5),
+    Printed("sheet_scale_warm", "Table I", "scale factor over temperature, peak to peak", "%", 2.0),
+    Printed("sheet_stability", "Table I", "bias stability at constant temperature, 1 sigma", "deg/s", 0.002),
+    Printed("sheet_bias_warm", "Table I", "bias over temperature, peak to peak", "deg/s", 0.2),
+    Printed("sheet_repeatability", "Table I", "bias repeatability, peak to peak", "deg/s", 0.002),
     Printed("arw_rate", "Table I", "angle random walk", "(deg/h)/sqrt(Hz)", 5.0),
     Printed("arw_angle", "Table I", "the same angle random walk", "deg/sqrt(h)", 0.08),
+    Printed("sheet_bandwidth", "Table I", "bandwidth", "Hz", 100.0),
     Printed("readings", "Eq. 1", "readings of a static bias", "1", float(STATIC_READINGS)),
     Printed("bias_before", "Eq. 1", "static bias, mean of the output at rest", "deg/s", None),
     Printed("bias_after", "Eq. 15", "static bias after calibration", "deg/s", None),
@@ -38,6 +50,12 @@ _PRINTED = (
 )
 
 _CONTRADICTIONS = (
+    Contradiction(
+        "Table I",
+        "The scale is printed as 0.000305 deg/s per bit, but a resolution of 0.004 deg/s; 10 bits per second of "
+        "0.000305 deg are 0.00305 deg/s.",
+        "A bit is taken as an angle of 0.000305 deg; its rate at 10 readings per second is the resolution.",
+    ),
     Contradiction(
         "Eqs. 7 to 11",
         "p and q are the orders 3 and 2, and then the numbers of rates and temperatures, 11 and 11; every 10 deg/s "

@@ -15,7 +15,7 @@ from labctl.plots.theme import ACCENT, INK, SCALE, WARM, grid_of, place
 
 COLOURS = (ACCENT, WARM, "#3a9d6e", "#8a63c7", INK, "#b3242f")
 NONE = "–"
-HEAD = ("quantity", "unit", "printed", "made from", "reproduced", "difference", "why")
+HEAD = ("quantity", "unit", "printed", "made from", "origin", "reproduced", "difference", "why")
 #: Room for the names of the lines, above the panels.
 LEGEND_PX = 30
 #: Sizes of a measured point, of one in a map, and of a cell of a modelled map.
@@ -45,15 +45,13 @@ def _numbers(numbers: Sequence[PaperNumber]) -> Iterator[str]:
     for at in dict.fromkeys(number["place"] for number in numbers):
         rows = [
             (
-                n["quantity"], n["unit"], _said(n), n["of"], _number(n["reproduced"]), _number(n["difference"]),
-                n["why"],
+                n["quantity"], n["unit"], _said(n), n["of"], n["origin"], _number(n["reproduced"]),
+                _number(n["difference"]), n["why"],
             )
             for n in numbers if n["place"] == at
         ]  # fmt: skip
         yield f"<h2>{escape(at)}</h2>"
-        yield table_part(
-            ("quantity", "unit", "printed", "made from", "reproduced", "difference", "why"), rows, (1, 3, 6)
-        )
+        yield table_part(HEAD, rows, (1, 3, 4, 7))
 
 
 def _said(number: PaperNumber) -> str:

@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, model_validator
 
+from instruments.datasheet import Convention, DatasheetFigure, datasheet_figure, undeclared
 from instruments.standards import Standard
 
 Axis = Literal["x", "y", "z"]
@@ -85,10 +86,28 @@ class RecordingInfo(BaseModel):
     notes: str = ""
     technology: Literal["fog", "mems", "piezo"] | None = None
     datasheet: dict[str, float] = Field(default_factory=dict)
+    #: What the figures of `datasheet` are; a figure without an entry is what the maker's own sheet states.
+    datasheet_conventions: dict[str, Convention] = Field(default_factory=dict)
     output: dict[Axis, OutputUnit] = Field(default_factory=dict)
     #: Reference standards of the bench, as they were when the readings were taken.
     standards: tuple[Standard, ...] = ()
     thermometer: str = ""  #: the instrument that `temperature_c` is by; empty: the unit's own, or the chamber's
+
+    def datasheet_figure(self, name: str) -> DatasheetFigure | None:
+        """Return a figure of the data sheet with its convention; None where there is none."""
+        return datasheet_figure(name, self.datasheet, self.datasheet_conventions, self.model)
+
+    @property
+    def stability_dps(self) -> float | None:
+        """The bias stability by the data sheet as a standard deviation, deg/s; None where it is not known."""
+        figure = self.datasheet_figure("bias_stability_dps")
+        return None if figure is None else figure.u
+
+    @model_validator(mode="after")
+    def _conventions_of_figures(self) -> RecordingInfo:
+        if text := undeclared(self.datasheet, self.datasheet_conventions):
+            raise ValueError(f"datasheet_conventions: {text}")
+        return self
 
     @model_validator(mode="after")
     def _axes_once(self) -> RecordingInfo:

@@ -13,7 +13,7 @@ from labctl.services.benches.confirmation import describe_bench, describe_safe_s
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.stop_requests import NotHere
 from labctl.services.commands.service_control import NO_BENCH, ServiceControl
-from labctl.services.schedule.scheduler import Scheduler
+from labctl.services.schedule.scheduler import REAL_BENCH_LATE_LIMIT_S, Scheduler
 from labctl.services.schemas.benches import BenchDescription, StopResponse
 from labctl.services.schemas.campaigns import CampaignResponse
 from labctl.stop.client import not_stopped_text
@@ -34,7 +34,7 @@ class LocalBench:
     def __init__(self, store: Store, clock: Clock, runner: BenchRunner | None) -> None:
         self._store = store
         self.runner = runner
-        self.scheduler = None if runner is None else Scheduler(store, clock, runner, runner.bench.name)
+        self.scheduler = None if runner is None else _scheduler(store, clock, runner)
         self.control = ServiceControl(runner)
         self.stops = False
 
@@ -154,3 +154,9 @@ class LocalBench:
         if row is not None and row.unconfirmed:
             return BenchLeft(describe_bench(row), row.is_unconfirmed)
         return BenchLeft(describe_safe_state(bench, "") if runner.used else f"bench {bench} was not used")
+
+
+def _scheduler(store: Store, clock: Clock, runner: BenchRunner) -> Scheduler:
+    """Return the queue of a bench: on a real one, what was missed long ago does not begin by itself."""
+    limit_s = None if runner.bench.is_simulated else REAL_BENCH_LATE_LIMIT_S
+    return Scheduler(store, clock, runner, runner.bench.name, limit_s)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,16 +86,25 @@ YANG_RATES_DPS = np.array(
 YANG_K = np.array([[1.0005, 0.0188, 0.0012], [-0.0187, 1.0005, 5.2027e-4], [0.0011, 7.5133e-4, 1.0017]])
 YANG_B_DPS = np.array([-0.0303, -0.0435, -0.0261])
 YANG_LEFT_DPS = np.array([0.0931, 0.0957, 0.0263])
+#: Temperature of their traditional vector, which they do not print: the node of Table 1 below 25 deg C. Their B there,
+#: and by how much their own scale factors are higher there: K_g prints 1.001 for 1.0005 about x and 1.0001 for 1.0005
+#: about y; within that rounding, the root of the difference of the squares of Table 4 over the RMS of the rates.
+YANG_SINGLE_C = 20.0
+YANG_K_SINGLE = np.array([4.11e-4, -4.09e-4, 0.0])
+YANG_B_SINGLE_DPS = np.array([-0.0316, -0.0488, -0.0232])
+#: Their temperatures are those of the turntable; a little heat keeps one node clearly the nearest to 25 deg C.
+YANG_HEATING_C = 0.3
 
 
 def yang_paper(axes: tuple[str, ...], _: np.random.Generator) -> UnitTruth:
     """Make the unit of Yang et al. 2018: printed K and B, and a soft limit that leaves what they print after their fit.
 
-    How its scale factors and its bias change with temperature is not printed in numbers: lines and parabolas of a
-    usual size here.
+    How its scale factors and its bias change with temperature follows from the two columns of K_g: the traditional one
+    is of a single temperature, `YANG_SINGLE_C`. The curve of the bias is an assumption.
     """
     rows = ["xyz".index(axis) for axis in axes]
-    slope, tilt = np.array([2e-5, -3e-5, 4e-5]), np.array([4e-4, -3e-4, 2e-4])
+    apart_c = YANG_SINGLE_C - 25.0
+    slope, tilt = YANG_K_SINGLE / apart_c, (YANG_B_SINGLE_DPS - YANG_B_DPS) / apart_c
     curve = np.array([5e-6, -4e-6, 3e-6])
     cubes = YANG_RATES_DPS**3
     bent = cubes - _line(cubes) * YANG_RATES_DPS
@@ -115,7 +124,7 @@ def yang_paper(axes: tuple[str, ...], _: np.random.Generator) -> UnitTruth:
         del temperature_c
         return limit_dps * np.tanh(own_dps / limit_dps) - own_dps - line * own_dps
 
-    return UnitTruth(axes, gain, offset, bend, 0.01, 0.0015)
+    return UnitTruth(axes, gain, offset, bend, 0.01, 0.0015, self_heating_c=YANG_HEATING_C)
 
 
 def _line(values: Array) -> float:
@@ -148,6 +157,30 @@ def rd2100(axes: tuple[str, ...], rng: np.random.Generator) -> UnitTruth:
     return UnitTruth(axes, gain, offset, bend, 0.0014, 0.0011, self_heating_c=1.5)
 
 
+#: What Ojeda et al. 2000 show after compensation: an order of magnitude below the error before, Fig. 7, and less than
+#: 2 % of a turn, Fig. 9. Largest ripple, deg/s, its period, deg/s, and the rate below which it vanishes, deg/s.
+RIPPLE_DPS, RIPPLE_PERIOD_DPS, RIPPLE_FROM_DPS = 0.27, 37.0, 25.0
+
+
+def rd2100_paper(axes: tuple[str, ...], rng: np.random.Generator) -> UnitTruth:
+    """Make the RD2100 of Ojeda et al. 2000 with what its compensation left.
+
+    The paper does not say what that is: here a ripple over the rate that moves with temperature, as the demodulator of
+    an open-loop gyro makes it.
+    """
+    ideal = rd2100(axes, rng)
+    assert ideal.bend is not None
+    smooth = ideal.bend
+
+    def bend(own_dps: Array, temperature_c: Array) -> Array:
+        square = own_dps * own_dps
+        moved = 0.9 * (temperature_c[:, None] - 35.0) / 10.0
+        ripple = np.sin(2.0 * np.pi * own_dps / RIPPLE_PERIOD_DPS + moved)
+        return smooth(own_dps, temperature_c) + RIPPLE_DPS * ripple * square / (square + RIPPLE_FROM_DPS**2)
+
+    return replace(ideal, bend=bend)
+
+
 def gyrostar(axes: tuple[str, ...], rng: np.random.Generator) -> UnitTruth:
     """Make a Gyrostar ENV-05S like that of the Weiss report: its offset is the problem, and it warms itself."""
     lot = rng.normal(1.0, 0.05, 3)
@@ -176,6 +209,7 @@ PROFILES: dict[str, Callable[[tuple[str, ...], np.random.Generator], UnitTruth]]
     "mems-triaxial": mems_triaxial,
     "yang-paper": yang_paper,
     "rd2100": rd2100,
+    "rd2100-paper": rd2100_paper,
     "gyrostar": gyrostar,
 }
 

@@ -42,7 +42,7 @@ def list_(
         detail = ", ".join(f"{key} {value}" for key, value in answer.detail.items() if value is not None)
         when = f"{answer.at:%Y-%m-%d %H:%M:%S}"
         rows.add_row(str(answer.id), when, answer.who, answer.action, answer.subject, detail)
-    console.print(rows, markup=False)
+    console.print(rows)
 
 
 @app.command("verify")
@@ -68,8 +68,8 @@ def verify(
     if as_json:
         print_json(answer)
     elif answer.ok:
-        console.print(f"{answer.rows} rows, none changed; anchor {answer.anchor or 'none yet'}", markup=False)
+        console.print(f"{answer.rows} rows, none changed; anchor {answer.anchor or 'none yet'}")
     else:
-        stderr.print(f"labctl: audit trail: {answer.text}", markup=False)
+        stderr.print(f"labctl: audit trail: {answer.text}")
     if not answer.ok:
         raise typer.Exit(1)

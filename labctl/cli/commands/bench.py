@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from rich.text import Text
 
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import Database, Json
@@ -52,9 +53,9 @@ def ports(as_json: Json = False, database: Database = None) -> None:  # noqa: AR
     for port in found:
         adapter = f"USB adapter {port.adapter or 'without a serial number'} ({port.product})" if port.product else ""
         said = [f"now {port.device}" if port.device != port.path else "", adapter, port.trouble]
-        console.print(f"{port.path}  {'; '.join(filter(None, said))}", markup=False, soft_wrap=True)
+        console.print(f"{port.path}  {'; '.join(filter(None, said))}", soft_wrap=True)
     if not found:
-        console.print("this computer has no serial port: plug in the USB adapters", markup=False)
+        console.print("this computer has no serial port: plug in the USB adapters")
 
 
 Name = Annotated[
@@ -111,7 +112,7 @@ def new(
     if as_json:
         print_json(answer)
     else:
-        console.print(f"{answer.file} is written; check it: labctl bench check {answer.file}", markup=False)
+        console.print(f"{answer.file} is written; check it: labctl bench check {answer.file}")
 
 
 @app.command("wiggle")
@@ -127,14 +128,14 @@ def wiggle(
 
     say = stderr if as_json else console
     with one_clear_line():
-        answer = wiggle_test(bench, lambda line: say.print(line, markup=False, soft_wrap=True))
+        answer = wiggle_test(bench, lambda line: say.print(line, soft_wrap=True))
     if as_json:
         print_json(answer)
     else:
         for unit in answer.units:
-            mark = "[green]right[/]" if unit.ok else "[red]wrong[/]"
-            console.print(f"{mark}  {unit.unit:8} ", end="")
-            console.print(f"{unit.serial}: {unit.text}", markup=False, soft_wrap=True)
+            mark = Text("right", "green") if unit.ok else Text("wrong", "red")
+            console.print(mark, f"  {unit.unit:8} ", sep="", end="")
+            console.print(f"{unit.serial}: {unit.text}", soft_wrap=True)
     if not answer.ok:
         raise typer.Exit(1)
 
@@ -166,7 +167,7 @@ def status(as_json: Json = False, database: Database = None) -> None:
                     "bench, then run `labctl bench clear`",
                 )
             for line in filter(None, said if any(said) else ["the safe state is confirmed"]):
-                console.print(f"{bench.name:18} {line}", markup=False, soft_wrap=True)
+                console.print(f"{bench.name:18} {line}", soft_wrap=True)
     if any(bench.unconfirmed or bench.left for bench in benches):
         raise typer.Exit(1)
 
@@ -187,7 +188,7 @@ def clear(
 
     with one_clear_line():
         answer = execute(database, CLEAR_BENCH, ToBench(bench, ClearRequest(by=by, reason=reason)))
-    print_json(answer) if as_json else console.print(f"{answer.name}: the safe state is confirmed", markup=False)
+    print_json(answer) if as_json else console.print(f"{answer.name}: the safe state is confirmed")
 
 
 @app.command("list")
@@ -200,4 +201,4 @@ def list_(as_json: Json = False, database: Database = None) -> None:  # noqa: AR
         print_json(benches)
         return
     for bench in benches:
-        console.print(f"{bench.name:18} {bench.text}", markup=False)
+        console.print(f"{bench.name:18} {bench.text}")

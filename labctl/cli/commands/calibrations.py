@@ -196,7 +196,7 @@ def calibration(
             out.write_bytes(file.content)
     if file.withdrawn is not None:
         said = f"labctl: calibration of {file.what} must not be used: {file.withdrawn.text}"
-        stderr.print(said, style="bold red", markup=False, soft_wrap=True)
+        stderr.print(said, style="bold red", soft_wrap=True)
     for loss in file.losses:
         typer.echo(f"format {format_} cannot express: {loss.text}", err=True)
 
@@ -239,10 +239,10 @@ def compensate(
         print_json(answer)
         return
     if answer.warning:
-        stderr.print(f"labctl: {answer.warning}", style="bold red", markup=False)
-    console.print(f"{answer.rows} readings -> {target}", markup=False)
+        stderr.print(f"labctl: {answer.warning}", style="bold red")
+    console.print(f"{answer.rows} readings -> {target}")
     if answer.left_out:
-        console.print(answer.left_out, style="yellow", markup=False)
+        console.print(answer.left_out, style="yellow")
     if answer.outside:
         console.print(
             f"{answer.outside} rows lie outside the calibrated range and are flagged in column `outside`",

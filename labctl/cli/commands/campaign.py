@@ -63,7 +63,8 @@ LateLimit = Annotated[
     typer.Option(
         "--late-limit-s",
         metavar="S",
-        help="Skip a start that is more than S seconds late; 0 skips every missed start; default: no limit.",
+        help="Skip a start that is more than S seconds late; 0 skips every missed start; default: no limit on a "
+        "simulated bench; on a real bench 3600, without the time behind a running campaign.",
     ),
 ]
 ClearConfirmedBy = Annotated[
@@ -87,7 +88,7 @@ Hide = Annotated[
     ),
 ]
 NoFit = Annotated[
-    bool, typer.Option("--no-fit", help="Make no draft calibration, even if the recipe has a section [fit].")
+    bool, typer.Option("--no-fit", help=r"Make no draft calibration, even if the recipe has a section \[fit].")
 ]
 
 
@@ -140,10 +141,10 @@ def start(
     as_json: Json = False,
     database: Database = None,
 ) -> None:
-    """Run a recipe. A service that uses the database runs it on its bench; without one it runs in this terminal
+    r"""Run a recipe. A service that uses the database runs it on its bench; without one it runs in this terminal
     until it ends.
 
-    A recipe with [fit] ends in a draft: a calibration that is fitted, criticised and not certified.
+    A recipe with \[fit] ends in a draft: a calibration that is fitted, criticised and not certified.
     With --at or --cron it is added to the schedule, which only a service (`labctl serve`) carries out. On a bench
     that is not simulated a person has to confirm first that the bench is clear, or will be at that time.
     """

@@ -46,13 +46,13 @@ def watch(campaign: CampaignId = None, as_json: Json = False, database: Database
             progress.update(answer)
             if not as_json and answer.prompt is not None and answer.prompt.id != asked:
                 asked = answer.prompt.id
-                console.print(f"question {asked}: {answer.prompt.text}", style="yellow", markup=False)
+                console.print(f"question {asked}: {answer.prompt.text}", style="yellow")
             if not as_json and (text := turn_text(answer)) and text != turned:
                 turned = text
-                console.print(text, markup=False)
+                console.print(text)
             if not as_json and answer.last_error and answer.last_error != fault:
                 fault = answer.last_error
-                console.print(f"fault: {fault}", style="red", markup=False)
+                console.print(f"fault: {fault}", style="red")
             if not answer.active:
                 break
             clock.sleep(1.0)
@@ -133,7 +133,7 @@ def abort(
     from labctl.services.campaigns.stop_first import stop_first
 
     with one_clear_line():
-        stopped = stop_first(database, campaign, reason, say=lambda text: stderr.print(f"labctl: {text}", markup=False))
+        stopped = stop_first(database, campaign, reason, say=lambda text: stderr.print(f"labctl: {text}"))
         try:
             answer = _at_its_end(database, _recorded(database, campaign, reason, stopped is not None))
         except (StoreError, BenchSilent) as error:
@@ -242,7 +242,7 @@ def draft(
     elif answer.drafts:
         print_drafts(answer.drafts)
     else:
-        console.print(f"campaign {answer.campaign} has no draft: its recipe has no [fit]", markup=False)
+        console.print(f"campaign {answer.campaign} has no draft: its recipe has no [fit]")
     if any(each.state == "failed" for each in answer.drafts):
         raise typer.Exit(1)
 

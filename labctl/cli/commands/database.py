@@ -32,16 +32,15 @@ def backup(
     if as_json:
         print_json(answer)
     else:
-        console.print(f"{answer.file}: {answer.bytes} bytes, sha256 {answer.sha256}", markup=False, soft_wrap=True)
+        console.print(f"{answer.file}: {answer.bytes} bytes, sha256 {answer.sha256}", soft_wrap=True)
         if answer.anchor:
-            console.print(f"anchor of its manifests: {answer.anchor}", markup=False, soft_wrap=True)
+            console.print(f"anchor of its manifests: {answer.anchor}", soft_wrap=True)
     if answer.remark:
-        stderr.print(f"labctl: {answer.remark}", markup=False)
+        stderr.print(f"labctl: {answer.remark}")
     for finding in answer.findings:
         stderr.print(
             f"labctl: the copy is identical to the database, but the database is damaged: {finding.part}: "
             f"{finding.text}",
-            markup=False,
         )
     if answer.findings:
         raise typer.Exit(1)
@@ -81,13 +80,13 @@ def check(
         print_json(answer)
     else:
         for finding in answer.findings:
-            console.print(f"{finding.part}: {finding.text}", markup=False, soft_wrap=True)
+            console.print(f"{finding.part}: {finding.text}", soft_wrap=True)
         for text in (*answer.remarks, *_of_manifests(answer)):
-            console.print(text, markup=False, soft_wrap=True)
+            console.print(text, soft_wrap=True)
         looked = f"{answer.blocks} blocks, {answer.calibrations} calibrations, {answer.audit_rows} audit rows"
         number = len(answer.findings)
         verdict = "no damage found" if answer.ok else f"{number} finding{'s' if number > 1 else ''}"
-        console.print(f"{answer.database}: {looked}: {verdict}", markup=False, soft_wrap=True)
+        console.print(f"{answer.database}: {looked}: {verdict}", soft_wrap=True)
     if not answer.ok:
         raise typer.Exit(1)
 
@@ -122,4 +121,4 @@ def migrate(
     if as_json:
         print_json(answer)
         return
-    console.print(migration_text(answer), markup=False, soft_wrap=True)
+    console.print(migration_text(answer), soft_wrap=True)

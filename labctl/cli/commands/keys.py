@@ -35,13 +35,13 @@ def create(
     if as_json:
         print_json(answer)
         return
-    console.print(answer.key, markup=False, soft_wrap=True)
+    console.print(answer.key, soft_wrap=True)
     may = {
         Role.VIEWER: "read",
         Role.OPERATOR: "read, and make changes",
         Role.APPROVER: "read, make changes and approve",
     }[answer.role]
-    stderr.print(f"{answer.name} may {may}. The key above is not shown again: store it now.", markup=False)
+    stderr.print(f"{answer.name} may {may}. The key above is not shown again: store it now.")
 
 
 @app.command("list")
@@ -74,4 +74,4 @@ def revoke(
 
     with one_clear_line():
         answer = execute(database, REVOKE_KEY, ToKey(name, ReasonRequest(reason=reason)))
-    print_json(answer) if as_json else console.print(f"{answer.name} is revoked", markup=False)
+    print_json(answer) if as_json else console.print(f"{answer.name} is revoked")

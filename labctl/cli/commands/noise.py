@@ -156,9 +156,9 @@ def orientation(
 
 def _print(answer: OrientationResponse) -> None:
     if answer.warning:
-        stderr.print(f"labctl: {answer.warning}", style="bold red", markup=False)
+        stderr.print(f"labctl: {answer.warning}", style="bold red")
     by = "uncorrected" if answer.version is None else f"corrected by version {answer.version}"
-    console.print(f"axis {answer.axis}, {by}: {answer.readings} readings, {answer.left_out} left out", markup=False)
+    console.print(f"axis {answer.axis}, {by}: {answer.readings} readings, {answer.left_out} left out")
     if (bias := answer.static_bias) is not None:
         console.print(f"  static bias  {format_number(bias.bias_dps)} deg/s, u = {format_number(bias.u_dps, 2)} deg/s")
     console.print(f"  angle        {answer.angle_deg:.3f} deg after {answer.seconds:.1f} s")
@@ -166,7 +166,7 @@ def _print(answer: OrientationResponse) -> None:
         console.print(f"  per minute   {format_number(answer.drift_deg_per_min)} deg/min")
     if legs := answer.drift_between_stops_deg_per_min:
         drifts = ", ".join(format_number(leg, 2) for leg in legs)
-        console.print(f"  between stops {drifts} deg/min", markup=False)
+        console.print(f"  between stops {drifts} deg/min")
     console.print(f"  standing     {answer.standing_s:.1f} s; offset {format_number(answer.offset_dps)} deg/s")
     if answer.gap_s:
         console.print(f"  without readings {answer.gap_s:.1f} s", style="yellow")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 import typer
+from rich.text import Text
 
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import Database, Json
@@ -28,7 +29,7 @@ def plugins(as_json: Json = False, database: Database = None) -> None:  # noqa: 
             rows.add_row(each.group, each.name, f"{each.distribution} {each.version}", state)
         console.print(rows)
         for line in dict.fromkeys(each.problem for each in found if each.problem):
-            stderr.print(line, markup=False, soft_wrap=True)
+            stderr.print(line, soft_wrap=True)
     if any(each.problem for each in found):
         raise typer.Exit(1)
 
@@ -54,8 +55,8 @@ def driver_checks(
 
     def show(each: DriverCheckResponse) -> None:
         if not as_json:
-            console.print("[red]fails[/]  " if each.problem else "[green]does[/]   ", end="")
-            console.print(f"{each.check}{': ' if each.problem else ''}{each.problem}", markup=False, soft_wrap=True)
+            console.print(Text("fails  ", "red") if each.problem else Text("does   ", "green"), end="")
+            console.print(f"{each.check}{': ' if each.problem else ''}{each.problem}", soft_wrap=True)
 
     with one_clear_line():
         answer = check_driver(name, bench, show)
@@ -66,6 +67,6 @@ def driver_checks(
         said = (
             f"{failed} of {len(answer.checks)} checks failed" if failed else f"all {len(answer.checks)} checks passed"
         )
-        console.print(f"{name} of {answer.distribution} {answer.version}: {said}", markup=False)
+        console.print(f"{name} of {answer.distribution} {answer.version}: {said}")
     if not answer.ok:
         raise typer.Exit(1)

@@ -100,7 +100,7 @@ def import_(
     console.print(
         f"recording {answer.recording} of {answer.serial}: {answer.datasets} data sets, {answer.readings} readings"
     )
-    console.print(f"next: labctl fit {answer.serial} --model {answer.suggested_model}", style="dim", markup=False)
+    console.print(f"next: labctl fit {answer.serial} --model {answer.suggested_model}", style="dim")
 
 
 @export_app.command("recording")

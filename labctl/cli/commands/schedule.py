@@ -25,7 +25,7 @@ def list_(
     as_json: Json = False,
     database: Database = None,
 ) -> None:
-    """List the scheduled starts, the next first."""
+    """List the scheduled starts, the next first. A start that was missed is listed until it is cancelled."""
     from labctl.services.commands.open import open_readonly, service_url
     from labctl.services.schedule.queue import list_starts
 

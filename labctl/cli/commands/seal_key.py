@@ -33,9 +33,9 @@ def create(
     if as_json:
         print_json(answer)
         return
-    console.print(f"private key: {answer.file}; name it by LABCTL_SEAL_KEY", markup=False, soft_wrap=True)
-    console.print(f"public key: {answer.public_file}; check with --key", markup=False, soft_wrap=True)
-    console.print(f"fingerprint: {answer.fingerprint}", markup=False, soft_wrap=True)
+    console.print(f"private key: {answer.file}; name it by LABCTL_SEAL_KEY", soft_wrap=True)
+    console.print(f"public key: {answer.public_file}; check with --key", soft_wrap=True)
+    console.print(f"fingerprint: {answer.fingerprint}", soft_wrap=True)
 
 
 @app.command("show")
@@ -48,7 +48,7 @@ def show(
 
     with one_clear_line():
         answer = show_seal_key()
-    print_json(answer) if as_json else console.print(answer.public_key.strip(), markup=False, soft_wrap=True)
+    print_json(answer) if as_json else console.print(answer.public_key.strip(), soft_wrap=True)
 
 
 @app.command("sign")
@@ -62,4 +62,4 @@ def sign(as_json: Json = False, database: Database = None) -> None:
         print_json(answer)
         return
     what = "is signed already" if answer.signed is None else f"was signed: manifests 1 to {answer.signed}"
-    console.print(f"the chain {what}; key {answer.fingerprint[:16]}", markup=False, soft_wrap=True)
+    console.print(f"the chain {what}; key {answer.fingerprint[:16]}", soft_wrap=True)

@@ -70,7 +70,7 @@ def serve(
             left = serve_forever(request, ready)
         finally:
             give_up_blocked_stderr()
-    stderr.print(f"labctl: stopped{'; ' if left else ''}{left}", markup=False)
+    stderr.print(f"labctl: stopped{'; ' if left else ''}{left}")
 
 
 def _print_ready(service: Ready, request: ServeRequest, *, as_json: bool) -> None:
@@ -83,11 +83,11 @@ def _print_ready(service: Ready, request: ServeRequest, *, as_json: bool) -> Non
         said = ServiceReady(**asdict(service), unconfirmed=unconfirmed, cut_short=cut_short)
         print_json(said, one_line=True)
         return
-    console.print(f"labctl listens on {service.url}  (HTTP interface: {service.url}/api-docs)", markup=False)
+    console.print(f"labctl listens on {service.url}  (HTTP interface: {service.url}/api-docs)")
     if start_at is not None:
-        console.print(f"the date of this service is simulated: {start_at:%Y-%m-%d %H:%M} UTC", markup=False)
+        console.print(f"the date of this service is simulated: {start_at:%Y-%m-%d %H:%M} UTC")
     for text in filter(None, (unconfirmed, cut_short)):
-        console.print(text, style="yellow", markup=False, soft_wrap=True)
+        console.print(text, style="yellow", soft_wrap=True)
 
 
 def _migrated(location: str) -> None:
@@ -101,7 +101,7 @@ def _migrated(location: str) -> None:
     refuse_unusable_keys()
     answer = migrate_before_service(location)
     if answer is not None:
-        stderr.print(f"labctl: {migration_text(answer)}", markup=False)
+        stderr.print(f"labctl: {migration_text(answer)}")
         get_logger().warning("database.migrated", said=migration_text(answer))
 
 
@@ -176,9 +176,9 @@ def simulator(
             print_json(SimulatorReady(addresses=addresses, bench_file=str(out) if out else None), one_line=True)
             return
         for device, address in addresses.items():
-            console.print(f"{device:14} {address}", markup=False)
+            console.print(f"{device:14} {address}")
         if out:
-            console.print(f"bench file: {out}", markup=False)
+            console.print(f"bench file: {out}")
 
     with one_clear_line():
         serve_simulator(bench, out, speed, ready, log)

@@ -38,4 +38,4 @@ def show(
         ("fingerprint", answer.fingerprint),
         ("valid", f"{answer.valid_from:%Y-%m-%d} to {answer.valid_until:%Y-%m-%d}"),
     ):
-        console.print(f"{name}: {value}", markup=False, soft_wrap=True)
+        console.print(f"{name}: {value}", soft_wrap=True)

@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Annotated
 
 import typer
+from rich.text import Text
 
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import Database, Json, Serial
-from labctl.cli.output import console, format_number, print_json, table
+from labctl.cli.output import console, format_number, print_heading, print_json, table
 
 if TYPE_CHECKING:
     from labctl.services.schemas.units import AppliedVersion, TrendResponse
@@ -42,7 +43,7 @@ def units(
     for each in found:
         version = "none" if each.certified_version is None else f"version {each.certified_version}"
         due = "–" if each.due is None else f"{each.due:%Y-%m-%d}"
-        rows.add_row(each.serial, each.model or "–", version, due, "[bold red]overdue[/]" if each.overdue else "")
+        rows.add_row(each.serial, each.model or "–", version, due, Text("overdue" if each.overdue else "", "bold red"))
     console.print(rows)
 
 
@@ -80,7 +81,7 @@ def trend(
 
 
 def _print(answer: TrendResponse) -> None:
-    console.print(f"[bold]{answer.serial}[/], version {answer.version} compared with every recording, deg/s RMS")
+    print_heading(answer.serial, f", version {answer.version} compared with every recording, deg/s RMS")
     rows = table("", "recording", "date", "as found", "as left", f"version {answer.version}", numbers=3)
     for point in answer.points:
         rows.add_row(
@@ -89,7 +90,7 @@ def _print(answer: TrendResponse) -> None:
         )  # fmt: skip
     console.print(rows)
     for line in answer.text:
-        console.print(line, markup=False, soft_wrap=True)
+        console.print(line, soft_wrap=True)
 
 
 def _said(applied: AppliedVersion | None) -> str:

@@ -38,11 +38,11 @@ class DemoRunner:
 
     def title(self, text: str) -> None:
         """Print the title of a part."""
-        self.console.print(f"\n[bold]{text}[/]")
+        self.console.print(f"\n{text}", style="bold")
 
     def say(self, text: str) -> None:
         """Print a line."""
-        self.console.print(text, markup=False)
+        self.console.print(text)
 
     def campaign(
         self,
@@ -103,4 +103,4 @@ class DemoRunner:
 @contextmanager
 def maybe_silent(quiet: bool) -> Iterator[Console]:
     """Give a console that prints, or one that does not."""
-    yield Console(highlight=False, quiet=quiet)
+    yield Console(highlight=False, markup=False, quiet=quiet)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from rich.text import Text
+
 from labctl.cli.output import console
 
 if TYPE_CHECKING:
     from labctl.services.schemas.benches import BenchCheckResponse, DeviceCheck
 
-MARKS = {"good": "[green]answers[/]", "doubtful": "[yellow]doubt[/]  ", "bad": "[red]failed[/] "}
+MARKS = {"good": Text("answers", "green"), "doubtful": Text("doubt  ", "yellow"), "bad": Text("failed ", "red")}
 
 
 def print_check(answer: BenchCheckResponse) -> None:
@@ -19,7 +21,7 @@ def print_check(answer: BenchCheckResponse) -> None:
     wrong = sum(finding.state == "bad" for device in answer.devices for finding in device.findings)
     doubts = sum(finding.state == "doubtful" for device in answer.devices for finding in device.findings)
     words = f"{wrong} wrong, {doubts} doubtful" if wrong or doubts else "nothing is wrong"
-    console.print(f"{answer.bench} at {answer.checked_at:%Y-%m-%d %H:%M:%S} UTC: {words}", markup=False)
+    console.print(f"{answer.bench} at {answer.checked_at:%Y-%m-%d %H:%M:%S} UTC: {words}")
 
 
 def _print_device(device: DeviceCheck) -> None:
@@ -27,11 +29,11 @@ def _print_device(device: DeviceCheck) -> None:
     release = f"[{device.driver} of {device.distribution} {device.version}]"
     for finding in device.findings:
         if finding.state != "good":
-            console.print(f"{MARKS[finding.state]}  {device.device:8} ", end="")
-            console.print(finding.text, markup=False, soft_wrap=True)
+            console.print(MARKS[finding.state], f"  {device.device:8} ", sep="", end="")
+            console.print(finding.text, soft_wrap=True)
     if good:
         first, *others = (finding.text for finding in good)
-        console.print(f"{MARKS['good']}  {device.device:8} ", end="")
-        console.print(f"{first}  {release}", markup=False, soft_wrap=True)
+        console.print(MARKS["good"], f"  {device.device:8} ", sep="", end="")
+        console.print(f"{first}  {release}", soft_wrap=True)
         if others:
-            console.print(f"{'':19}{'; '.join(others)}", markup=False, soft_wrap=True)
+            console.print(f"{'':19}{'; '.join(others)}", soft_wrap=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from labctl.cli.output import console, format_number, print_warnings, table
+from labctl.cli.output import console, format_number, print_heading, print_warnings, table
 from labctl.cli.printing.joint import print_joint
 from labctl.fitting.numeric.rounding import rounded_to_uncertainty
 from labctl.services.schemas.certification import CertificationResponse, ReleaseRequestResponse
@@ -20,7 +20,7 @@ def print_fit(answer: FitResponse) -> None:
     """Print a fit for a person: the errors first, then the coefficients."""
     error = answer.error
     print_warnings(answer.warnings)
-    console.print(f"[bold]{answer.serial}[/] version {answer.version}: {answer.model.name}")
+    print_heading(answer.serial, f" version {answer.version}: {answer.model.name}")
     console.print(f"  before             {format_number(error.raw_rms_dps)} deg/s RMS")
     console.print(f"  after              {format_number(error.rms_dps)} deg/s RMS")
     console.print(f"  held-out           {format_number(error.heldout_rms_dps)} deg/s RMS")
@@ -38,7 +38,7 @@ def print_fit(answer: FitResponse) -> None:
     for axis, content in answer.axes.items():
         coefficients = content["coefficients"]
         if isinstance(nodes := coefficients.get("temperature_c"), list):
-            console.print(f"\n[bold]axis {axis}[/]: a table over {len(nodes)} temperatures")
+            print_heading(f"\naxis {axis}", f": a table over {len(nodes)} temperatures")
             print_table(coefficients)
             continue
         rows = table(f"axis {axis}", "coefficient", "unit", "value", "u", numbers=2)
@@ -54,8 +54,8 @@ def print_fit(answer: FitResponse) -> None:
 def _print_held(held: HeldJson) -> None:
     """Print which coefficients were held at known values, and where these are from."""
     for axis, names in held["axes"].items():
-        console.print(f"  held, axis {axis}       {', '.join(names)}", markup=False, soft_wrap=True)
-    console.print(f"  held values from   {held['source']}", markup=False, soft_wrap=True)
+        console.print(f"  held, axis {axis}       {', '.join(names)}", soft_wrap=True)
+    console.print(f"  held values from   {held['source']}", soft_wrap=True)
 
 
 def print_poses(poses: PosesJson) -> None:
@@ -76,28 +76,26 @@ def print_poses(poses: PosesJson) -> None:
     )
     for left in moves["left_out"]:
         where = f"{left['from_s']:.1f} to {left['until_s']:.1f} s"
-        console.print(f"  turn left out, from {where}: {left['why']}", style="yellow", markup=False, soft_wrap=True)
-    console.print(f"frame: {poses['accelerometer']['frame']}", style="dim", markup=False, soft_wrap=True)
-    console.print(f"not determined: {poses['not_determined']}", style="dim", markup=False, soft_wrap=True)
+        console.print(f"  turn left out, from {where}: {left['why']}", style="yellow", soft_wrap=True)
+    console.print(f"frame: {poses['accelerometer']['frame']}", style="dim", soft_wrap=True)
+    console.print(f"not determined: {poses['not_determined']}", style="dim", soft_wrap=True)
 
 
 def print_certification(answer: CertificationResponse | ReleaseRequestResponse) -> None:
     """Print an act of certifying or revoking and what was known of the version, or that it waits for its release."""
     if isinstance(answer, ReleaseRequestResponse):
-        console.print(_waits(answer), markup=False, soft_wrap=True)
+        console.print(_waits(answer), soft_wrap=True)
         return
     done = "is now the calibration in force" if answer.act == "certify" else "is no longer in force"
-    console.print(
-        f"{answer.serial} version {answer.version} {done} ({_persons(answer)}: {answer.reason})", markup=False
-    )
+    console.print(f"{answer.serial} version {answer.version} {done} ({_persons(answer)}: {answer.reason})")
     if answer.act == "certify":
-        console.print(f"  verdict: {_verdict(answer)}", markup=False, soft_wrap=True)
+        console.print(f"  verdict: {_verdict(answer)}", soft_wrap=True)
     _print_objections(answer)
     for number in answer.withdrawn_certificates:
-        console.print(f"  certificate {number} is withdrawn", markup=False, soft_wrap=True)
+        console.print(f"  certificate {number} is withdrawn", soft_wrap=True)
     for each in answer.fetched_by:
         when = f"{each.first_at:%Y-%m-%d %H:%M} to {each.last_at:%Y-%m-%d %H:%M} UTC"
-        console.print(f"  fetched by {each.who}, {when}: notify them", markup=False, soft_wrap=True)
+        console.print(f"  fetched by {each.who}, {when}: notify them", soft_wrap=True)
 
 
 def _persons(answer: CertificationResponse) -> str:
@@ -119,14 +117,14 @@ def _waits(request: ReleaseRequestResponse) -> str:
 def print_certifications(rows: Sequence[CertificationResponse], waiting: Sequence[ReleaseRequestResponse] = ()) -> None:
     """Print what waits for a second person, and acts, newest first."""
     for request in waiting:
-        console.print(_waits(request), style="yellow", markup=False, soft_wrap=True)
+        console.print(_waits(request), style="yellow", soft_wrap=True)
     if not rows:
         console.print("nothing has been certified yet")
     for row in rows:
         said = f"{row.at:%Y-%m-%d %H:%M} UTC  {row.act} version {row.version}  {_persons(row)}: {row.reason}"
-        console.print(said, markup=False, soft_wrap=True)
+        console.print(said, soft_wrap=True)
         if row.act == "certify":
-            console.print(f"  verdict: {_verdict(row)}", markup=False, soft_wrap=True)
+            console.print(f"  verdict: {_verdict(row)}", soft_wrap=True)
         _print_objections(row)
 
 
@@ -140,7 +138,7 @@ def _verdict(answer: CertificationResponse) -> str:
 
 def _print_objections(answer: CertificationResponse) -> None:
     for each in answer.objections:
-        console.print(f"  overridden: {each.text}", style="bold red", markup=False, soft_wrap=True)
+        console.print(f"  overridden: {each.text}", style="bold red", soft_wrap=True)
 
 
 def print_table(coefficients: Coefficients) -> None:

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import typer
+from rich.text import Text
 
-from labctl.cli.output import console, format_number, print_json, table
+from labctl.cli.output import console, format_number, print_heading, print_json, table
 from labctl.cli.turn_text import turn_text
 from procedures.contracts.campaign_state import STOPPED_EARLY, UNDER_WAY
 
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 def print_plan(answer: PlanResponse) -> None:
     """Print a plan's figures for a person."""
-    console.print(f"[bold]{answer.recipe}[/] on {answer.bench}")
+    print_heading(answer.recipe, f" on {answer.bench}")
     console.print(f"  {answer.datasets} data sets in {answer.steps} steps, about {hours(answer.expected_s)}")
     if answer.verification_datasets:
         share = 100.0 * answer.verification_s / max(answer.expected_s, 1e-9)
@@ -29,9 +30,9 @@ def print_plan(answer: PlanResponse) -> None:
             f"{hours(answer.verification_s)} ({share:.0f} %)"
         )
     for left_out in answer.clipped:
-        console.print(f"  left out: {left_out}", style="yellow", markup=False)
+        console.print(f"  left out: {left_out}", style="yellow")
     if answer.attendance is not None:
-        console.print(f"  begun now it {answer.attendance.text}", markup=False)
+        console.print(f"  begun now it {answer.attendance.text}")
         _print_warning(answer.attendance)
     if answer.visibility is None:
         return
@@ -50,7 +51,7 @@ def print_plan(answer: PlanResponse) -> None:
 
 def _print_warning(attendance: AttendanceResponse) -> None:
     if attendance.warning:
-        console.print(f"  at night: {attendance.warning}", style="yellow", markup=False, soft_wrap=True)
+        console.print(f"  at night: {attendance.warning}", style="yellow", soft_wrap=True)
 
 
 def hours(seconds: float) -> str:
@@ -80,11 +81,12 @@ def print_started(answer: CampaignResponse | ScheduledResponse, *, as_json: bool
 
 def print_campaign(answer: CampaignResponse) -> None:
     """Print where a campaign is."""
-    console.print(f"campaign {answer.id} ({answer.recipe} on {answer.bench}): [bold]{answer.state}[/]", end="")
-    console.print(f" – {answer.reason}" if answer.reason else "", markup=False)
+    console.print(
+        f"campaign {answer.id} ({answer.recipe} on {answer.bench}): ", Text(answer.state, "bold"), sep="", end=""
+    )
+    console.print(f" – {answer.reason}" if answer.reason else "")
     console.print(
         f"  step {answer.step or '–'} of {answer.steps}  {answer.step_text}  {100 * answer.progress:.1f} %",
-        markup=False,
     )
     if answer.expected_end and answer.state in UNDER_WAY:
         clock = "simulated time" if answer.simulated_time else "UTC"
@@ -97,74 +99,74 @@ def print_campaign(answer: CampaignResponse) -> None:
     _print_instruments(answer)
     _print_question(answer)
     if answer.wish is not None:
-        console.print(f"  requested and still to be carried out: {answer.wish}", style="yellow", markup=False)
+        console.print(f"  requested and still to be carried out: {answer.wish}", style="yellow")
     for unit, why in answer.dropped.items():
-        console.print(f"  {unit} is excluded from the rest of the campaign: {why}", style="red", markup=False)
+        console.print(f"  {unit} is excluded from the rest of the campaign: {why}", style="red")
     if answer.last_error:
-        console.print(f"  last fault: {answer.last_error}", style="red", markup=False)
+        console.print(f"  last fault: {answer.last_error}", style="red")
     if answer.unrecorded:
-        console.print(f"  {answer.unrecorded}", style="red", markup=False)
+        console.print(f"  {answer.unrecorded}", style="red")
     _print_advice(answer)
     for serial, recording in answer.recordings.items():
-        console.print(f"  recording {recording}: {serial}", markup=False)
+        console.print(f"  recording {recording}: {serial}")
     print_drafts(answer.drafts)
     for device, said in answer.reported.items():
         known = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in said.items())
-        console.print(f"  {device} says: {known}", markup=False, soft_wrap=True)
+        console.print(f"  {device} says: {known}", soft_wrap=True)
 
 
 def print_drafts(drafts: Sequence[DraftResponse]) -> None:
     """Print what each draft of a campaign is, or why there is none."""
     for draft in drafts:
         if draft.state == "failed":
-            console.print(f"  {draft.reason}", style="red", markup=False, soft_wrap=True)
+            console.print(f"  {draft.reason}", style="red", soft_wrap=True)
         elif draft.report is not None:
             kept = draft.report.within_limits is not False and not draft.report.objections
-            console.print(f"  {draft.report.text}", style="" if kept else "yellow", markup=False, soft_wrap=True)
+            console.print(f"  {draft.report.text}", style="" if kept else "yellow", soft_wrap=True)
         else:
             text = f"  draft of {draft.serial}: not made yet; a service makes it, or `labctl campaign draft "
-            console.print(f"{text}{draft.campaign}`", markup=False, soft_wrap=True)
+            console.print(f"{text}{draft.campaign}`", soft_wrap=True)
 
 
 def _print_instruments(answer: CampaignResponse) -> None:
     """Print what reference instruments read, and links that are not well."""
     for column, value in answer.references.items():
-        console.print(f"  {column} {format_number(value)} (reference instrument)", markup=False)
+        console.print(f"  {column} {format_number(value)} (reference instrument)")
     for device, state in answer.links.items():
-        console.print(f"  {device}: link {state}", style="red", markup=False)
+        console.print(f"  {device}: link {state}", style="red")
 
 
 def _print_question(answer: CampaignResponse) -> None:
     """Print what a person is asked, and how far a turn by hand has come."""
     if text := turn_text(answer):
-        console.print(f"  {text}", markup=False)
+        console.print(f"  {text}")
     if answer.prompt is not None:
-        console.print(f"  question {answer.prompt.id}: {answer.prompt.text}", style="yellow", markup=False)
+        console.print(f"  question {answer.prompt.id}: {answer.prompt.text}", style="yellow")
 
 
 def _print_advice(answer: CampaignResponse) -> None:
     """Print a failure in words, and whether the campaign may be resumed."""
     if answer.advice is not None:
-        console.print(f"  what happened: {answer.advice.happened}", markup=False, soft_wrap=True)
-        console.print(f"  what labctl did: {answer.advice.done}", markup=False, soft_wrap=True)
-        console.print(f"  what to do next: {answer.advice.next}", markup=False, soft_wrap=True)
+        console.print(f"  what happened: {answer.advice.happened}", soft_wrap=True)
+        console.print(f"  what labctl did: {answer.advice.done}", soft_wrap=True)
+        console.print(f"  what to do next: {answer.advice.next}", soft_wrap=True)
     if answer.state in STOPPED_EARLY and answer.resume_reason:
         word = "resume only after you have checked the points above" if answer.resumable else "not resumable"
-        console.print(f"  {word}: {answer.resume_reason}", style="yellow", markup=False, soft_wrap=True)
+        console.print(f"  {word}: {answer.resume_reason}", style="yellow", soft_wrap=True)
 
 
 def print_start(answer: ScheduledResponse) -> None:
     """Print one entry of the schedule."""
-    console.print(f"start {answer.id} ({answer.recipe} on {answer.bench}): [bold]{answer.state}[/]")
+    console.print(f"start {answer.id} ({answer.recipe} on {answer.bench}): ", Text(answer.state, "bold"), sep="")
     if answer.due_at is not None:
         again = f", repeated by cron line {answer.cron!r}" if answer.cron else ""
-        console.print(f"  begins {answer.due_at:%Y-%m-%d %H:%M %z} ({answer.time_zone}){again}", markup=False)
+        console.print(f"  begins {answer.due_at:%Y-%m-%d %H:%M %z} ({answer.time_zone}){again}")
     if answer.confirmed_by:
-        console.print(f"  {answer.confirmed_by} confirmed that the bench will be clear", markup=False)
+        console.print(f"  {answer.confirmed_by} confirmed that the bench will be clear")
     if answer.attendance is not None:
-        console.print(f"  {answer.attendance.text}", markup=False, soft_wrap=True)
+        console.print(f"  {answer.attendance.text}", soft_wrap=True)
         _print_warning(answer.attendance)
     for event in answer.history:
-        console.print(f"  due {event.due_at:%Y-%m-%d %H:%M %z}: {event.outcome}: {event.message}", markup=False)
+        console.print(f"  due {event.due_at:%Y-%m-%d %H:%M %z}: {event.outcome}: {event.message}")
     if answer.note:
-        console.print(f"  {answer.note}", style="yellow", markup=False)
+        console.print(f"  {answer.note}", style="yellow")

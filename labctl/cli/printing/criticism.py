@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import log10
 from typing import TYPE_CHECKING
 
-from labctl.cli.output import console, format_number, print_warnings, table
+from labctl.cli.output import console, format_number, print_heading, print_warnings, table
 from labctl.cli.printing.joint import print_joint
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ def print_verification(answer: VerificationResponse) -> None:
     """Print what a version leaves of a recording as it is, axis by axis."""
     from labctl.services.criticism.verification.text import verification_sentence
 
-    console.print(verification_sentence(answer), markup=False, soft_wrap=not console.is_terminal)
+    console.print(verification_sentence(answer), soft_wrap=not console.is_terminal)
     rows = table("", "axis", "RMS deg/s", "largest", "mean", numbers=3)
     for axis, found in answer.axes.items():
         rows.add_row(axis, format_number(found.rms_dps), format_number(found.max_dps), format_number(found.bias_dps))
@@ -38,7 +38,7 @@ def print_criticism(answer: CriticismResponse) -> None:
     whole = not console.is_terminal  # a program that reads lines gets each sentence on one
     _print_applied(answer, whole=whole)
     for line in answer.text:
-        console.print(line, style="bold" if line is answer.text[0] else None, markup=False, soft_wrap=whole)
+        console.print(line, style="bold" if line is answer.text[0] else None, soft_wrap=whole)
     error = answer.error
     of = ", ".join(map(str, answer.recordings or [answer.recording]))
     console.print(
@@ -65,14 +65,13 @@ def print_criticism(answer: CriticismResponse) -> None:
         console.print(
             f"to distinguish {', '.join(experiment['separates'])}: {experiment['do']} "
             f"({experiment['hours']:.0f} h, {100 * experiment['power']:.0f} % sure to)",
-            markup=False,
         )
     for why in _not_testable(answer):
-        console.print(why, style="dim", markup=False, soft_wrap=whole)
+        console.print(why, style="dim", soft_wrap=whole)
     if answer.named:
         fitted = {each["effect"] for each in answer.suspects if each["rms_after_dps"] is not None}
         first = next((name for name in answer.named if name in fitted), answer.named[0])
-        console.print(f"next: labctl improve {answer.serial} --add {first}", style="dim", markup=False)
+        console.print(f"next: labctl improve {answer.serial} --add {first}", style="dim")
 
 
 def _print_applied(answer: CriticismResponse, *, whole: bool) -> None:
@@ -82,8 +81,8 @@ def _print_applied(answer: CriticismResponse, *, whole: bool) -> None:
     if answer.applied is None or answer.applied.seen:
         return
     style = None if answer.applied.ok else "red"
-    console.print(verification_sentence(answer.applied), style=style, markup=False, soft_wrap=whole)
-    console.print(f"Refitted to recording {answer.recording}:", markup=False)
+    console.print(verification_sentence(answer.applied), style=style, soft_wrap=whole)
+    console.print(f"Refitted to recording {answer.recording}:")
 
 
 def _not_testable(answer: CriticismResponse) -> list[str]:
@@ -112,7 +111,7 @@ def _print_static(static: StaticRecordJson) -> None:
         )
         instead = "; B is the value of the data sheet" if noise["replaces_datasheet"] else ""
         text = f"axis {axis} at rest for {static['duration_s']:.0f} s: {said or 'no slope shows'}{instead}"
-        console.print(text, style="dim", markup=False)
+        console.print(text, style="dim")
 
 
 def _name_of(suspect: Suspect) -> str:
@@ -139,15 +138,15 @@ def _print_map(picture: ResidualMap, columns: int = 21) -> None:
         for column in range(-(-len(rates) // step)):
             scores = cells.get((column, row))
             line += "  " if scores is None else 2 * SHADES[min(int(max(scores)), len(SHADES) - 1)]
-        console.print(f"{value:5d} deg C |{line}|", markup=False, highlight=False)
-    console.print(f"            {rates[0]:g} to {rates[-1]:g} deg/s", style="dim", markup=False)
+        console.print(f"{value:5d} deg C |{line}|", highlight=False)
+    console.print(f"            {rates[0]:g} to {rates[-1]:g} deg/s", style="dim")
 
 
 def print_improvement(answer: ImproveResponse) -> None:
     """Print what a change brought."""
     before = answer.before
     print_warnings(answer.warnings)
-    console.print(f"[bold]{answer.serial}[/] version {answer.version}, from {answer.parent}: {answer.model.name}")
+    print_heading(answer.serial, f" version {answer.version}, from {answer.parent}: {answer.model.name}")
     print_joint(answer.joint)
     rows = table("", "deg/s", "before", "after", numbers=2)
     rows.add_row("RMS", format_number(before.rms_dps), format_number(answer.error.rms_dps))
@@ -175,7 +174,7 @@ def print_improvement(answer: ImproveResponse) -> None:
 def print_ladder(answer: LadderResponse) -> None:
     """Print how the error falls from version to version, as bars."""
     for line in ladder_lines(answer):
-        console.print(line, markup=False, highlight=False, soft_wrap=True)
+        console.print(line, highlight=False, soft_wrap=True)
 
 
 def ladder_lines(answer: LadderResponse, width: int = 40) -> list[str]:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from labctl.cli.output import console, format_number, table
+from rich.text import Text
+
+from labctl.cli.output import console, format_number, print_heading, table
 
 if TYPE_CHECKING:
     from labctl.services.schemas.reports.datasheet import Characteristic, DatasheetResponse
@@ -12,7 +14,7 @@ if TYPE_CHECKING:
 
 def print_datasheet(answer: DatasheetResponse) -> None:
     """Print each characteristic with its uncertainty beside the specified value, then the decision in words."""
-    console.print(f"[bold]{answer.serial}[/] {answer.model}", highlight=False)
+    print_heading(answer.serial, f" {answer.model}")
     rows = table("", "characteristic", "axis", "value", "u", "unit", "specified", "", "recording", numbers=0)
     for each in answer.characteristics:
         if each.value is None and each.at_most is None:
@@ -26,16 +28,16 @@ def print_datasheet(answer: DatasheetResponse) -> None:
         )
     console.print(rows)
     for text in answer.text:
-        console.print(text, markup=False, soft_wrap=True)
-    console.print(answer.decision_rule, markup=False, soft_wrap=True)
+        console.print(text, soft_wrap=True)
+    console.print(answer.decision_rule, soft_wrap=True)
 
 
 def _specified(each: Characteristic) -> str:
     return "" if each.specified is None else f"{each.specified_as} {each.specified:g}"
 
 
-def _decision(each: Characteristic) -> str:
+def _decision(each: Characteristic) -> Text:
     if each.passed is None:
-        return ""
+        return Text()
     near = ", near" if each.near_limit else ""
-    return f"[green]pass{near}[/]" if each.passed else f"[red]fail{near}[/]"
+    return Text(f"pass{near}", "green") if each.passed else Text(f"fail{near}", "red")

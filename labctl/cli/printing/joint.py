@@ -18,6 +18,6 @@ def print_joint(joint: JointJson | None) -> None:
     console.print(f"  recordings         {numbers}, fitted together")
     for line in joint["held_out"]:
         error = f"{format_number(line['rms_dps'])} deg/s RMS" if line["rms_dps"] is not None else line["why"]
-        console.print(f"  recording {line['recording']:<10} predicted by a fit to the others: {error}", markup=False)
+        console.print(f"  recording {line['recording']:<10} predicted by a fit to the others: {error}")
     for sentence in joint["text"]:
-        console.print(f"  {sentence}", markup=False, soft_wrap=True)
+        console.print(f"  {sentence}", soft_wrap=True)

@@ -22,9 +22,9 @@ def print_allan(answer: AllanResponse) -> None:
         said = ", ".join(
             f"{letter} {_shown(figure)}" for letter, figure in (("N", axis["N"]), ("B", axis["B"]), ("K", axis["K"]))
         )
-        console.print(f"{name}: {said}", markup=False, soft_wrap=True)
+        console.print(f"{name}: {said}", soft_wrap=True)
     for name, value in answer.datasheet.items():
-        console.print(f"data sheet: {name} = {value:g}", markup=False)
+        console.print(f"data sheet: {name} = {value:g}")
 
 
 def _shown(figure: NoiseFigure) -> str:

@@ -39,7 +39,6 @@ def print_uncertainty(answer: UncertaintyResponse) -> None:
         console.print(
             f"uncertainties that the bench does not state, and that U does not contain: {', '.join(answer.not_stated)}",
             style="yellow",
-            markup=False,
         )
     if answer.overdue:
         late = {line.name: line.due for one in answer.budget.values() for line in one.lines if line.overdue}
@@ -61,11 +60,10 @@ def _print_lines(title: str, budget: BudgetResponse) -> None:
         f"u_c = {format_number(budget.combined, 2)} deg/s, effective degrees of freedom "
         f"{'inf' if effective is None else format_number(effective, 3)}, k = {format_number(budget.k, 3)}, "
         f"U = {format_number(budget.expanded, 2)} deg/s (95.45 %)",
-        markup=False,
     )
     for line in budget.lines:
         if line.contribution is None and line.stated:
-            console.print(f"{line.source} is unknown: {line.why}", style="yellow", markup=False)
+            console.print(f"{line.source} is unknown: {line.why}", style="yellow")
 
 
 def _print_covariance(vector: VectorUncertainty) -> None:
@@ -97,7 +95,7 @@ def _print_any_axis(any_axis: Mapping[str, AnyAxisUncertainty]) -> None:
     reasons = [text for one in any_axis.values() for text in (one.why, one.cross_rates.why if one.cross_rates else "")]
     for text in dict.fromkeys(reasons):
         if text:
-            console.print(f"unknown about any axis: {text}", style="yellow", markup=False)
+            console.print(f"unknown about any axis: {text}", style="yellow")
 
 
 def _contribution(line: BudgetLineResponse) -> str:

@@ -91,7 +91,7 @@ class Criticism:
         return (self._over_datasheet(attrgetter("least_dps")) or 0.0) >= LARGE_DRIFT
 
     def _over_datasheet(self, size_dps: Callable[[Drift], float]) -> float | None:
-        stability = self.data.info.datasheet.get("bias_stability_dps")
+        stability = self.data.info.stability_dps
         if not stability or self.comparison is None:
             return None
         return max(size_dps(noise.drift) for noise in self.floor.axes.values()) / (stability / 2)

@@ -41,9 +41,7 @@ def size_reference(recording: Recording) -> SizeReference:
     model = usual_model(fit_data_of(recording))
     designs = {axis: replace(design_of(data, model, axis, {}), options=[]) for axis in map(str, data.info.axes)}
     info = data.info
-    return SizeReference(
-        data, designs, expected_drift_dps(info.technology or "", info.datasheet.get("bias_stability_dps"))
-    )
+    return SizeReference(data, designs, expected_drift_dps(info.technology or "", info.stability_dps))
 
 
 def size_in_noise_units(reference: SizeReference, recording: Recording) -> tuple[float, float]:

@@ -75,7 +75,7 @@ def schedule_of(recording: Recording, model: ErrorModel | None = None) -> Schedu
             f"{info.serial}: the noise of a data set's mean is not known: each data set has fewer than 6 readings, or "
             "readings that are all equal; measure longer, or at more readings per second"
         )
-    drift = Noise(expected_drift_dps(info.technology or "", info.datasheet.get("bias_stability_dps")), 0.0, 0.0)
+    drift = Noise(expected_drift_dps(info.technology or "", info.stability_dps), 0.0, 0.0)
     designs, left, slices = {}, {}, {}
     for axis in map(str, info.axes):
         design = design_of(data, model, axis)

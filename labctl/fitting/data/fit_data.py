@@ -118,7 +118,7 @@ class FitData:
             np.asarray(self.channels["run"], dtype=np.int64) if "run" in self.channels else np.ones(m, dtype=np.int64),
             np.asarray(self.channels["table_rate_dps"], dtype=np.float64),
             None if self.white_var is None else self.white_var[axis],
-            self.info.datasheet.get("bias_stability_dps"),
+            self.info.stability_dps,
         )
 
     def distinct_rates(self, axis: str) -> int:

@@ -28,8 +28,6 @@ REPEAT_TEMPERATURE_C = SAME_TEMPERATURE_C
 REPEATS_NEEDED = 8
 #: Probability at which noise alone is taken for a law that no smooth function of temperature follows.
 FALSE_ALARM = 1e-4
-#: A drift stays within the bias stability that a data sheet states, as two standard deviations.
-DATASHEET_SHARE = 0.5
 
 
 @dataclass(frozen=True)
@@ -94,7 +92,7 @@ def _with_known_white(
         elif enough:
             drift = _drift(surface, with_levels_of_temperature(surface, channels, axis), errors_dps[axis], known)
         else:
-            drift = Drift(DATASHEET_SHARE * float(stability or 0.0), 1.0)
+            drift = Drift(float(stability or 0.0), 1.0)
         floor = np.sqrt(known.white_var + drift.drift_dps**2 + (drift.per_rate * known.rate_dps) ** 2)
         axes[axis] = AxisNoise(np.asarray(floor), float(np.sqrt(known.white_var.mean())), drift)
     if enough:

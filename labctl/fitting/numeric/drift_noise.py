@@ -42,7 +42,7 @@ class Scatter:
     run: NDArray[np.int64]
     rate_dps: Array
     white_var: Array | None
-    datasheet_drift_dps: float | None = None
+    datasheet_drift_dps: float | None = None  #: bias stability by the data sheet, a standard deviation
 
     @property
     def largest_drift_dps(self) -> float:

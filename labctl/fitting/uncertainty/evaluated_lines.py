@@ -63,8 +63,8 @@ def repeatability_line(fitted: FittedModel, evidence: AxisEvidence | None) -> Bu
         return BudgetLine("repeatability", "none", "A", "normal", None, "deg/s", 1.0, None, why=why)
     known = evidence.repeatability
     return BudgetLine(
-        "repeatability", known.source, "B" if known.source == "data sheet" else "A", "normal", known.u_dps, "deg/s",
-        1.0, known.u_dps, known.freedom,
+        "repeatability", known.name, "B" if known.source == "data sheet" else "A", known.distribution, known.u_dps,
+        "deg/s", 1.0, known.u_dps, known.freedom, why=known.text,
     )  # fmt: skip
 
 

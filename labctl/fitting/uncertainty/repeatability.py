@@ -7,11 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from instruments.datasheet import LIMITS, Convention
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.numeric.arrays import Array
 
-#: Data sheets state stability and repeatability as limits of about two standard deviations.
-DATASHEET_SHARE = 0.5
 #: The drift whose Allan deviation is as high as a bias instability B, over B.
 DRIFT_OVER_INSTABILITY = 1.35
 #: One run was calibrated and another is corrected: both are off, independently.
@@ -25,6 +24,18 @@ class Repeatability:
     u_dps: float
     source: str
     freedom: int | None = None  #: degrees of freedom of the figure; None where it is stated and not estimated
+    text: str = ""  #: of a data sheet: the figure, its convention and what follows from it
+    convention: Convention | None = None  #: of the data sheet
+
+    @property
+    def name(self) -> str:
+        """Where the figure is from, with the convention of a data sheet."""
+        return f"{self.source}, {self.convention}" if self.convention else self.source
+
+    @property
+    def distribution(self) -> str:
+        """The distribution: the difference of two errors within the same limits is triangular."""
+        return "triangular" if self.convention in LIMITS else "normal"
 
 
 def repeatability_of(
@@ -42,7 +53,7 @@ def repeatability_of(
         if between is not None:
             found[axis] = between
         elif sheet := _by_datasheet(data):
-            found[axis] = Repeatability(OF_TWO * sheet, "data sheet")
+            found[axis] = sheet
         elif measured:
             found[axis] = Repeatability(OF_TWO * DRIFT_OVER_INSTABILITY * measured, "static record")
         else:
@@ -50,10 +61,12 @@ def repeatability_of(
     return found
 
 
-def _by_datasheet(data: FitData) -> float | None:
+def _by_datasheet(data: FitData) -> Repeatability | None:
+    """Return what the data sheet states by its convention."""
     for name in ("bias_repeatability_dps", "bias_stability_dps"):
-        if data.info.datasheet.get(name):
-            return DATASHEET_SHARE * float(data.info.datasheet[name])
+        if figure := data.info.datasheet_figure(name):
+            text = f"{figure.text}; times sqrt(2), for the run that was calibrated and the one that is corrected"
+            return Repeatability(OF_TWO * figure.u, "data sheet", None, text, figure.convention)
     return None
 
 

@@ -24,6 +24,9 @@ from labctl.fitting.uncertainty.repeatability import Repeatability, repeatabilit
 from labctl.json_types.calibrations import AxisEvidenceJson
 from labctl.recording import Recording
 
+#: Of a calibration that an earlier version of labctl has made.
+HALVED = "an earlier version of labctl took half the figure of the data sheet, whatever its convention: fit it again"
+
 
 @dataclass(frozen=True)
 class AxisEvidence:
@@ -45,6 +48,9 @@ class AxisEvidence:
             "repeatability_freedom": self.repeatability.freedom if self.repeatability else None,
             "repeatability_source": self.repeatability.source if self.repeatability else "none",
         }
+        if self.repeatability and self.repeatability.convention:
+            found["repeatability_convention"] = self.repeatability.convention
+            found["repeatability_text"] = self.repeatability.text
         if local.across_dps is not None:
             found["across_dps"] = {axis: rates.tolist() for axis, rates in local.across_dps.items()}
         if self.correlation:
@@ -62,7 +68,10 @@ class AxisEvidence:
         u_dps, correlation = record["repeatability_dps"], record.get("correlation", {})
         if u_dps is None:
             return AxisEvidence(local, None, correlation)
-        known = Repeatability(u_dps, record["repeatability_source"], record["repeatability_freedom"])
+        source = record["repeatability_source"]
+        text = record.get("repeatability_text", HALVED if source == "data sheet" else "")
+        convention = record.get("repeatability_convention")
+        known = Repeatability(u_dps, source, record["repeatability_freedom"], text, convention)
         return AxisEvidence(local, known, correlation)
 
 

@@ -101,9 +101,12 @@ class BenchRunner:
     @property
     def free(self) -> bool:
         """Whether a campaign may begin now: nothing runs, or waits to be resumed, and the bench may be driven."""
-        if self._job is not None or self._recovery.pending or self._stops or not self._may_drive:
-            return False
-        return not self.stop_latch.state.held
+        return not self.occupied and not self._stops and not self.stop_latch.state.held
+
+    @property
+    def occupied(self) -> bool:
+        """Whether a campaign runs or waits to be resumed, or another process drives the bench."""
+        return self._job is not None or self._recovery.pending or not self._may_drive
 
     @property
     def _may_drive(self) -> bool:

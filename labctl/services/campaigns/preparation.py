@@ -227,6 +227,12 @@ def _units(
     )
 
 
+def _conventions(identity: GyroIdentity, bench: BenchFile) -> dict[str, str]:
+    """Return the conventions that the bench file states for the figures of a unit's data sheet."""
+    stated = next((unit.datasheet_conventions for unit in bench.gyros if unit.serial == identity.serial), {})
+    return {name: convention for name, convention in stated.items() if name in identity.datasheet}
+
+
 def _unit(
     gyro: Gyro,
     identity: GyroIdentity,
@@ -253,6 +259,7 @@ def _unit(
             "max_rate_dps": gyro.limits.max_rate_dps,
             "technology": identity.technology or None,
             "datasheet": dict(identity.datasheet),
+            "datasheet_conventions": _conventions(identity, bench),
             "output": {axis: dict(unit) for axis, unit in identity.output.items()},
             "standards": standards_of(bench),
             "thermometer": temperature_instrument(bench),

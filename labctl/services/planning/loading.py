@@ -37,6 +37,8 @@ LONGEST_PLACE = 80
 Look = Callable[[Plan, BenchFile], list[Visibility]]
 #: When a plan would begin, and the time zone of the people at the bench.
 LocalStart = tuple[datetime, ZoneInfo]
+#: End of the name of a shipped bench that simulates the unit of a paper.
+OF_A_PAPER = "-paper-sim"
 
 
 def load_recipe(source: str) -> Recipe:
@@ -118,13 +120,15 @@ def bench_for(recipe: Recipe) -> str:
     """Return the shipped simulated bench that fits a recipe best.
 
     One that is named after it; else the one with the fewest axes that can do it whole, the fastest of these first, and
-    a table with an encoder last.
+    a table with an encoder last. One with the unit of a paper is chosen by its own name only: its errors are special.
     """
     if f"{recipe.name}-sim" in shipped_benches():
         return f"{recipe.name}-sim"
     axes = {position.lstrip("-") for position in recipe.positions}
     fitting: list[tuple[bool, int, float, bool, str]] = []
     for name, path in shipped_benches().items():
+        if name.endswith(OF_A_PAPER):
+            continue
         bench = load_bench(str(path))
         recorded = {axis for gyro in bench.gyros for axis in gyro.axes}
         if bench.is_simulated and axes <= recorded and not missing_instruments(recipe, limits_of(bench)):

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -11,6 +11,11 @@ from numpy.typing import ArrayLike
 
 from labctl.json_types.reproduction import PaperFigure, PaperPanel, PaperTrace
 from labctl.json_types.views import Numbers
+
+#: Where a number is from. measured: a real unit. simulated: what labctl makes of a simulated unit. built in: the
+#: simulated unit was given it, so that its return shows the arithmetic only. computed: from printed numbers alone.
+Origin = Literal["measured", "simulated", "built in", "computed", ""]
+PRINTED = "printed numbers"
 
 
 @dataclass(frozen=True)
@@ -21,6 +26,7 @@ class Value:
     of: str
     value: float | None
     why: str = ""
+    origin: Origin = ""
 
 
 @dataclass(frozen=True)
@@ -41,6 +47,18 @@ class Findings:
     values: list[Value] = field(default_factory=list)
     missing: list[Missing] = field(default_factory=list)
     figures: list[PaperFigure] = field(default_factory=list)
+
+    def told(self, origin: Origin, built_in: Callable[[str], bool] = lambda _: False) -> Findings:
+        """Return these findings with the origin of each number; `built_in` names those that a simulation was given."""
+
+        def of(value: Value) -> Origin:
+            if value.origin or value.value is None:
+                return value.origin
+            if value.of == PRINTED:
+                return "computed"
+            return "built in" if origin == "simulated" and built_in(value.id) else origin
+
+        return replace(self, values=[replace(value, origin=of(value)) for value in self.values])
 
     def add(self, other: Findings) -> None:
         """Take in what another recording gave."""

@@ -65,21 +65,22 @@ def reproduce_unit(
     paper = paper_named(name)
     check_folder(folder)
     measured = of_unit(store, serial, recording)
-    return _written(paper, OF_UNIT[name](measured, axis), folder, serial, measured.number)
+    found = OF_UNIT[name](measured, axis).told(measured.origin)
+    return _written(paper, found, folder, serial, measured.number)
 
 
 def _rows(printed: Printed, found: Findings) -> list[NumberResponse]:
     """Return a row for each source that a printed number was reproduced from; one without a number where none is."""
 
-    def row(of: str, value: float | None, why: str) -> NumberResponse:
+    def row(of: str, value: float | None, why: str, origin: str = "") -> NumberResponse:
         known = value is not None and printed.value is not None
         return NumberResponse(
             place=printed.place, quantity=printed.quantity, unit=printed.unit, relation=printed.relation,
             printed=printed.value, of=of, reproduced=value,
-            difference=(value or 0.0) - (printed.value or 0.0) if known else None, why=why,
+            difference=(value or 0.0) - (printed.value or 0.0) if known else None, why=why, origin=origin,
         )  # fmt: skip
 
-    made = [row(value.of, value.value, value.why) for value in found.values if value.id == printed.id]
+    made = [row(value.of, value.value, value.why, value.origin) for value in found.values if value.id == printed.id]
     return made or [row("", None, "not made; see what could not be made")]
 
 
@@ -104,7 +105,7 @@ def _page(answer: ReproductionResponse, found: Findings) -> PaperPage:
     numbers: list[PaperNumber] = [
         {
             "place": n.place, "quantity": n.quantity, "unit": n.unit, "relation": n.relation, "printed": n.printed,
-            "of": n.of, "reproduced": n.reproduced, "difference": n.difference, "why": n.why,
+            "of": n.of, "reproduced": n.reproduced, "difference": n.difference, "why": n.why, "origin": n.origin,
         }
         for n in answer.numbers
     ]  # fmt: skip

@@ -17,6 +17,7 @@ class NumberResponse(ResponseModel):
     reproduced: float | None
     difference: float | None  #: reproduced less printed
     why: str
+    origin: str = ""  #: measured, simulated, built in (the simulated unit was given it), computed; "": not made
 
 
 class ContradictionResponse(ResponseModel):

@@ -13,6 +13,7 @@ from labctl.recording import OutputUnit, Recording, read_recording, to_points
 from labctl.recording.recording import Columns
 from labctl.services.recordings.examples import example
 from labctl.services.recordings.loading import newest_row, source_of
+from labctl.services.reproduction.findings import Origin
 from labctl.services.simulation.recordings import SimulateRequest, make_recording
 from labctl.store import Store
 
@@ -34,6 +35,11 @@ class Measured:
     recording: Recording  #: one row per data set, or a table of coefficients
     rest: Rest | None  #: None where no readings at rest are kept
     number: int | None = None  #: of a recording of the database
+
+    @property
+    def origin(self) -> Origin:
+        """Whether its recording says that it was simulated."""
+        return "simulated" if self.recording.info.notes.startswith("simulated") else "measured"
 
 
 def shipped(name: str, sentence: str) -> Measured:

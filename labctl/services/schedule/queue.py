@@ -10,6 +10,7 @@ from labctl.services.benches.start_confirmation import confirmation_text
 from labctl.services.planning.attendance import attendance, visits_s
 from labctl.services.planning.loading import limits_of, load_recipe
 from labctl.services.schedule import times
+from labctl.services.schedule.scheduler import REAL_BENCH_LATE_LIMIT_S
 from labctl.services.schemas.campaigns import CampaignRequest
 from labctl.services.schemas.schedule import ScheduledResponse, StartEventResponse
 from labctl.services.simulation.hidden_effects import with_hidden_effects
@@ -68,7 +69,7 @@ def _has_zone(at: str | None) -> bool:
 
 
 def list_starts(store: Store, *, ended: bool) -> list[ScheduledResponse]:
-    """Return what waits to begin, next first; with `ended` also what is over."""
+    """Return what waits to begin, next first, and what was missed and not removed; with `ended` also what is over."""
     return [_answer(store, row) for row in store.starts.all(ended=ended)]
 
 
@@ -78,9 +79,19 @@ def start_status(store: Store, start: int) -> ScheduledResponse:
 
 
 def cancel_start(store: Store, start: int, now: datetime) -> ScheduledResponse:
-    """Take an entry out of the schedule; a campaign that it has begun runs on. Raises NotFound, Conflict."""
+    """Take an entry that waits or was missed out of the schedule; a campaign that it has begun runs on.
+
+    Raises NotFound, Conflict.
+    """
     store.starts.cancel(start, now)
     return start_status(store, start)
+
+
+def _missed_after_s(row: StartRow) -> float | None:
+    """Return the limit that holds for an entry; only entries of a real bench carry a confirmation."""
+    if row.late_limit_s is not None:
+        return row.late_limit_s
+    return REAL_BENCH_LATE_LIMIT_S if row.confirmed_by else None
 
 
 def _answer(store: Store, row: StartRow, note: str = "") -> ScheduledResponse:
@@ -90,7 +101,7 @@ def _answer(store: Store, row: StartRow, note: str = "") -> ScheduledResponse:
         id=row.id, bench=row.bench_name, recipe=row.recipe_name, state=row.state,
         due_at=row.due_at.astimezone(zone) if waits else None, time_zone=row.time_zone, cron=row.cron,
         priority=row.priority, clip=row.clip, hide=list(row.hide or ()), fit=row.fit,
-        late_limit_s=row.late_limit_s, created_at=row.created_at, note=note,
+        late_limit_s=row.late_limit_s, missed_after_s=_missed_after_s(row), created_at=row.created_at, note=note,
         history=[
             StartEventResponse(
                 at=event.at, due_at=event.due_at.astimezone(zone), outcome=event.outcome, message=event.message,

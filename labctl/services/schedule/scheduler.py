@@ -3,6 +3,11 @@
 A start is claimed in the database before anything is opened, and concluded when its campaign is written down. What a
 process claimed and did not conclude is settled at the next start of a service: begun if there is a campaign of it, else
 due again.
+
+A start that this service could not begin in time may be missed: the entry's own limit counts from its due time. Without
+one, a real bench has a default limit, because a person has confirmed that the bench is clear at that time, not hours
+later. The time in which a campaign was seen on the bench does not count against the default: a start that queues behind
+a campaign was not missed.
 """
 
 from __future__ import annotations
@@ -26,6 +31,8 @@ log = get_logger()
 POLL_S = 1.0
 #: A start within this is on time: the schedule is read once a second, and a service takes a while to start.
 GRACE_S = 60.0
+#: A start without a limit of its own that is later than this is not made up on a real bench.
+REAL_BENCH_LATE_LIMIT_S = 3600.0
 
 
 class Runs(Protocol):
@@ -34,6 +41,11 @@ class Runs(Protocol):
     @property
     def free(self) -> bool:
         """Whether a campaign may begin now."""
+        ...
+
+    @property
+    def occupied(self) -> bool:
+        """Whether a campaign runs or waits to be resumed, or another process drives the bench."""
         ...
 
     def resume_interrupted(self) -> None:
@@ -46,10 +58,15 @@ class Runs(Protocol):
 
 
 class Scheduler:
-    """The queue of one bench."""
+    """The queue of one bench; `late_limit_s` holds for entries without a limit of their own, None: no limit."""
 
-    def __init__(self, store: Store, clock: Clock, runner: Runs, bench_name: str) -> None:
+    def __init__(
+        self, store: Store, clock: Clock, runner: Runs, bench_name: str, late_limit_s: float | None = None
+    ) -> None:
         self._store, self._clock, self._runner, self._bench = store, clock, runner, bench_name
+        self._late_limit_s = late_limit_s
+        self._was_occupied = False  #: when the schedule was read last
+        self._occupied_until: datetime | None = None  #: the last moment at which the bench was seen occupied
         self._guard = threading.Lock()
         self._over = threading.Event()
         self._thread: threading.Thread | None = None
@@ -114,15 +131,33 @@ class Scheduler:
                 self._owes = False
             self._runner.resume_interrupted()
             now = self._clock.utc()
+            if self._was_occupied and self._runner.occupied:  # also through a pause of this process
+                self._occupied_until = now
             for row in self._store.starts.due(self._bench, now):
                 due = row.due_at if row.cron is None else self._last_due(row, row.cron, now)
-                late_s = (now - due).total_seconds()
-                if row.late_limit_s is not None and late_s > max(row.late_limit_s, GRACE_S):
-                    message = f"missed: the start was {_span(late_s)} late, and the limit is {_span(row.late_limit_s)}"
-                    self._store.starts.take(row, due, self._next(row, now), now, "missed", message)
-                    log.warning("schedule.missed", bench=self._bench, start=row.id, recipe=row.recipe, reason=message)
+                if why := self._why_missed(row, due, now):
+                    self._store.starts.take(row, due, self._next(row, now), now, "missed", why)
+                    log.warning("schedule.missed", bench=self._bench, start=row.id, recipe=row.recipe_name, reason=why)
                 elif self._runner.free and self.attended():
                     self._begin(row, due, now)
+            self._was_occupied = self._runner.occupied
+            if self._was_occupied:
+                self._occupied_until = self._clock.utc()
+
+    def _why_missed(self, row: StartRow, due: datetime, now: datetime) -> str:
+        """Say why a start that is due is too late to begin, and what to do; empty while it may begin."""
+        late_s = (now - due).total_seconds()
+        limit_s, counted_s, of_bench = row.late_limit_s, late_s, ""
+        if limit_s is None:
+            limit_s, of_bench = self._late_limit_s, " of a real bench"
+            counted_s = (now - max(due, self._occupied_until or due)).total_seconds()
+        if limit_s is None or counted_s <= max(limit_s, GRACE_S):
+            return ""
+        behind = f", {_span(counted_s)} of it without a campaign on the bench" if counted_s < late_s else ""
+        return (
+            f"missed: the start was {_span(late_s)} late{behind}, and the limit{of_bench} is {_span(limit_s)}; check "
+            f"the bench, then start recipe {row.recipe_name} again, now or with --at TIME"
+        )
 
     @staticmethod
     def _last_due(row: StartRow, cron: str, now: datetime) -> datetime:

@@ -69,8 +69,9 @@ class CampaignRequest(Request):
         default=None,
         ge=0,
         le=1e9,
-        description="Largest delay of the start, s: a start that is later is skipped. 0: every missed start is "
-        "skipped; default: no limit, a missed start begins late, once.",
+        description="Largest delay of the start, s, from its due time: a start that is later is skipped. 0: every "
+        "missed start is skipped. Default: on a simulated bench no limit, a missed start begins late, once; on a real "
+        "bench 3600, without the time behind a running campaign.",
     )
     confirmed_by: str = Field(
         default="",

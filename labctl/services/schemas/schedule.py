@@ -27,7 +27,10 @@ class ScheduledResponse(ResponseModel):
     id: int
     bench: str
     recipe: str
-    state: str = Field(description="State of the entry: waiting, ended (no start is to come) or cancelled.")
+    state: str = Field(
+        description="State of the entry: waiting, missed (a single start that was too late; it is listed until it is "
+        "removed), ended (no start is to come) or cancelled."
+    )
     due_at: datetime | None = Field(description="Time of the next start, in `time_zone`; null: no start is to come.")
     time_zone: str
     cron: str | None
@@ -38,7 +41,12 @@ class ScheduledResponse(ResponseModel):
         description="Effects hidden in the units of a simulated bench, each as EFFECT or EFFECT=SIZE.",
     )
     fit: bool = Field(default=True, description="Whether the campaign ends in a draft if its recipe has [fit].")
-    late_limit_s: float | None
+    late_limit_s: float | None = Field(description="Limit of the entry on the delay of a start, s; null: none given.")
+    missed_after_s: float | None = Field(
+        default=None,
+        description="Delay after which a start is missed and does not begin by itself, s: `late_limit_s`, else 3600 on "
+        "a bench that is not simulated, without the time behind a running campaign; null: any delay is permitted.",
+    )
     created_at: datetime
     note: str = ""
     history: list[StartEventResponse] = Field(default_factory=list)

@@ -183,6 +183,7 @@ class _Walk:
             max_rate_dps=settings.max_rate_dps,
             technology=settings.technology or None,
             datasheet=settings.datasheet,
+            datasheet_conventions=settings.datasheet_conventions,
             standards=standards_of(self._bench),
             notes=f"simulated: recipe {self._plan.recipe.name}, seed {self._seed()}",
         )

@@ -18,6 +18,9 @@ from labctl.store.schema import tables
 #: `claimed`: being started by the process that wrote it. The others are final.
 Outcome = Literal["claimed", "started", "refused", "missed"]
 
+#: States of an entry that a person still has to know of; `cancel` ends them.
+_OPEN = ("waiting", "missed")
+
 
 @dataclass(frozen=True)
 class NewStart:
@@ -40,7 +43,7 @@ class NewStart:
 
 @dataclass(frozen=True)
 class StartRow(NewStart):
-    """An entry of the schedule. State: waiting, ended, cancelled."""
+    """An entry of the schedule. State: waiting, missed (a single start that was too late), ended, cancelled."""
 
     id: int
     state: str
@@ -89,9 +92,9 @@ class Starts:
         return found[0]
 
     def all(self, *, ended: bool) -> list[StartRow]:
-        """Return what waits, next first; with `ended` also what is over."""
+        """Return what waits, next first, and what was missed and not removed since; with `ended` all entries."""
         s = tables.scheduled_starts.c
-        return self._rows(sa.true() if ended else s.state == "waiting", s.due_at, s.id)
+        return self._rows(sa.true() if ended else s.state.in_(_OPEN), s.due_at, s.id)
 
     def due(self, bench_name: str, at: datetime) -> list[StartRow]:
         """Return what should have begun on a bench by `at`: highest priority first, then the longest due."""
@@ -115,11 +118,13 @@ class Starts:
     ) -> StartEventRow | None:
         """Take a start that is due out of the queue and write down why; returns the event.
 
-        The entry waits for `next_due` from then on, or is over. None when it was cancelled or taken meanwhile.
+        The entry waits for `next_due` from then on, or is over; one that was missed stays in the list until a person
+        removes it. None when it was cancelled or taken meanwhile.
         """
         s = tables.scheduled_starts
         mine = sa.update(s).where(s.c.id == row.id, s.c.state == "waiting", s.c.due_at == row.due_at)
-        after = mine.values(state="ended") if next_due is None else mine.values(due_at=next_due)
+        over = "missed" if outcome == "missed" else "ended"
+        after = mine.values(state=over) if next_due is None else mine.values(due_at=next_due)
         newest = sa.select(sa.func.coalesce(sa.func.max(tables.campaigns.c.id), 0))
         with self._database.writing() as connection:
             if connection.execute(after).rowcount != 1:
@@ -181,9 +186,9 @@ class Starts:
         """End an entry; what it has started runs on. Raises NotFound, Conflict."""
         row = self.get(start)
         s = tables.scheduled_starts
-        waiting = sa.update(s).where(s.c.id == start, s.c.state == "waiting")
+        there = sa.update(s).where(s.c.id == start, s.c.state.in_(_OPEN))
         with self._database.writing() as connection:
-            if connection.execute(waiting.values(state="cancelled")).rowcount != 1:
+            if connection.execute(there.values(state="cancelled")).rowcount != 1:
                 raise Conflict(
                     f"scheduled start {start} has already ended (state: {self.get(start).state}); add a new "
                     "start to the schedule"

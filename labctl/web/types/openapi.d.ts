@@ -2543,7 +2543,7 @@ export interface components {
             priority?: number;
             /**
              * Late Limit S
-             * @description Largest delay of the start, s: a start that is later is skipped. 0: every missed start is skipped; default: no limit, a missed start begins late, once.
+             * @description Largest delay of the start, s, from its due time: a start that is later is skipped. 0: every missed start is skipped. Default: on a simulated bench no limit, a missed start begins late, once; on a real bench 3600, without the time behind a running campaign.
              */
             late_limit_s?: number | null;
             /**
@@ -6876,7 +6876,7 @@ export interface components {
             recipe: string;
             /**
              * State
-             * @description State of the entry: waiting, ended (no start is to come) or cancelled.
+             * @description State of the entry: waiting, missed (a single start that was too late; it is listed until it is removed), ended (no start is to come) or cancelled.
              */
             state: string;
             /**
@@ -6903,8 +6903,16 @@ export interface components {
              * @default true
              */
             fit: boolean;
-            /** Late Limit S */
+            /**
+             * Late Limit S
+             * @description Limit of the entry on the delay of a start, s; null: none given.
+             */
             late_limit_s: number | null;
+            /**
+             * Missed After S
+             * @description Delay after which a start is missed and does not begin by itself, s: `late_limit_s`, else 3600 on a bench that is not simulated, without the time behind a running campaign; null: any delay is permitted.
+             */
+            missed_after_s: number | null;
             /**
              * Created At
              * Format: date-time

@@ -114,7 +114,7 @@ def recording_of(make_points: Callable[..., Recording], grid: Any, **info: Any) 
     rate, warm = grid
     noise = np.random.default_rng(5).normal(0, 1e-3, len(rate))
     output = rate * 1.02 + 0.3 + 0.01 * (warm - 35) + noise
-    return make_points(rate, warm, output, datasheet={"bias_stability_dps": 2e-3}, **info)
+    return make_points(rate, warm, output, datasheet={"bias_stability_dps": 1e-3}, **info)
 
 
 EFFECTS = ["bias", "bias_temperature:1", "scale_factor"]

@@ -50,7 +50,7 @@ def measured(positions: tuple[str, ...] = THREE, outputs: tuple[str, ...] = AXES
     columns["temperature_c"] = columns.pop("chamber_c")
     info = RecordingInfo(
         serial="VECTOR", axes=outputs, kind="points", started_at=datetime(2026, 1, 5, tzinfo=UTC), max_rate_dps=100,
-        standards=(Standard(quantity="fixture_angle", u=FIXTURE_DEG),), datasheet={"bias_stability_dps": 1e-3},
+        standards=(Standard(quantity="fixture_angle", u=FIXTURE_DEG),), datasheet={"bias_stability_dps": 5e-4},
     )  # fmt: skip
     return Recording(info, columns)
 

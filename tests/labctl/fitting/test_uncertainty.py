@@ -35,7 +35,7 @@ def calibrated(make_points: Callable[..., Recording], grid: Any, model: str) -> 
     rate, warm = grid
     noise = np.random.default_rng(5).normal(0, NOISE_DPS, len(rate))
     output = rate * (1.2 + 1e-3 * (warm - 35)) + 0.3 + 0.01 * (warm - 35) + noise
-    recording = make_points(rate, warm, output, datasheet={"bias_stability_dps": 2 * NOISE_DPS})
+    recording = make_points(rate, warm, output, datasheet={"bias_stability_dps": NOISE_DPS})
     return build_calibration(
         recording.info,
         fit(recording, model),
@@ -154,12 +154,45 @@ def test_what_is_not_known_is_none_and_never_zero() -> None:
     assert one_run.repeatability_dps is one_run.combined_dps is one_run.expanded_dps is None
     assert list(one_run.unknown) == ["repeatability"]
     by_sheet = of_use(campaign(datasheet={"bias_stability_dps": 0.01}), 0.0, 20.0)
-    assert by_sheet.repeatability_dps == pytest.approx(0.005 * np.sqrt(2))
+    assert by_sheet.repeatability_dps == pytest.approx(0.01 * np.sqrt(2))
     assert by_sheet.expanded_dps is not None
     assert by_sheet.unknown == {}
     far = of_use(campaign(datasheet={"bias_stability_dps": 0.01}), 0.0, 90.0)
     assert far.model_dps is far.expanded_dps is None
     assert far.unknown == {"model": "no data set was measured near there"}
+
+
+@pytest.mark.parametrize(
+    ("convention", "u_over_figure", "shape"),
+    [
+        ("1 sigma", 1.0, "normal"),
+        ("maximum", 1 / np.sqrt(3), "triangular"),
+        ("peak to peak", 1 / np.sqrt(12), "triangular"),
+        ("typical", 1.48, "normal"),
+    ],
+)
+def test_a_figure_of_the_data_sheet_counts_by_its_convention_and_the_line_names_it(
+    convention: str, u_over_figure: float, shape: str
+) -> None:
+    sheet = {"bias_stability_dps": 0.01}
+    recording = campaign(datasheet=sheet, datasheet_conventions={"bias_stability_dps": convention})
+    budget = of_use(recording, 0.0, 20.0).budget
+    line = next(line for line in budget.lines if line.source == "repeatability")
+    assert line.u == pytest.approx(0.01 * u_over_figure * np.sqrt(2))
+    assert (line.name, line.kind, line.distribution) == (f"data sheet, {convention}", "B", shape)
+    assert line.why.startswith(f"bias stability 0.01 deg/s, {convention}: ")
+    assert of_use(recording, 0.0, 20.0).repeatability_source == "data sheet"
+
+
+def test_a_version_from_before_conventions_says_that_its_figure_was_halved() -> None:
+    [evidence] = evidence_of(campaign(datasheet={"bias_stability_dps": 0.01}), None, STRAIGHT).values()
+    record = evidence.to_json()
+    assert AxisEvidence.from_json(record).repeatability == evidence.repeatability
+    for key in ("repeatability_convention", "repeatability_text"):
+        del record[key]
+    earlier = AxisEvidence.from_json(record).repeatability
+    assert earlier is not None
+    assert "half the figure" in earlier.text
 
 
 def test_too_few_data_sets_near_a_place_are_said() -> None:

@@ -82,6 +82,60 @@ def test_the_simulated_unit_of_yang_2018_has_its_printed_coefficients_and_remain
             assert abs(value) == pytest.approx(named[f"K{turned}{out}"])
 
 
+def test_the_simulated_unit_of_yang_2018_changes_with_temperature_as_the_two_columns_of_k_g_say() -> None:
+    unit = make_unit("stim300", ("x", "y", "z"), {"profile": "yang-paper"}, [7])
+    gain, offset = (law(np.array([20.0, 25.0])) for law in (unit.gain, unit.offset))
+    printed, single = (
+        dict(zip(yang2018.NAMES, values, strict=True)) for values in (yang2018.PROPOSED, yang2018.TRADITIONAL)
+    )
+    rates = float(np.sqrt(np.mean(YANG_RATES_DPS**2)))
+    for row, axis in enumerate("xyz"):
+        change = float(gain[0, row, row] - gain[1, row, row])
+        # each printed factor is rounded, 1.001 to three digits after the point
+        assert change == pytest.approx(single[f"K{axis}{axis}"] - printed[f"K{axis}{axis}"], abs=2e-4)
+        assert abs(float(offset[0, row])) == pytest.approx(single[f"B{axis}"], abs=2e-4)
+        if axis != yang2018.MEANS:  # the traditional error is that of the proposed method and of the change
+            before, left = yang2018.TABLE_4[axis][axis][1:]
+            assert np.hypot(left, change * rates) == pytest.approx(before, rel=0.005)
+    np.testing.assert_allclose(gain[0][~np.eye(3, dtype=bool)], gain[1][~np.eye(3, dtype=bool)])
+
+
+def test_table_4_has_18_reductions_and_those_that_the_paper_prints_are_among_them() -> None:
+    rows = {each.id: each for each in yang2018.PAPER.printed if each.place == "Table 4, reductions"}
+    assert len(rows) == 18
+    misprinted = {"x": {"y": 10.0, "z": 10.0}}
+    for turned, outputs in yang2018.PRINTED_GAINS.items():
+        for output, percentage in outputs.items():
+            value = rows[f"gain_{turned}_{output}_traditional"].value
+            by = misprinted.get(turned, {}).get(output, 1.0)
+            assert value == pytest.approx(percentage / by, abs=0.02)
+    assert rows["gain_x_x_traditional"].value == pytest.approx(26.75, abs=0.005)
+
+
+def test_table_1_of_ojeda_2000_has_its_11_rows() -> None:
+    rows = [each for each in PAPERS["ojeda2000"].printed if each.place == "Table I"]
+    assert len(rows) == 11
+    assert all(each.value is not None for each in rows)
+
+
+def test_the_simulated_rd2100_of_the_paper_has_errors_that_no_surface_of_its_orders_follows() -> None:
+    rate, warm = (grid.ravel() for grid in np.meshgrid(np.arange(-100.0, 101.0, 10.0), np.arange(25.0, 46.0, 2.0)))
+    u, v = (warm - 35.0) / 10.0, rate / 100.0
+    surface = np.column_stack([u**j * v**i for i in range(4) for j in range(3)])
+    left = {}
+    for profile in ("rd2100", "rd2100-paper"):
+        unit = make_unit("kvh-rd2100", ("z",), {"profile": profile}, [1])
+        assert unit.bend is not None
+        error = rate * (unit.gain(warm)[:, 0, 2] - 1.0) + unit.offset(warm)[:, 0] + unit.bend(rate[:, None], warm)[:, 0]
+        rest = error - surface @ np.linalg.lstsq(surface, error)[0]
+        fast = np.abs(rate) >= 5.0
+        share = float(np.max(np.abs(rest[fast] / rate[fast])))
+        left[profile] = (float(np.sqrt(np.mean(error**2) / np.mean(rest**2))), share)
+    assert left["rd2100"][0] > 1000.0
+    assert 7.0 < left["rd2100-paper"][0] < 15.0  # "about one order of magnitude"
+    assert left["rd2100-paper"][1] < 0.02  # "less than 2 %" of a turn
+
+
 def test_the_page_of_the_documentation_has_every_printed_number() -> None:
     page = (ROOT / "docs" / "explanation" / "papers.md").read_text(encoding="utf-8")
     rows = {tuple(cell.strip() for cell in line.split("|")[1:5]) for line in page.splitlines() if line.startswith("| ")}

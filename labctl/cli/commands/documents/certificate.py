@@ -110,7 +110,7 @@ def issue(
     issued = f"issued {answer.issued_at:%Y-%m-%d} by {answer.by}"
     issued += f", replaces {answer.replaces}" if answer.replaces else ""
     issued += f", signed by {answer.signed_by.subject}" if answer.signed_by else ""
-    console.print(f"certificate {answer.number} of {serial} version {number}, {issued} -> {out}", markup=False)
+    console.print(f"certificate {answer.number} of {serial} version {number}, {issued} -> {out}")
     _say_state(answer)
 
 
@@ -144,7 +144,7 @@ def withdraw(
         print_json(answer)
         return
     said = f"certificate {answer.number} of {answer.serial} version {answer.version} is {state_text(answer)}"
-    console.print(said, markup=False, soft_wrap=True)
+    console.print(said, soft_wrap=True)
 
 
 def _say_state(answer: CertificateResponse) -> None:
@@ -153,7 +153,7 @@ def _say_state(answer: CertificateResponse) -> None:
 
     if answer.state != "valid":
         said = f"labctl: certificate {answer.number} is {state_text(answer)}"
-        stderr.print(said, style="bold red", markup=False, soft_wrap=True)
+        stderr.print(said, style="bold red", soft_wrap=True)
 
 
 def read_order(path: Path | None) -> CertificateOrder:

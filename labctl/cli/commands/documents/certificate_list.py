@@ -40,7 +40,7 @@ def certificates(serial: Serial, as_json: Json = False, database: Database = Non
         print_json(rows)
         return
     for row in rows:
-        console.print(list_line(row), markup=False, soft_wrap=True)
+        console.print(list_line(row), soft_wrap=True)
 
 
 @app.command("verify")
@@ -79,13 +79,13 @@ def _print(file: Path, answer: VerifiedFileResponse) -> None:
     from labctl.cli.printing.certificates import state_text
 
     number = f"certificate {answer.number}" if answer.number else "a file without a certificate's number"
-    console.print(f"{file}: {number}, {REGISTER[answer.in_register]}", markup=False, soft_wrap=True)
+    console.print(f"{file}: {number}, {REGISTER[answer.in_register]}", soft_wrap=True)
     if answer.certificate is not None and answer.certificate.state != "valid":
-        console.print(state_text(answer.certificate), markup=False, soft_wrap=True)
+        console.print(state_text(answer.certificate), soft_wrap=True)
     for each in answer.signatures:
-        console.print(_signature(each), markup=False, soft_wrap=True)
+        console.print(_signature(each), soft_wrap=True)
     if not answer.signatures:
-        console.print("no signature", markup=False, soft_wrap=True)
+        console.print("no signature", soft_wrap=True)
 
 
 def _signature(found: SignatureResponse) -> str:

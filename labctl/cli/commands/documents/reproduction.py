@@ -63,19 +63,27 @@ def reproduce(
 
 def _print(answer: ReproductionResponse) -> None:
     shown = table(
-        answer.title, "place", "quantity", "unit", "made from", "printed", "reproduced", "difference", numbers=3
+        answer.title,
+        "place",
+        "quantity",
+        "unit",
+        "made from",
+        "origin",
+        "printed",
+        "reproduced",
+        "difference",
+        numbers=3,
     )
     for number in answer.numbers:
-        shown.add_row(number.place, number.quantity, number.unit, number.of, *_cells(number))
+        shown.add_row(number.place, number.quantity, number.unit, number.of, number.origin, *_cells(number))
     console.print(shown)
     for line in answer.story:
-        console.print(line, markup=False)
+        console.print(line)
     for part in answer.missing:
-        console.print(f"not made: {part.what}: {part.why}; record {part.record}", style="yellow", markup=False)
+        console.print(f"not made: {part.what}: {part.why}; record {part.record}", style="yellow")
     console.print(
         f"{len(answer.figures)} figures, {len(answer.contradictions)} contradictions of the paper -> "
         + ", ".join(str(Path(answer.folder) / name) for name in answer.files),
-        markup=False,
     )
 
 

@@ -61,7 +61,7 @@ def uncertainty(
 
     print_uncertainty(answer)
     if figure is not None:
-        console.print(f"contributions -> {figure}", markup=False)
+        console.print(f"contributions -> {figure}")
 
 
 def _rates(text: str | None) -> list[float] | None:

@@ -58,7 +58,7 @@ def _explained(design: Design, found: AxisEvidence, option: int) -> NDArray[np.f
 
 def _noise_of(data: ReducedRecording, design: Design, y: NDArray[np.float64], axis: str) -> tuple[Array, list[Noise]]:
     """Return the white variance of each mean, (m,) (deg/s)^2, and the drifts to average over."""
-    stability = data.info.datasheet.get("bias_stability_dps")
+    stability = data.info.stability_dps
     known = data.white_var
     white = known[axis] if known is not None else np.full(len(data), max(_floor_squared(design, y), LEAST_VAR))
     level = float(np.sqrt(np.median(white)))

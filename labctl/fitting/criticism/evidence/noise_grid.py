@@ -42,7 +42,8 @@ class Noise:
 def expected_drift_dps(technology: str, stability_dps: float | None, instability_dps: float | None = None) -> float:
     """Return the expected size of the drift, deg/s: measured at rest, else by the data sheet, else by the technology.
 
-    `stability_dps` is the data sheet's bias stability, `instability_dps` the bias instability B of a static record.
+    `stability_dps` is the data sheet's bias stability as a standard deviation; it covers the worse units, so half of it
+    is expected, within `PRIOR_FACTOR`. `instability_dps` is the bias instability B of a static record.
     """
     if instability_dps is not None:
         return DRIFT_PER_INSTABILITY * instability_dps

@@ -47,7 +47,7 @@ def bias_of(readings: PoseReadings, rests: Rests, force_g: NDArray[np.float64], 
     k = int(np.count_nonzero(used))
 
     def of(axis: int) -> Solution:
-        stability = readings.info.datasheet.get("bias_stability_dps")
+        stability = readings.info.stability_dps
         scatter = Scatter(rests.t_s[used], np.ones(k, dtype=np.int64), np.zeros(k), white[used, axis], stability)
         return solve(design[used], rest[used, axis], scatter)
 

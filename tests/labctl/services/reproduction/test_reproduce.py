@@ -146,6 +146,10 @@ def test_the_page_stands_alone_and_its_numbers_are_those_printed_as_json(lab: La
         expected = number["reproduced"] - number["printed"] if known else None
         assert number["difference"] == (None if expected is None else pytest.approx(expected))
         assert number["why"]
+        assert number["origin"] in (
+            {"measured", "simulated", "built in", "computed"} if number["reproduced"] is not None else {""}
+        )
+        assert f"<td>{number['origin']}</td>" in shown.replace(' class="words"', "")
     assert sorted(p.name for p in (lab.folder / "out").iterdir()) == ["weiss1995.html", "weiss1995.json"]
 
 

@@ -17,58 +17,13 @@ from labctl.services.commands.registry import START_CAMPAIGN
 from labctl.services.commands.requests import CampaignStart
 from labctl.services.lab_service import LabService
 from labctl.services.local_bench import LocalBench
-from labctl.services.planning.loading import load_bench
-from labctl.services.schedule.queue import add_start, cancel_start, is_scheduled, list_starts, start_status
+from labctl.services.schedule.queue import cancel_start, is_scheduled, list_starts, start_status
 from labctl.services.schedule.scheduler import Scheduler
-from labctl.services.schemas.campaigns import CampaignRequest, CampaignResponse
+from labctl.services.schemas.campaigns import CampaignRequest
 from labctl.store import Store, open_store
 from labctl.store.connection.database import Database
 from procedures.contracts.errors import PlanRefused
-
-BENCH = load_bench("single-axis-sim")
-START = datetime(2026, 1, 5, 8, tzinfo=UTC)
-
-
-class Lab:
-    """A store, a virtual clock and a bench that only notes what is asked of it."""
-
-    def __init__(self, store: Store, start: datetime = START) -> None:
-        self.store = store
-        self.clock = VirtualClock(start)
-        self.free = True
-        self.went_on = 0
-        self.begun: list[tuple[datetime, str]] = []
-        self.refusal: BaseException | None = None
-        self.scheduler = self.service()
-
-    def service(self) -> Scheduler:
-        return Scheduler(self.store, self.clock, self, BENCH.name)
-
-    def resume_interrupted(self) -> None:
-        self.went_on += 1
-
-    def start(self, request: CampaignRequest, *, attended: bool) -> CampaignResponse:
-        assert not attended
-        if self.refusal is not None:
-            raise self.refusal
-        self.begun.append((self.clock.utc(), request.recipe))
-        raise Conflict("a bench of paper")  # what is tried counts here; real campaigns come below
-
-    def enter(self, recipe: str = "short", **when: object) -> int:
-        request = CampaignRequest.model_validate({"recipe": recipe, **when})
-        return add_start(self.store, request, BENCH, self.clock.utc()).id
-
-    def live(self, duration: timedelta, every_s: float = 60.0) -> None:
-        until = self.clock.utc() + duration
-        while self.clock.utc() < until:
-            self.scheduler.tick()
-            self.clock.sleep(every_s)
-
-    def outcomes(self, start: int) -> list[str]:
-        return [event.outcome for event in start_status(self.store, start).history]
-
-    def message(self, start: int) -> str:
-        return start_status(self.store, start).history[-1].message
+from tests.helpers.schedule_lab import BENCH, START, Lab
 
 
 @pytest.fixture
@@ -128,37 +83,6 @@ def test_a_missed_start_begins_late_and_once_for_all_that_were_missed(lab: Lab) 
     history = start_status(lab.store, daily).history
     assert [event.due_at for event in history] == [datetime(2026, 1, 8, 2, tzinfo=UTC)]
     assert start_status(lab.store, daily).due_at == datetime(2026, 1, 9, 2, tzinfo=UTC)
-
-
-def test_a_limit_on_lateness_is_kept(lab: Lab) -> None:
-    at = "2026-01-05T10:00Z"
-    patient, hasty, strict = (lab.enter(at=at, late_limit_s=limit) for limit in (7200, 3600, 0))
-    lab.clock.sleep(2 * 3600 + 5400)  # 1.5 h late
-    lab.scheduler.tick()
-    assert [lab.outcomes(start)[0] for start in (patient, hasty, strict)] == ["refused", "missed", "missed"]
-    assert lab.message(hasty) == "missed: the start was 1 h 30 min late, and the limit is 1 h 00 min"
-    assert len(lab.begun) == 1
-
-
-def test_a_start_that_may_not_be_late_begins_on_time(lab: Lab) -> None:
-    lab.enter(at="2026-01-05T10:00Z", late_limit_s=0)
-    lab.live(timedelta(hours=3), every_s=50.0)
-    assert len(lab.begun) == 1
-
-
-def test_waiting_behind_another_campaign_counts_as_late(lab: Lab) -> None:
-    strict = lab.enter(at="now", late_limit_s=0)
-    lab.free = False
-    lab.live(timedelta(minutes=5))
-    assert (lab.outcomes(strict), lab.begun) == (["missed"], [])
-
-
-def test_a_cron_line_that_may_not_be_late_goes_on_the_next_day(lab: Lab) -> None:
-    daily = lab.enter(cron="0 2 * * *", time_zone="UTC", late_limit_s=0)
-    lab.clock.sleep(86400)
-    lab.live(timedelta(days=1))
-    assert [at for at, _ in lab.begun] == [datetime(2026, 1, 7, 2, tzinfo=UTC)]
-    assert lab.outcomes(daily) == ["missed", "refused"]
 
 
 def test_a_refused_start_says_why_and_does_not_block_the_others(lab: Lab) -> None:

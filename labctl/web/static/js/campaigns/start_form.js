@@ -46,7 +46,12 @@ export function startForm(bench, order) {
     (Intl.supportedValuesOf?.("timeZone") ?? []).map((value) => h("option", { value })),
   );
   const priority = h("input", { type: "number", value: "0", min: "-100", max: "100", step: "1" });
-  const late = h("input", { type: "number", min: "0", step: "any", placeholder: "any time" });
+  const late = h("input", {
+    type: "number",
+    min: "0",
+    step: "any",
+    placeholder: bench?.simulated === false ? "1" : "any time",
+  });
   const seed = h("input", { type: "number", value: "1", min: "0", step: "1" });
 
   const attended = h("div", { "aria-live": "polite" });

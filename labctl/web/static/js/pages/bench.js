@@ -72,7 +72,7 @@ export async function page({ signal }) {
       idleBench(
         bench,
         whole,
-        schedule.find((each) => each.bench === bench.name),
+        schedule.find((each) => each.bench === bench.name && each.state === "waiting"),
       ),
     );
     element.append(checkCard(bench, !bench.unconfirmed, show));

@@ -155,7 +155,7 @@ function scheduleCard(rows, again) {
         {
           title: "Begins",
           cell: (row) => [
-            startTime(row),
+            row.state === "missed" ? chip("missed", "warn") : startTime(row),
             row.confirmed_by
               ? h(
                   "span",
@@ -186,7 +186,7 @@ function scheduleCard(rows, again) {
         {
           title: "May be late by",
           number: true,
-          cell: (row) => (row.late_limit_s === null ? "any time" : duration(row.late_limit_s)),
+          cell: (row) => (typeof row.missed_after_s === "number" ? duration(row.missed_after_s) : "any time"),
         },
         {
           title: "Before",
@@ -196,7 +196,7 @@ function scheduleCard(rows, again) {
           title: h("span", { class: "visually-hidden" }, "Cancel"),
           cell: (row) =>
             button(
-              "Cancel",
+              row.state === "missed" ? "Remove" : "Cancel",
               async () => {
                 await remove("/api/schedule/{start}", { path: { start: row.id } });
                 await again();
