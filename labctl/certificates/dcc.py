@@ -156,7 +156,9 @@ def _measured(parent: ET.Element, given: Certificate) -> None:
         one = child(conditions, "influenceCondition")
         texts(one, "name", condition.name)
         data = child(one, "data")
-        quantity(data, "Least and largest mean of a data set", [condition.low, condition.high], condition.unit)
+        quantity(
+            data, "Least and largest value during the calibration", [condition.low, condition.high], condition.unit
+        )
     _results(child(made, "results"), given)
 
 

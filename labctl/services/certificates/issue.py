@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from datetime import date, datetime
 
 from instruments.standards import Standard
@@ -14,6 +15,7 @@ from labctl.services.certificates.facts import Facts, facts_of
 from labctl.services.certificates.found import Found
 from labctl.services.certificates.missing import MissingFacts
 from labctl.services.schemas.documents.certificates import CertificateOrder, CertificateRequest, CertificateResponse
+from labctl.services.standards.usage import Notices
 from labctl.store import CertificateForms, CertificateRow, Store
 
 
@@ -30,13 +32,15 @@ def issue(store: Store, serial: str, version: int, request: CertificateRequest, 
     """
     kept = store.certificates.newest(store.units.get(serial).serial, version)
     if kept is not None and request.amend is None:
-        return response(_unchanged(kept, request))
+        recordings = store.calibrations.get(serial, version).recordings
+        return response(_unchanged(kept, request), notices=Notices.of(store).of_recordings(recordings))
     if kept is None and request.amend is not None:
         raise CertificateRefused(f"{serial} version {version} has no certificate to amend; issue one without --amend")
     order = CertificateOrder.model_validate(kept.order) if kept and not _given(request) else request.order
     facts = facts_of(store, serial, version, order)
     found = Found.of(store, facts)
     refuse(facts, found)
+    _refuse_bad(store, facts)
     certificate = assembled(store, facts, found, request, at, kept)
     document = certificate.to_bytes()
     xml = dcc_of(certificate)
@@ -96,13 +100,23 @@ def _refuse_dates(facts: Facts) -> None:
         )
 
 
+def _refuse_bad(store: Store, facts: Facts) -> None:
+    """Raise CertificateRefused for measurements with a standard that was found bad on those days."""
+    if bad := Notices.of(store).of_recordings([row.id for row in facts.recordings]):
+        raise CertificateRefused(
+            f"no certificate of {facts.what}: {'; '.join(bad)}, and the calibration was measured with it from "
+            f"{facts.performed_from} to {facts.performed_until}. Measure again with another standard; a finding that "
+            "was wrong is withdrawn by `labctl standards withdraw`"
+        )
+
+
 def _off(standard: Standard, first: date, last: date) -> bool:
     return standard.is_overdue(last) or (standard.calibrated is not None and standard.calibrated > first)
 
 
-def response(row: CertificateRow, replaced_by: str | None = None) -> CertificateResponse:
+def response(row: CertificateRow, replaced_by: str | None = None, notices: Sequence[str] = ()) -> CertificateResponse:
     """Return a certificate as an answer."""
     return CertificateResponse(
         serial=row.serial, version=row.version, number=row.number, issued_at=row.at, by=row.by, hash=row.hash,
-        replaces=row.replaces, reason=row.reason, replaced_by=replaced_by,
+        replaces=row.replaces, reason=row.reason, replaced_by=replaced_by, notices=list(notices),
     )  # fmt: skip

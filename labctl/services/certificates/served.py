@@ -8,6 +8,7 @@ from typing import Literal, get_args
 from labctl.errors import BadInput, NotFound
 from labctl.services.certificates.issue import response
 from labctl.services.schemas.documents.certificates import CertificateResponse
+from labctl.services.standards.usage import Notices
 from labctl.store import Store
 
 CertificateFormat = Literal["pdf", "xml", "json"]
@@ -55,4 +56,6 @@ def list_certificates(store: Store, serial: str) -> list[CertificateResponse]:
     """Return every certificate of a unit, newest first. Raises NotFound."""
     rows = store.certificates.of_unit(store.units.get(serial).serial)
     by = {row.replaces: row.number for row in rows if row.replaces}
-    return [response(row, by.get(row.number)) for row in rows]
+    notices = Notices.of(store)
+    behind = {row.version: row.recordings for row in store.calibrations.of_unit(serial)} if notices.bad else {}
+    return [response(row, by.get(row.number), notices.of_recordings(behind.get(row.version, ()))) for row in rows]

@@ -11,7 +11,15 @@ from labctl.store.schema.certificates import certificates
 from labctl.store.schema.drafts import drafts
 from labctl.store.schema.manifests import block_digests, manifest_head, manifests
 from labctl.store.schema.recordings import data_set_means, data_sets, environment, recordings, sample_blocks
+from labctl.store.schema.room_environment import room_environment
 from labctl.store.schema.schedule import scheduled_starts, start_events
+from labctl.store.schema.standards import (
+    check_gyros,
+    standard_certificates,
+    standard_checks,
+    standard_findings,
+    standards,
+)
 from labctl.store.schema.types import Instant, metadata
 from labctl.store.schema.units import units
 
@@ -27,6 +35,7 @@ __all__ = [
     "campaigns",
     "certificates",
     "certifications",
+    "check_gyros",
     "data_set_means",
     "data_sets",
     "drafts",
@@ -37,8 +46,13 @@ __all__ = [
     "manifests",
     "metadata",
     "recordings",
+    "room_environment",
     "sample_blocks",
     "scheduled_starts",
+    "standard_certificates",
+    "standard_checks",
+    "standard_findings",
+    "standards",
     "start_events",
     "steps",
     "units",

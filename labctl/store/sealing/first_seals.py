@@ -10,7 +10,7 @@ from instruments.clock import SystemClock
 from labctl.errors import StoreError
 from labctl.store import sample_codec
 from labctl.store.manifests import chain
-from labctl.store.manifests.contents import KINDS, Kind
+from labctl.store.manifests.contents import FIRST_KINDS, Kind
 from labctl.store.manifests.digests import block_digests
 from labctl.store.manifests.parts import Parts, parts_of
 from labctl.store.schema import tables
@@ -26,7 +26,7 @@ def seal_all(connection: sa.Connection) -> None:
     reason = f"sealed by migration on {at:%Y-%m-%d}"
     chain.begin(connection)
     _digest_blocks(connection)
-    for kind in KINDS.values():
+    for kind in FIRST_KINDS:
         _seal_kind(connection, kind, at, reason)
     if connection.execute(sa.select(tables.audit.c.id).limit(1)).first() is not None:
         chain.note_audit_row(connection, at)
