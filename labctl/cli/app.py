@@ -20,6 +20,7 @@ from labctl.cli.commands import (
     criticism,
     database,
     effects,
+    environment,
     keys,
     noise,
     plugins,
@@ -27,6 +28,7 @@ from labctl.cli.commands import (
     schedule,
     seal_key,
     server,
+    standards,
     trend,
 )
 from labctl.cli.commands.documents import certificate, datasheet, reproduction, uncertainty
@@ -52,6 +54,8 @@ app.add_typer(recordings.export_app, name="export")
 app.add_typer(keys.app, name="key")
 app.add_typer(audit.app, name="audit")
 app.add_typer(seal_key.app, name="seal-key")
+app.add_typer(standards.app, name="standards")
+app.add_typer(environment.app, name="environment")
 COMMANDS: dict[str, Callable[..., None]] = {
     "demo": server.demo,
     "serve": server.serve,

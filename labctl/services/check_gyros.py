@@ -15,6 +15,7 @@ from typing import Literal
 from labctl.calibration import read_calibration
 from labctl.errors import BadInput, LabctlError, NotEnoughData
 from labctl.metrology.control_chart import ChartPoint, Judged, judged
+from labctl.services.cache import UNNAMED, compute
 from labctl.services.calibrations.uncertainty import coefficients_at
 from labctl.services.schemas.validity import CheckGyroChart, CheckGyroPoint, CheckGyroRequest, CheckGyroResponse
 from labctl.services.standards.checks import limits_answer, out_text
@@ -56,6 +57,7 @@ def check_gyro(store: Store, serial: str, temperature_c: float | None = None) ->
 
     Raises NotFound; NotEnoughData for a unit without a version.
     """
+    compute(UNNAMED)
     unit = store.units.get(serial).serial
     mark = next((row for row in store.check_gyros.all() if row.serial == unit), None)
     chosen = temperature_c if temperature_c is not None else mark.temperature_c if mark else None

@@ -12,6 +12,7 @@ from labctl.calibration import Calibration, read_calibration
 from labctl.errors import BadInput, Conflict
 from labctl.fitting.uncertainty import BenchConditions, Budget
 from labctl.metrology.interlaboratory import Result, en_number, en_performance, zeta_performance, zeta_score
+from labctl.services.cache import UNNAMED, compute
 from labctl.services.calibrations.uncertainty import coefficients_at
 from labctl.services.schemas.validity import ComparedCalibration, ComparedResult, LaboratoryComparison
 from labctl.services.standards.usage import performed
@@ -38,6 +39,7 @@ def compare(
     Raises NotFound; BadInput for versions of two units, for ranges without a common temperature, and for a temperature
     outside them; Conflict for versions that rest on the same recording.
     """
+    compute(UNNAMED)
     if first[0] != second[0]:
         raise BadInput(
             f"{first[0]} and {second[0]}: En and zeta compare results of one unit; give two versions of one serial "
