@@ -43,14 +43,16 @@ def add(
     from labctl.services.commands.standards import ADD_ENVIRONMENT
     from labctl.services.schemas.validity import RoomEnvironmentRequest, RoomRecord, RoomValue
 
-    given = [
-        RoomValue.model_validate({"quantity": quantity, "value": value, "unit": unit})
-        for quantity, value, unit in (
-            ("temperature", temperature_c, "deg C"), ("humidity", humidity_pct, "%"), ("pressure", pressure_hpa, "hPa"),
-        )
-        if value is not None
-    ]  # fmt: skip
     with one_clear_line():
+        given = [
+            RoomValue.model_validate({"quantity": quantity, "value": value, "unit": unit})
+            for quantity, value, unit in (
+                ("temperature", temperature_c, "deg C"),
+                ("humidity", humidity_pct, "%"),
+                ("pressure", pressure_hpa, "hPa"),
+            )
+            if value is not None
+        ]  # fmt: skip
         if not given:
             raise BadInput("nothing was read: give --temperature-c, --humidity-pct or --pressure-hpa")
         record = RoomRecord(measured_at=instant(at, "--at"), values=given)

@@ -44,9 +44,12 @@ def print_standard(answer: StandardResponse) -> None:
         console.print(rows)
     for found in answer.predictions:
         where = "" if found.nominal is None else f" at {found.nominal:g}"
+        drift = _drift(found) if found.per_year is None else f"drift per year {_drift(found)}"
         value = "not stated" if found.value is None else f"{found.value:.4g}"
         console.print(
-            f"on {found.on}{where}: error {value}, u = {found.u:.3g} {answer.unit}; drift {_drift(found)}", markup=False
+            f"on {found.on}{where}: error {value}, u = {found.u:.3g} {answer.unit}; {drift}",
+            markup=False,
+            soft_wrap=True,
         )
     if answer.checks:
         rows = table("intermediate checks", "time", "by", "state", "limits", "nominal", "value", "u", numbers=3)

@@ -112,7 +112,9 @@ def _text(standard: RegisteredStandard, found: Sequence[AffectedCalibration]) ->
         return
     units = len({each.serial for each in found})
     issued = [number for each in found for number in each.certificates]
-    yield f"{len(found)} calibrations of {units} units were measured with standard {label} on these days."
+    what = "calibration" if len(found) == 1 else "calibrations"
+    of, was = ("unit", "was") if units == 1 == len(found) else ("unit" if units == 1 else "units", "were")
+    yield f"{len(found)} {what} of {units} {of} {was} measured with standard {label} on these days."
     if issued:
         yield f"Certificates issued of them: {', '.join(issued)}. Inform those who hold them, and measure again."
     if any(each.in_force for each in found):

@@ -36,8 +36,8 @@ def measure(store: Store, week: int, bias_dps: float, scale: float = 0.0, *, fit
     """Import a recording of the unit with an error added to its output, and fit it; returns the recording."""
     recording = simulated()
     day = FIRST + timedelta(weeks=week)
-    rate = recording.columns["z_rate_dps"]
-    columns = {**recording.columns, "z_rate_dps": np.asarray(rate) * (1 + scale) + bias_dps}
+    rate = recording.columns["gyro_z"]
+    columns = {**recording.columns, "gyro_z": np.asarray(rate) * (1 + scale) + bias_dps}
     info = recording.info.model_copy(update={"serial": SERIAL, "started_at": noon(day), "standards": ()})
     number = store.recordings.add_import(replace(recording, info=info, columns=columns), noon(day))
     if fitted:

@@ -37,7 +37,7 @@ def clock(u_ppm: float, certificate: str) -> Standard:
 def measure(store: Store, day: date, standard: Standard, scale: float = 0.0, serial: str = SERIAL) -> int:
     """Import a recording with a scale factor error added, fit it; returns the version."""
     recording = simulated()
-    columns = {**recording.columns, "z_rate_dps": np.asarray(recording.columns["z_rate_dps"]) * (1 + scale)}
+    columns = {**recording.columns, "gyro_z": np.asarray(recording.columns["gyro_z"]) * (1 + scale)}
     update = {"serial": serial, "started_at": noon(day), "standards": (standard,)}
     info = recording.info.model_copy(update=update)
     number = store.recordings.add_import(replace(recording, info=info, columns=columns), noon(day))
@@ -56,33 +56,33 @@ def scale_factor(found: LaboratoryComparison) -> ComparedResult:
 
 
 def test_scores_of_two_laboratories_with_standards_of_their_own(store: Store) -> None:
-    found = compared(store, clock(100.0, "A-1"), clock(200.0, "B-1"), -500e-6)
+    found = compared(store, clock(6000.0, "A-1"), clock(9000.0, "B-1"), -0.03)
     one = scale_factor(found)
     assert found.shared == []
     assert one.shared_u == 0.0
-    assert one.difference == pytest.approx(500e-6, rel=0.02)
+    assert one.difference == pytest.approx(0.03 * (1 + one.values[0]), rel=1e-3)
     assert one.en == pytest.approx(one.difference / math.hypot(*one.expanded))
     assert one.en == one.en_if_independent
     u = [expanded / k for expanded, k in zip(one.expanded, one.k, strict=True)]
     assert one.zeta == pytest.approx(one.difference / math.hypot(*u))
-    assert u[0] == pytest.approx(100e-6, rel=0.2)  # the clock leads in both
+    assert u[0] == pytest.approx(6e-3, rel=0.05)  # the clock leads in both
     assert one.en_performance == "unsatisfactory"
     assert not found.satisfactory
     assert found.text[0].startswith("scale_factor of axis z: En = 1.")
 
 
 def test_laboratories_that_agree(store: Store) -> None:
-    found = compared(store, clock(100.0, "A-1"), clock(200.0, "B-1"), -100e-6)
+    found = compared(store, clock(6000.0, "A-1"), clock(9000.0, "B-1"), -0.01)
     assert found.satisfactory
     assert found.text == ["All 2 results agree within their expanded uncertainties (|En| <= 1)."]
 
 
 def test_a_shared_standard_is_said_and_its_part_subtracted(store: Store) -> None:
-    same = clock(200.0, "A-1")
-    found = compared(store, same, same, -150e-6)
+    same = clock(9000.0, "A-1")
+    found = compared(store, same, same, -4e-3)
     one = scale_factor(found)
     assert found.shared == [same.label]
-    assert one.shared_u == pytest.approx(200e-6, rel=0.02)
+    assert one.shared_u == pytest.approx(9e-3 * (1 + one.values[0]), rel=5e-3)
     assert abs(one.en_if_independent) < 1 < abs(one.en)  # the clock cannot explain what it adds to both
     assert any("correlated by it" in text for text in found.text)
 
