@@ -17,10 +17,12 @@ import sqlalchemy as sa
 from labctl.errors import DatabaseUnreachable, StoreError
 from labctl.services.campaigns.execution import run_here
 from labctl.services.schemas.campaigns import StartRequest
-from labctl.store import Store, open_store
+from labctl.store import CheckGyroRow, RoomReading, Store, check, open_store
 from labctl.store.connection import postgresql_server
 from labctl.store.connection.database import Database
 from labctl.store.schema import tables
+from tests.helpers import register
+from tests.helpers.certificates import simulated
 from tests.helpers.postgresql import Cluster, running_cluster
 
 pytestmark = pytest.mark.timeout(300)
@@ -232,3 +234,26 @@ def test_a_writer_that_hangs_is_told_and_then_ended_by_the_server(url: str, monk
     assert subjects(patient) == ["row 2"]
     for store in (hasty, patient, hanging):
         store.close()
+
+
+def test_the_register_of_standards_is_the_same_as_in_a_file(url: str, tmp_path: Path) -> None:
+    path = str(tmp_path / "lab.sqlite")
+    for location in (path, url):
+        with open_store(location, write=True) as store:
+            register.add(store)
+            register.certificate(store, "T-1", AT.date(), 0.010, due="2027-01-31")
+            register.check(store, AT.date(), 0.012)
+            register.bad(store, AT.date(), None, AT.date())
+            reading = RoomReading(AT, "", "temperature", "deg C", 21.5, "TH-3")
+            store.room_environment.add([reading], AT, "T. Technician")
+            store.units.get(store.recordings.get(store.recordings.add_import(simulated(), AT)).serial)
+            store.check_gyros.add(CheckGyroRow("FOG-0001", "mark", 25.0, AT.date(), "stays", "Q", AT))
+            assert store.standards.get("SN-0815") == store.standards.all()[0]
+            assert [each.high for each in store.room_environment.spans(AT, AT, "any")] == [21.5]
+            assert [each.chart_from for each in store.check_gyros.all()] == [AT.date()]
+        assert not check(location).findings
+    in_file, on_server = rows_of(path), rows_of(url)
+    for name in ("standards", "standard_certificates", "standard_checks", "standard_findings", "check_gyros"):
+        assert len(in_file[name]) == 1
+    for name in (*in_file.keys() - {"block_digests"},):
+        assert on_server[name] == in_file[name], name
