@@ -188,15 +188,19 @@ def prepare(
             bench_clear=bench_clear,
         )
         number = store.campaigns.create(new, clock.utc())
-        log.info(
-            "campaign.planned", campaign=number, bench=bench_file.name, recipe=recipe.name, steps=len(plan.steps),
-            datasets=plan.datasets, expected_s=round(plan.expected_s), simulated=bench_file.is_simulated,
-            units=[unit.info["serial"] for unit in units], by=actor().name,
-        )  # fmt: skip
+        _log_planned(number, bench_file, plan, units)
         return Prepared(number, plan, bench, clock, operator_of(bench))
     except BaseException:
         bench.close()
         raise
+
+
+def _log_planned(number: int, bench: BenchFile, plan: Plan, units: tuple[NewUnit, ...]) -> None:
+    log.info(
+        "campaign.planned", campaign=number, bench=bench.name, recipe=plan.recipe.name, steps=len(plan.steps),
+        datasets=plan.datasets, expected_s=round(plan.expected_s), simulated=bench.is_simulated,
+        units=[unit.info["serial"] for unit in units], by=actor().name,
+    )  # fmt: skip
 
 
 def _with_reported(store: Store, bench: BenchFile, identities: Mapping[str, GyroIdentity]) -> BenchFile:

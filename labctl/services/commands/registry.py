@@ -248,12 +248,12 @@ CREATE_KEY = Command(method="POST", path="/api/keys", handler=_create_key, respo
 REVOKE_KEY = Command(method="POST", path="/api/keys/{name}/revoke", handler=_revoke_key, responses={200: KeyResponse})
 NOTE_BACKUP = Command(method="POST", path="/api/backups", handler=_note_backup, responses={204: NoContent})
 
-OF_STANDARDS: tuple[Command[Any, Any], ...] = (
+_OF_STANDARDS: tuple[Command[Any, Any], ...] = (
     ADD_STANDARD, ADD_STANDARD_CERTIFICATE, ADD_STANDARD_CHECK, MARK_STANDARD_BAD, WITHDRAW_FINDING, SET_CHECK_GYRO,
     ADD_ENVIRONMENT,
 )  # fmt: skip
 #: All of them, in the order above.
 COMMANDS: tuple[Command[Any, Any], ...] = (
-    *(each for each in list(vars().values()) if isinstance(each, Command) and each not in OF_STANDARDS),
-    *OF_STANDARDS,
+    *(each for each in list(vars().values()) if isinstance(each, Command) and each not in _OF_STANDARDS),
+    *_OF_STANDARDS,
 )

@@ -40,7 +40,7 @@ class RoomSpan:
 
 
 class RoomEnvironment:
-    """What was read in the rooms of the laboratory."""
+    """What was read in the laboratory, beside its benches."""
 
     def __init__(self, database: Database) -> None:
         self._database = database
