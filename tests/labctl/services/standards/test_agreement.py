@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterator
 from datetime import date
@@ -13,16 +14,24 @@ import pytest
 from instruments.bench_config import BenchFile
 from instruments.clock import VirtualClock
 from instruments.standards import Standard
+from labctl.calibration import read_calibration
 from labctl.errors import Conflict
 from labctl.recording import RecordingInfo
 from labctl.services.benches.check import check_bench
+from labctl.services.calibrations.fitting import fit_unit
+from labctl.services.calibrations.uncertainty import coefficients_at
 from labctl.services.campaigns.execution import run
 from labctl.services.campaigns.preparation import prepare
+from labctl.services.certificates.issue import issue
+from labctl.services.certificates.served import certificate_file
 from labctl.services.planning.loading import load_bench
+from labctl.services.schemas.calibrations import FitRequest
 from labctl.services.standards.agreement import as_used, differences, with_register
+from labctl.services.standards.register import one_standard
 from labctl.store import Store, open_store
 from tests.helpers import register
-from tests.helpers.register import thermometer
+from tests.helpers.certificates import SERIAL, request
+from tests.helpers.register import COUNTER, thermometer
 
 TODAY = date(2026, 1, 5)  #: of virtual clocks
 ENTRY = thermometer("T-1", calibrated="2023-12-01", due="2026-06-30")
@@ -103,6 +112,24 @@ def test_a_campaign_records_what_the_register_predicts(store: Store) -> None:
     events = [each for each in store.campaigns.events(answer.id) if each.kind == "standard_differs"]
     assert any("with the uncertainty of its drift" in each.message for each in events)
     assert {each.level for each in events} == {"warning"}
+
+
+def test_budget_file_and_certificate_state_the_same_uncertainty(store: Store) -> None:
+    register.certificate(store, "T-1", date(2024, 1, 5), 0.010, due="2026-06-30")
+    register.certificate(store, "T-2", date(2025, 1, 5), 0.030, due="2026-06-30")
+    entries = (COUNTER, thermometer("T-2", due="2026-06-30"))
+    run(store, prepare(store, "short", bench(*entries), VirtualClock(), clip=False))
+    fit_unit(store, SERIAL, FitRequest(effects=["bias", "scale_factor"]), register.noon(TODAY))
+    store.calibrations.certify(SERIAL, 1, "certify", by="Ada", reason="meets them", at=register.noon(TODAY))
+    (predicted,) = one_standard(store, "Pt100-7", TODAY).predictions
+    calibration = read_calibration(store.calibrations.get(SERIAL, 1).document)
+    in_file = {each["quantity"]: each for each in calibration.document["standards"]["stated"]}
+    assert (in_file["thermometer"]["u"], in_file["thermometer"]["value"]) == (predicted.u, predicted.value)
+    (line,) = [each for each in coefficients_at(calibration, 25.0)["z"]["bias"].lines if each.source == "thermometer"]
+    assert line.u == predicted.u
+    issue(store, SERIAL, 1, request(conformity=None), register.noon(TODAY))
+    document = json.loads(certificate_file(store, SERIAL, 1, "json").content)
+    assert [each["u"] for each in document["standards"] if each["name"] == "Pt100-7"] == [predicted.u]
 
 
 def test_a_campaign_with_a_bad_standard_is_refused_before_anything_is_written(store: Store) -> None:
