@@ -29,8 +29,10 @@ from labctl.api.routers import (
     plans,
     recordings,
     schedule,
+    standards,
     swagger_ui,
     units,
+    validity,
 )  # fmt: skip
 from labctl.services.admin.key_memory import KeyMemory
 from labctl.services.lab_service import LabService
@@ -53,7 +55,7 @@ certifying and keys for an approver's.
 #: In the order of the API's description, in which they are also asked: what is read most comes first.
 ROUTERS = (
     calibrations, certification, health, units, benches, effects, certificates, plans,
-    campaigns, schedule, recordings, motions, admin, swagger_ui,
+    campaigns, schedule, recordings, motions, standards, validity, admin, swagger_ui,
 )  # fmt: skip
 #: Which of their routes take a key; every route of the others does.
 SAY_THEMSELVES = (health, swagger_ui)

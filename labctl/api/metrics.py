@@ -36,6 +36,15 @@ class ServiceCollector(Collector):
             "Units whose certification ends within 30 days, or has ended",
             value=figures.due_soon,
         )
+        standards = GaugeMetricFamily("labctl_standards", "Reference standards in each state", labels=["state"])
+        for name, count in sorted(figures.standards.items()):
+            standards.add_metric([name], count)
+        yield standards
+        yield GaugeMetricFamily(
+            "labctl_check_gyros_out_of_limits",
+            "Check gyros whose newest result is out of its control limits",
+            value=figures.check_gyro_alarms,
+        )
         yield GaugeMetricFamily("labctl_campaigns", "Campaigns in the database", value=sum(by_state.values()))
         yield GaugeMetricFamily("labctl_campaigns_failed", "Campaigns that failed", value=by_state.get("failed", 0))
         states = GaugeMetricFamily("labctl_campaigns_by_state", "Campaigns in each state", labels=["state"])

@@ -191,7 +191,8 @@ def _condition(parent: ET.Element, given: Condition) -> None:
     texts(made, "name", given.name)
     data = child(made, "data")
     for name, value, suffix in (("Least", given.low, "Min"), ("Largest", given.high, "Max")):
-        quantity(data, f"{name} mean of a data set", [value], given.unit, ref_type=ref_type and f"{ref_type}{suffix}")
+        said = f"{name} value during the calibration"
+        quantity(data, said, [value], given.unit, ref_type=ref_type and f"{ref_type}{suffix}")
 
 
 def _method(made: ET.Element, given: Certificate) -> None:

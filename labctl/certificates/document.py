@@ -80,7 +80,7 @@ class StandardUsed(Part):
 
 
 class Condition(Part):
-    """An environmental condition as it was measured: least and largest mean of a data set."""
+    """An environmental condition as it was measured: least and largest mean of a data set, or reading in the room."""
 
     name: str
     unit: str

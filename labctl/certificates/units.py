@@ -10,6 +10,7 @@ READ = {"deg/s": "°/s", "deg C": "°C", "deg": "°", "pct": "%"}
 SYMBOLS = {
     "deg": r"\degree", "°": r"\degree", "s": r"\second", "h": r"\hour", "min": r"\minute", "K": r"\kelvin",
     "°C": r"\degreecelsius", "deg C": r"\degreecelsius", "V": r"\volt", "%": r"\percent", "ppm": r"\ppm", "1": r"\one",
+    "hPa": r"\hecto\pascal",
 }  # fmt: skip
 _POWER = re.compile(r"([^\^]+)(?:\^(\d+))?")
 

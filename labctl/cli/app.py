@@ -20,6 +20,7 @@ from labctl.cli.commands import (
     criticism,
     database,
     effects,
+    environment,
     keys,
     noise,
     plugins,
@@ -28,6 +29,7 @@ from labctl.cli.commands import (
     seal_key,
     server,
     signing_key,
+    standards,
     trend,
 )
 from labctl.cli.commands.documents import certificate, certificate_list, datasheet, reproduction, uncertainty
@@ -56,6 +58,8 @@ app.add_typer(seal_key.app, name="seal-key")
 app.add_typer(signing_key.app, name="signing-key")
 app.add_typer(certificate_list.app, name="certificates")
 app.add_typer(certificate.app, name="certificate")
+app.add_typer(standards.app, name="standards")
+app.add_typer(environment.app, name="environment")
 COMMANDS: dict[str, Callable[..., None]] = {
     "demo": server.demo,
     "serve": server.serve,

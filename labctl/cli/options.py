@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from datetime import UTC, datetime
+from datetime import UTC, date, datetime
 from typing import Annotated
 
 import typer
@@ -82,3 +82,20 @@ def recording_numbers(given: str | None) -> list[int]:
             )
         found.append(int(text))
     return found
+
+
+def day(given: str | None, option: str) -> date | None:
+    """Return the day that an option states; None where it states none. Raises BadInput."""
+    try:
+        return None if not given else date.fromisoformat(given)
+    except ValueError as error:
+        raise BadInput(f"{option} {given!r} is not a day; write it as 2027-11-23") from error
+
+
+def instant(given: str | None, option: str) -> datetime | None:
+    """Return the instant that an option states, without an offset UTC; None where it states none. Raises BadInput."""
+    try:
+        moment = None if not given else datetime.fromisoformat(given)
+    except ValueError as error:
+        raise BadInput(f"{option} {given!r} is not a time; write it as 2027-11-23T08:00Z") from error
+    return moment.replace(tzinfo=UTC) if moment is not None and moment.tzinfo is None else moment

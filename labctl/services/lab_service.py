@@ -19,6 +19,7 @@ from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.event_stream import CampaignEventStream
 from labctl.services.campaigns.resumability import NO_BENCH, with_resume
 from labctl.services.campaigns.status import from_rows, mark_abandoned, statuses_of
+from labctl.services.check_gyros import alarms
 from labctl.services.commands.command import Command, LocalExecutor, RequestT, ResponseT
 from labctl.services.commands.computed import carry_out
 from labctl.services.commands.context import CommandContext
@@ -36,6 +37,7 @@ from labctl.services.schemas.campaigns import (
 )
 from labctl.services.schemas.reports.drafts import DraftsRequest, DraftsResponse
 from labctl.services.schemas.service import HealthResponse, HeartbeatResponse, PulseResponse
+from labctl.services.standards.register import count_by_state
 from labctl.services.units import count_due
 from labctl.store import Store
 from procedures.contracts.campaign_state import ENDED
@@ -56,6 +58,8 @@ class ServiceFigures:
     heard_s: float  #: time since the last answer of the bench, s
     overdue: int  #: units whose certification has ended
     due_soon: int  #: units whose certification has ended, or ends within `DUE_SOON`
+    standards: Mapping[str, int]  #: reference standards by state
+    check_gyro_alarms: int  #: check gyros whose newest result is out of its control limits
 
 
 class LabService:
@@ -201,5 +205,5 @@ class LabService:
         overdue, soon = count_due(self.store, self.clock.utc(), DUE_SOON)
         return ServiceFigures(
             self.store.units.count(), self.store.campaigns.count_by_state(), access.running is not None, access.heard_s,
-            overdue, soon,
+            overdue, soon, count_by_state(self.store, self.clock.utc().date()), alarms(self.store),
         )  # fmt: skip

@@ -9,6 +9,7 @@ from labctl.services.calibrations.due import campaign_of
 from labctl.services.campaigns.plan_view import recipe_text
 from labctl.services.drafts.answers import newest_draft
 from labctl.services.schemas.units import ExportFormatResponse, RecalibrationResponse, UnitResponse
+from labctl.services.standards.usage import Notices
 from labctl.store import CertificationRow, Store, Unit
 
 
@@ -53,6 +54,7 @@ def _answer(
         certified_version=act.version if act else None,
         due=act.due_at if act else None,
         overdue=bool(act and act.due_at and act.due_at <= now),
+        notices=_notices(store, act),
         recalibration=_recalibration(store, act) if act and whole else None,
         draft=newest_draft(store, found.serial) if whole else None,
         formats=[
@@ -60,6 +62,12 @@ def _answer(
             for name, each in export_formats().items()
         ],
     )
+
+
+def _notices(store: Store, act: CertificationRow | None) -> list[str]:
+    if act is None or not (notices := Notices.of(store)).bad:
+        return []
+    return notices.of_recordings(store.calibrations.get(act.serial, act.version).recordings)
 
 
 def _recalibration(store: Store, act: CertificationRow) -> RecalibrationResponse | None:

@@ -41,6 +41,7 @@ from labctl.store.repositories.calibrations import Calibrations, NewCalibration
 from labctl.store.repositories.campaign_journal import StoreJournal
 from labctl.store.repositories.campaign_summaries import CampaignSummary
 from labctl.store.repositories.campaigns import Campaigns, NewCampaign
+from labctl.store.repositories.check_gyros import CheckGyroRow, CheckGyros
 from labctl.store.repositories.documents.certificates import CertificateForms, CertificateRow, Certificates
 from labctl.store.repositories.drafts.records import DraftEvent, DraftRow, DraftState
 from labctl.store.repositories.drafts.repository import Drafts
@@ -52,7 +53,17 @@ from labctl.store.repositories.recording_writer import Imports, ImportTicket
 from labctl.store.repositories.recordings import Recordings
 from labctl.store.repositories.releases import NewReleaseRequest, ReleaseRequestRow, ReleaseRequests
 from labctl.store.repositories.resume_points import ResumePoint, ResumePoints, Resumption
+from labctl.store.repositories.room_environment import RoomEnvironment, RoomReading, RoomSpan
 from labctl.store.repositories.scheduled_starts import NewStart, StartEventRow, StartRow, Starts
+from labctl.store.repositories.standards import (
+    CertifiedPoint,
+    RegisteredStandard,
+    StandardCertificate,
+    StandardCheck,
+    StandardFinding,
+    StandardRow,
+    Standards,
+)
 from labctl.store.repositories.units import Certifications, Units
 from labctl.store.sealing.signers import SEAL_KEY, Signer, create_key, signer_of
 from labctl.store.sealing.signing import begin_signing, sign_chain
@@ -73,7 +84,10 @@ __all__ = [
     "CertificateRow",
     "Certificates",
     "CertificationRow",
+    "CertifiedPoint",
     "ChainHead",
+    "CheckGyroRow",
+    "CheckGyros",
     "Checked",
     "Copy",
     "DataSetRow",
@@ -107,15 +121,24 @@ __all__ = [
     "PublicKey",
     "RecordingRow",
     "Recordings",
+    "RegisteredStandard",
     "Release",
     "ReleaseRequestRow",
     "ReleaseRequests",
     "ResumePoint",
     "ResumePoints",
     "Resumption",
+    "RoomEnvironment",
+    "RoomReading",
+    "RoomSpan",
     "ServedCalibration",
     "ServiceAddress",
     "Signer",
+    "StandardCertificate",
+    "StandardCheck",
+    "StandardFinding",
+    "StandardRow",
+    "Standards",
     "StartEventRow",
     "StartRow",
     "Starts",
@@ -160,6 +183,9 @@ class Store:
         self.release_requests = ReleaseRequests(database)
         self.fetches = Fetches(database)
         self.drafts = Drafts(database)
+        self.standards = Standards(database)
+        self.check_gyros = CheckGyros(database)
+        self.room_environment = RoomEnvironment(database)
         self.audit = Audit(database)
         self.keys = Keys(database)
         self.starts = Starts(database)

@@ -25,14 +25,22 @@ def is_terminal() -> bool:
 def check(
     bench: Annotated[str, typer.Argument(metavar="FILE", help="Bench file, or the name of a shipped bench.")],
     as_json: Json = False,
-    database: Database = None,  # noqa: ARG001  every command takes it
+    database: Database = None,
 ) -> None:
-    """Connect to every instrument of a bench and list what was found, each fault with what to do. Nothing moves."""
+    """Connect to every instrument of a bench and list what was found, each fault with what to do. Nothing moves.
+
+    What the bench file states of its standards is compared with the register of the database, where there is one.
+    """
     from labctl.cli.printing.benches import print_check
     from labctl.services.benches.check import check_bench
+    from labctl.services.commands.open import open_existing
+    from labctl.services.planning.loading import load_bench
+    from labctl.services.standards.agreement import with_register
 
     with one_clear_line():
         answer = check_bench(bench)
+        with open_existing(database) as store:
+            answer = answer if store is None else with_register(store, answer, load_bench(bench))
     if as_json:
         print_json(answer)
     else:

@@ -12,6 +12,7 @@ from labctl.services.criticism.criticise import criticise_unit
 from labctl.services.recordings.inspection import inspect_stored
 from labctl.services.schemas.certification import AssessmentResponse, CertifiedErrors, Objection
 from labctl.services.schemas.criticism import CriticismResponse
+from labctl.services.standards.usage import Notices
 from labctl.store import CalibrationRecord, Store
 
 #: The least length of a reason for an override: a sentence.
@@ -26,6 +27,7 @@ def assess(store: Store, serial: str, version: int) -> AssessmentResponse:
     row = store.calibrations.get(store.units.get(serial).serial, version)
     criticism, reason, unusable = _criticised(store, row)
     objections = [*unusable, *_of_verdict(criticism), *_of_errors(store, row), *_of_data(store, row)]
+    objections += _of_standards(store, row)
     due_days, due_from = interval_days(store, serial, version, None)
     return AssessmentResponse(
         serial=serial,
@@ -42,6 +44,12 @@ def assess(store: Store, serial: str, version: int) -> AssessmentResponse:
         due_days=due_days,
         due_from=due_from,
     )
+
+
+def _of_standards(store: Store, row: CalibrationRecord) -> Iterator[Objection]:
+    """Yield an objection for each standard that was found bad on the days of the version's measurements."""
+    for text in Notices.of(store).of_recordings(row.recordings):
+        yield Objection(what="standard", text=text, do="measure again with another standard")
 
 
 def _criticised(store: Store, row: CalibrationRecord) -> tuple[CriticismResponse | None, str, list[Objection]]:

@@ -26,6 +26,7 @@ from labctl.services.schemas.calibrations import (
     ImprovedVersionResponse,
     VersionResponse,
 )
+from labctl.services.standards.usage import Notices
 from labctl.store import NewCalibration, RecordingRow, Store
 
 
@@ -92,7 +93,7 @@ def days_of(rows: Sequence[RecordingRow]) -> list[date]:
 
 def list_calibrations(store: Store, serial: str) -> list[CalibrationRow]:
     """Return a unit's versions, newest first. Raises NotFound."""
-    in_force = version_in_force(store, serial)
+    in_force, notices = version_in_force(store, serial), Notices.of(store)
     return [
         CalibrationRow(
             serial=row.serial,
@@ -104,6 +105,7 @@ def list_calibrations(store: Store, serial: str) -> list[CalibrationRow]:
             certified=row.version == in_force,
             rms_dps=row.answer["error"]["rms_dps"],
             heldout_rms_dps=row.answer["error"]["heldout_rms_dps"],
+            notices=notices.of_recordings(row.recordings),
         )
         for row in store.calibrations.of_unit(store.units.get(serial).serial)
     ]
@@ -121,7 +123,8 @@ def one_version(store: Store, serial: str, version: int) -> VersionResponse | Im
         "created_at": row.created_at, "hash": row.hash,
         "rate_reference": calibration.document["provenance"].get("rate_reference", ""),
         "left_out": list(calibration.document["left_out"]), "remembers": remembered_by(calibration),
-        "in_force": in_force, "due": last.due if last is not None and in_force else None, "certification": last,
+        "notices": Notices.of(store).of_recordings(row.recordings), "in_force": in_force,
+        "due": last.due if last is not None and in_force else None, "certification": last,
     }  # fmt: skip
     kind = ImprovedVersionResponse if "improved_from" in row.answer else VersionResponse
     return kind.model_validate({**row.answer, **beside})

@@ -34,6 +34,7 @@ from labctl.services.schemas.campaigns import (
     ResumeRequest,
 )
 from labctl.services.simulation.hidden_effects import with_hidden_effects
+from labctl.services.standards.agreement import with_register
 from labctl.stop.latch import StopRequest
 from labctl.store import Store
 from procedures.contracts.campaign_state import ENDED, UNFINISHED, CampaignState
@@ -160,7 +161,9 @@ class BenchRunner:
         """Ask every instrument what it is and how it does; nothing moves. Raises BenchBusy while a campaign runs."""
         with self._guard:
             self._refuse_unless_free()
-            self._last_check = checked(with_drivers(self._bench), self._bench.name, self._make_clock())
+            bench = with_drivers(self._bench)
+            answer = checked(bench, bench.name, self._make_clock())
+            self._last_check = with_register(self._store, answer, bench)
             return self._last_check
 
     def _refuse_unless_free(self) -> None:

@@ -16,7 +16,7 @@ from labctl.log.context import for_campaign
 from labctl.services.benches.confirmation import SafeStateRetry, describe_safe_state
 from labctl.services.benches.lease import holding, open_for
 from labctl.services.benches.pace import with_pace_watch
-from labctl.services.benches.standards import overdue_events
+from labctl.services.benches.standards import overdue_events, standards_of
 from labctl.services.benches.start_confirmation import confirmation_text, start_questions
 from labctl.services.campaigns.bench_lending import BenchLending, lending_journal
 from labctl.services.campaigns.foreground_stop import answering_stops, let_move, note_carried_out
@@ -32,6 +32,7 @@ from labctl.services.campaigns.status import answer_of, describe_interrupted, fr
 from labctl.services.planning.loading import bench_for, load_bench, load_recipe
 from labctl.services.schemas.campaigns import BENCH_CHECKS, CampaignResponse, StartRequest
 from labctl.services.simulation.hidden_effects import with_hidden_effects
+from labctl.services.standards.agreement import register_events
 from labctl.store import Store
 from labctl.store.connection.writer_lock import note_campaign
 from procedures.contracts.campaign_state import ENDED
@@ -76,6 +77,7 @@ def _engine(
 ) -> Engine:
     row = store.campaigns.get(prepared.id)
     bench = BenchFile.model_validate({**row.bench, "simulation": None})
+    today = prepared.clock.utc().date()
     serials = {gyro.name: gyro.serial for gyro in bench.gyros}
     journal = LoggedJournal(store.campaigns.journal(prepared.id), prepared.id, row.bench_name, prepared.plan, serials)
     return Engine(
@@ -87,7 +89,7 @@ def _engine(
         control=control or Control(),
         observer=with_pace_watch(prepared.clock, observe),
         time=prepared.time,
-        notices=overdue_events(bench.standards, prepared.clock.utc().date()),
+        notices=(*overdue_events(bench.standards, today), *register_events(store, standards_of(bench), today)),
     )
 
 

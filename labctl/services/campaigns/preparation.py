@@ -13,6 +13,7 @@ from instruments.drivers.unit_handlers import ManualUnitHandler
 from instruments.errors import InstrumentError
 from instruments.interfaces.gyro import Gyro, GyroIdentity
 from instruments.interfaces.table import RateTable
+from instruments.standards import Standard
 from labctl.acting_user import actor
 from labctl.errors import BadInput, Conflict
 from labctl.json_types.recordings import RawChannelJson
@@ -31,6 +32,7 @@ from labctl.services.benches.reference_columns import (
 from labctl.services.benches.standards import standards_of
 from labctl.services.planning.loading import load_recipe, with_drivers
 from labctl.services.planning.timeline import step_json
+from labctl.services.standards.agreement import as_used, refuse_bad
 from labctl.store import NewCampaign, NewUnit, Store
 from labctl.store.sample_codec import load_compressor
 from procedures.contracts.operator import HumanOperator, Operator, UnitHandlerOperator
@@ -156,19 +158,23 @@ def prepare(
 
     Without `fit` it ends in its recordings, whatever its recipe says. `opened` is the bench where it is open already;
     `bench_clear` is what a person has confirmed about it. Raises InstrumentError when an instrument does not answer,
-    PlanRefused when the bench cannot do the recipe, Conflict where a unit or its USB adapter is not the one it was.
+    PlanRefused when the bench cannot do the recipe, Conflict where a unit or its USB adapter is not the one it was,
+    and where a standard of the bench is bad by the register.
     """
     load_libraries()
     bench_file = with_drivers(bench_file)  # what is written down names the release of each driver
     recipe = _runnable(load_recipe(recipe_source), fit=fit)
     refuse_unconfirmed(store, bench_file.name)
+    today = clock.utc().date()
+    refuse_bad(store, standards_of(bench_file), today, bench_file.name)
     bench = opened or open_bench(bench_file, clock)
     try:
         _identify_at_rest(bench, clock)
         plan = make_plan(recipe, BenchLimits.of(bench), clip=clip)
         identities = {name: gyro.identify() for name, gyro in bench.gyros.items()}
         bench_file = _with_reported(store, bench_file, identities)
-        units = _units(bench, identities, bench_file, clock, recipe)
+        standards = as_used(store, standards_of(bench_file), today)
+        units = _units(bench, identities, bench_file, clock, recipe, standards)
         new = NewCampaign(
             recipe_name=recipe.name,
             recipe=plan.recipe.model_dump(mode="json"),
@@ -182,15 +188,19 @@ def prepare(
             bench_clear=bench_clear,
         )
         number = store.campaigns.create(new, clock.utc())
-        log.info(
-            "campaign.planned", campaign=number, bench=bench_file.name, recipe=recipe.name, steps=len(plan.steps),
-            datasets=plan.datasets, expected_s=round(plan.expected_s), simulated=bench_file.is_simulated,
-            units=[unit.info["serial"] for unit in units], by=actor().name,
-        )  # fmt: skip
+        _log_planned(number, bench_file, plan, units)
         return Prepared(number, plan, bench, clock, operator_of(bench))
     except BaseException:
         bench.close()
         raise
+
+
+def _log_planned(number: int, bench: BenchFile, plan: Plan, units: tuple[NewUnit, ...]) -> None:
+    log.info(
+        "campaign.planned", campaign=number, bench=bench.name, recipe=plan.recipe.name, steps=len(plan.steps),
+        datasets=plan.datasets, expected_s=round(plan.expected_s), simulated=bench.is_simulated,
+        units=[unit.info["serial"] for unit in units], by=actor().name,
+    )  # fmt: skip
 
 
 def _with_reported(store: Store, bench: BenchFile, identities: Mapping[str, GyroIdentity]) -> BenchFile:
@@ -217,12 +227,17 @@ def _identify_at_rest(bench: Bench, clock: Clock) -> None:
 
 
 def _units(
-    bench: Bench, identities: dict[str, GyroIdentity], bench_file: BenchFile, clock: Clock, recipe: Recipe
+    bench: Bench,
+    identities: dict[str, GyroIdentity],
+    bench_file: BenchFile,
+    clock: Clock,
+    recipe: Recipe,
+    standards: tuple[Standard, ...],
 ) -> tuple[NewUnit, ...]:
     """Return the recording of each unit; raises BadInput for a column that would have two sources."""
     beside = reference_channels(bench, bench_file)
     return tuple(
-        _unit(gyro, identities[name], bench.table, bench_file, clock, recipe, beside)
+        _unit(gyro, identities[name], bench.table, bench_file, clock, recipe, beside, standards)
         for name, gyro in bench.gyros.items()
     )
 
@@ -241,6 +256,7 @@ def _unit(
     clock: Clock,
     recipe: Recipe,
     beside: tuple[RawChannelJson, ...],
+    standards: tuple[Standard, ...],
 ) -> NewUnit:
     latitude = bench.latitude_deg
     info = RecordingInfo.model_validate(
@@ -261,7 +277,7 @@ def _unit(
             "datasheet": dict(identity.datasheet),
             "datasheet_conventions": _conventions(identity, bench),
             "output": {axis: dict(unit) for axis, unit in identity.output.items()},
-            "standards": standards_of(bench),
+            "standards": standards,
             "thermometer": temperature_instrument(bench),
         }
     )

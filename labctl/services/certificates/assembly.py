@@ -64,7 +64,7 @@ def assembled(
         method=_method(facts),
         performed_from=first,
         performed_until=last,
-        environment=found.conditions,
+        environment=(*found.conditions, *found.room),
         standards=tuple(_standard(each) for each in facts.standards),
         uncertainty=uncertainty,
         results=found.results.points,

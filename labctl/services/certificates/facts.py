@@ -11,9 +11,9 @@ from instruments.laboratory import Laboratory
 from instruments.standards import Standard
 from labctl.calibration import Calibration, read_calibration
 from labctl.recording import RecordingInfo
-from labctl.services.certificates.measured import performed
 from labctl.services.certificates.missing import of_contact
 from labctl.services.schemas.documents.certificates import CertificateOrder
+from labctl.services.standards.usage import performed
 from labctl.store import CalibrationRecord, CampaignRow, CertificationRow, RecordingRow, Store
 
 BENCH = "[laboratory] of the bench file of the campaign, or [laboratory] of the order"

@@ -9,6 +9,7 @@ from labctl.certificates.document import Condition
 from labctl.services.certificates import measured
 from labctl.services.certificates.facts import Facts
 from labctl.services.criticism.measurements import Measurements
+from labctl.services.room_environment import of_campaign
 from labctl.store import Store
 
 
@@ -19,6 +20,7 @@ class Found:
     measurements: Measurements | None = None  #: None: there are none
     results: measured.Results = field(default_factory=measured.Results)
     conditions: tuple[Condition, ...] = ()
+    room: tuple[Condition, ...] = ()
 
     @staticmethod
     def of(store: Store, facts: Facts) -> Found:
@@ -27,7 +29,9 @@ class Found:
             return Found()
         measurements = Measurements(store, facts.recordings)
         results = measured.results(store, facts.row, facts.calibration)
-        return Found(measurements, results, measured.environment(measurements.points))
+        spans = [] if facts.campaign is None else of_campaign(store, facts.campaign.id)
+        room = measured.environment_of_room(spans, facts.order.environment)
+        return Found(measurements, results, measured.environment(measurements.points), room)
 
     def missing(self) -> Iterator[tuple[str, str]]:
         """Yield what is not known of the results, and what makes it known."""

@@ -21,6 +21,7 @@ from labctl.services.schemas.documents.certificates import (
     CertificateResponse,
     WithdrawRequest,
 )
+from labctl.services.standards.usage import Notices
 from labctl.store import CertificateRow, Store, Withdrawal
 
 
@@ -45,6 +46,7 @@ def issue(store: Store, serial: str, version: int, request: CertificateRequest, 
     facts = facts_of(store, serial, version, order)
     found = Found.of(store, facts)
     refuse(facts, found)
+    _refuse_bad(store, facts)
     with signing_key(at) as key:
         certificate = to_be_signed(assembled(store, facts, found, request, at, kept), key)
         forms = forms_of(certificate, key, at)
@@ -120,6 +122,16 @@ def _refuse_dates(facts: Facts) -> None:
         raise CertificateRefused(
             f"no certificate of {facts.what}: measured from {first} to {last}, when the calibration of a "
             f"reference standard was not valid ({said}). Have the standard calibrated, and measure again"
+        )
+
+
+def _refuse_bad(store: Store, facts: Facts) -> None:
+    """Raise CertificateRefused for measurements with a standard that was found bad on those days."""
+    if bad := Notices.of(store).of_recordings([row.id for row in facts.recordings]):
+        raise CertificateRefused(
+            f"no certificate of {facts.what}: {'; '.join(bad)}, and the calibration was measured with it from "
+            f"{facts.performed_from} to {facts.performed_until}. Measure again with another standard; a finding that "
+            "was wrong is withdrawn by `labctl standards withdraw`"
         )
 
 

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import date, timedelta
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,12 +24,13 @@ from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.uncertainty.budget import Budget
 from labctl.fitting.uncertainty.combination import LEVEL
 from labctl.json_types.models import Coefficients
-from labctl.recording import Recording, RecordingInfo
+from labctl.recording import Recording
 from labctl.services.calibrations.surface import errors_on_grid
 from labctl.services.calibrations.uncertainty import coefficients_at, over_any_axis, places_of, uncertainty_of
 from labctl.services.criticism.measurements import Measurements
 from labctl.services.criticism.verification.of_version import applied_errors
-from labctl.store import CalibrationRecord, RecordingRow, Store
+from labctl.services.schemas.documents.certificates import RoomConditions
+from labctl.store import CalibrationRecord, RoomSpan, Store
 
 Array = NDArray[np.float64]
 #: A coefficient is the quantity of a budget where both have this value, relative; the budget's is a derivative.
@@ -43,6 +43,12 @@ CONDITIONS: Mapping[str, tuple[str, str]] = {
     "own_temperature_c": ("Temperature by the item's own thermometer", "°C"),
     "humidity_pct": ("Relative humidity of the air", "%"),
     "supply_v": ("Supply voltage of the item", "V"),
+}
+#: Quantities of the room: name and unit of the condition, and what states it in an order.
+ROOM: Mapping[str, tuple[str, str, str]] = {
+    "temperature": ("Temperature of the room", "°C", "temperature_c"),
+    "humidity": ("Relative humidity of the room", "%", "humidity_pct"),
+    "pressure": ("Air pressure of the room", "hPa", "pressure_hpa"),
 }
 
 
@@ -72,15 +78,14 @@ class Results:
         )
 
 
-def performed(store: Store, row: RecordingRow) -> tuple[date, date | None]:
-    """Return the first and the last day (UTC) of a campaign or of an imported recording; None: the last is unknown."""
-    if row.campaign is not None:
-        campaign = store.campaigns.get(row.campaign)
-        begun = campaign.started_at or campaign.created_at
-        return begun.date(), None if campaign.ended_at is None else campaign.ended_at.date()
-    begun = RecordingInfo.model_validate(row.info).started_at
-    ends = [each.t_until_s for each in store.recordings.data_sets(row.id) if each.t_until_s is not None]
-    return begun.date(), (begun + timedelta(seconds=max(ends))).date() if ends else None
+def environment_of_room(spans: Sequence[RoomSpan], ordered: RoomConditions) -> tuple[Condition, ...]:
+    """Return the environment of the room: what was recorded while the campaign ran, else what the order states."""
+    recorded = {each.quantity: (each.low, each.high) for each in spans}
+    return tuple(
+        Condition(name=name, unit=unit, low=found[0], high=found[1])
+        for quantity, (name, unit, stated) in ROOM.items()
+        if (found := recorded.get(quantity) or getattr(ordered, stated)) is not None
+    )
 
 
 def environment(points: Recording) -> tuple[Condition, ...]:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from datetime import datetime
 
 from labctl.services.schemas.documents.certificates import CertificateResponse, CertificateState, SignatoryResponse
+from labctl.services.standards.usage import Notices
 from labctl.store import CertificateRow, CertificationRow, Store
 
 
@@ -29,7 +30,12 @@ class _Change:
 def list_certificates(store: Store, serial: str) -> list[CertificateResponse]:
     """Return every certificate of a unit with its state, newest first. Raises NotFound."""
     known = store.units.get(serial).serial
-    return stated(store.certificates.of_unit(known), store.calibrations.history(known))
+    notices = Notices.of(store)
+    behind = {row.version: row.recordings for row in store.calibrations.of_unit(known)} if notices.bad else {}
+    return [
+        row.model_copy(update={"notices": list(notices.of_recordings(behind.get(row.version, ())))})
+        for row in stated(store.certificates.of_unit(known), store.calibrations.history(known))
+    ]
 
 
 def certificate_by_number(store: Store, number: str) -> CertificateResponse:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from instruments.clock import SystemClock
@@ -25,6 +26,17 @@ if TYPE_CHECKING:
 def open_readonly(database: str | None) -> Iterator[Store]:
     """Open the store for reading, also while another process writes."""
     with open_store(database or default_database(), write=False) as store:
+        yield store
+
+
+@contextmanager
+def open_existing(database: str | None) -> Iterator[Store | None]:
+    """Open the store for reading where there is one; None: no database was made yet, and none is made."""
+    location = database or default_database()
+    if not is_url(location) and not Path(location).is_file():
+        yield None
+        return
+    with open_readonly(location) as store:
         yield store
 
 

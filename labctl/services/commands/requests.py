@@ -77,6 +77,23 @@ class ToKey(Addressed, Generic[BodyT_co]):
 
 
 @dataclass(frozen=True)
+class ToStandard(Addressed, Generic[BodyT_co]):
+    """A request for a reference standard, by its label or serial number."""
+
+    label: str
+    body: BodyT_co
+
+
+@dataclass(frozen=True)
+class ToFinding(Addressed, Generic[BodyT_co]):
+    """A request for a finding on a reference standard."""
+
+    label: str
+    finding: int
+    body: BodyT_co
+
+
+@dataclass(frozen=True)
 class ToStart(Addressed):
     """A request for an entry of the schedule."""
 

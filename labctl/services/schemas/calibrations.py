@@ -34,6 +34,7 @@ ACCEPT = (
 
 
 SEVERAL = "Several recordings of the unit, fitted together; instead of `recording`."
+NOTICES = "Reference standards that were found bad on the days of the measurements behind the version; no certificate."
 FITTED_TO = "All recordings that the model was fitted to; `recording` is the newest of these."
 
 
@@ -223,6 +224,7 @@ class CalibrationRow(ResponseModel):
     certified: bool
     rms_dps: float | None = None
     heldout_rms_dps: float | None = None
+    notices: list[str] = Field(default_factory=list, description=NOTICES)
 
 
 class Follower(ResponseModel):
@@ -242,6 +244,7 @@ class VersionFacts(ResponseModel):
 
     created_at: datetime
     in_force: bool
+    notices: list[str] = Field(default_factory=list, description=NOTICES)
     due: datetime | None = Field(
         default=None, description="Date until which the certification is valid; null: no date."
     )

@@ -65,7 +65,7 @@ class ReleaseRequestResponse(ResponseModel):
 class Objection(ResponseModel):
     """One objection to certifying a version."""
 
-    what: Literal["verdict", "worse", "data"]
+    what: Literal["verdict", "worse", "data", "standard"]
     text: str = Field(description="The objection, with figures in deg/s.")
     do: str = Field(description="What to do instead of certifying this version.")
 

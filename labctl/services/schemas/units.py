@@ -41,6 +41,11 @@ class UnitResponse(ResponseModel):
         description="Time until which the version in force is valid; null: no due date, or no version is in force.",
     )
     overdue: bool = Field(default=False, description="Whether the date in `due` has passed.")
+    notices: list[str] = Field(
+        default_factory=list,
+        description="Reference standards that were found bad on the days of the measurements behind the version in "
+        "force.",
+    )
     recalibration: RecalibrationResponse | None = Field(
         default=None,
         description="How to recalibrate the unit: the campaign behind the version in force, and its recipe; "

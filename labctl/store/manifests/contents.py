@@ -241,7 +241,78 @@ KEY = Kind(
     "name",
 )
 
+STANDARD = Kind(
+    "standard",
+    _T.standards,
+    "id",
+    (Part("head", _T.standards, "id", "label serial quantity unit description by at"),),
+    lambda row: f"standard {row[0]!r}",
+    "label",
+    since="0020",
+)
+
+STANDARD_CERTIFICATE = Kind(
+    "standard certificate",
+    _T.standard_certificates,
+    "id",
+    (
+        Part(
+            "certificate", _T.standard_certificates, "id",
+            "standard_id number laboratory calibrated due adjusted traceability reason by at",
+        ),
+        Part("points", _T.standard_certificates, "id", "points"),
+    ),
+    lambda row: f"certificate {row[0]} of a standard",
+    "number",
+    since="0020",
+)  # fmt: skip
+
+STANDARD_CHECK = Kind(
+    "intermediate check",
+    _T.standard_checks,
+    "id",
+    (Part("check", _T.standard_checks, "id", "standard_id checked_at nominal value u note by at"),),
+    lambda row: f"intermediate check {row[0]}",
+    "id",
+    since="0020",
+)
+
+STANDARD_FINDING = Kind(
+    "standard finding",
+    _T.standard_findings,
+    "id",
+    (Part("act", _T.standard_findings, "id", "standard_id act finding bad_from bad_until reason by at"),),
+    lambda row: f"finding {row[0]} on a standard",
+    "id",
+    since="0020",
+)
+
+CHECK_GYRO = Kind(
+    "check gyro",
+    _T.check_gyros,
+    "id",
+    (Part("act", _T.check_gyros, "id", "serial act temperature_c chart_from reason by at"),),
+    lambda row: f"check gyro {row[0]}",
+    "serial",
+    since="0020",
+)
+
+#: All of them.
 KINDS: Mapping[str, Kind] = {
     kind.name: kind
-    for kind in (CAMPAIGN, RECORDING, CALIBRATION, CERTIFICATION, CERTIFICATE, KEY, WITHDRAWAL, RELEASE_REQUEST)
+    for kind in (
+        CAMPAIGN,
+        RECORDING,
+        CALIBRATION,
+        CERTIFICATION,
+        CERTIFICATE,
+        KEY,
+        WITHDRAWAL,
+        RELEASE_REQUEST,
+        STANDARD,
+        STANDARD_CERTIFICATE,
+        STANDARD_CHECK,
+        STANDARD_FINDING,
+        CHECK_GYRO,
+    )
 }

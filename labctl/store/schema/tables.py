@@ -17,7 +17,15 @@ from labctl.store.schema.certificates import certificate_withdrawals, certificat
 from labctl.store.schema.drafts import drafts
 from labctl.store.schema.manifests import block_digests, manifest_head, manifests
 from labctl.store.schema.recordings import data_set_means, data_sets, environment, recordings, sample_blocks
+from labctl.store.schema.room_environment import room_environment
 from labctl.store.schema.schedule import scheduled_starts, start_events
+from labctl.store.schema.standards import (
+    check_gyros,
+    standard_certificates,
+    standard_checks,
+    standard_findings,
+    standards,
+)
 from labctl.store.schema.types import Instant, metadata
 from labctl.store.schema.units import units
 
@@ -35,6 +43,7 @@ __all__ = [
     "certificate_withdrawals",
     "certificates",
     "certifications",
+    "check_gyros",
     "data_set_means",
     "data_sets",
     "drafts",
@@ -46,8 +55,13 @@ __all__ = [
     "metadata",
     "recordings",
     "release_requests",
+    "room_environment",
     "sample_blocks",
     "scheduled_starts",
+    "standard_certificates",
+    "standard_checks",
+    "standard_findings",
+    "standards",
     "start_events",
     "steps",
     "units",

@@ -1433,6 +1433,238 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/standards": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Reference standards
+         * @description Every standard of the register: state, due date, certificates, drift, checks on control charts, findings.
+         */
+        get: operations["standards_api_standards_get"];
+        put?: never;
+        /**
+         * Enter a standard
+         * @description Enter a standard under the name that bench files give it.
+         */
+        post: operations["add_api_standards_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/standards/{label}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * One standard
+         * @description A standard by its label or serial number, with the value and the uncertainty that its certificates predict.
+         */
+        get: operations["standard_api_standards__label__get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/standards/{label}/affected": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Calibrations that a standard was used for
+         * @description Unit, version, campaigns and certificates that are touched when the standard is bad between two days.
+         */
+        get: operations["affected_api_standards__label__affected_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/standards/{label}/certificates": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Enter a certificate
+         * @description Enter a certificate of a standard; one that was typed wrong is replaced by the same number with a reason.
+         */
+        post: operations["certificate_api_standards__label__certificates_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/standards/{label}/checks": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Enter an intermediate check
+         * @description Enter an intermediate check; out of the control limits, the state of the standard becomes `check it`.
+         */
+        post: operations["check_api_standards__label__checks_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/standards/{label}/findings": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Say that a standard was found bad
+         * @description The calibrations that it was used for on these days have a notice, and get no certificate.
+         */
+        post: operations["bad_api_standards__label__findings_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/standards/{label}/findings/{finding}/withdraw": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Withdraw a finding
+         * @description Withdraw a finding that was wrong. Needs an approver's key.
+         */
+        post: operations["withdraw_api_standards__label__findings__finding__withdraw_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/check-gyros": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Check gyros
+         * @description Every unit that is measured in each campaign to check the bench, with its control charts and alarms.
+         */
+        get: operations["check_gyros_api_check_gyros_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/check-gyros/{serial}": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Control charts of a unit
+         * @description Bias at one temperature and scale factor of each campaign, with limits from the history.
+         */
+        get: operations["one_check_gyro_api_check_gyros__serial__get"];
+        put?: never;
+        /**
+         * Make a unit a check gyro, or end that
+         * @description Its charts are then listed, and a monitor counts its alarms.
+         */
+        post: operations["set_check_gyro_api_check_gyros__serial__post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/comparisons": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Compare two laboratories or benches
+         * @description En number and zeta score (ISO 13528) of each coefficient of two calibrations of one unit.
+         */
+        get: operations["comparison_api_comparisons_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/environment": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * The environment of the room
+         * @description Least and largest of each quantity between two times, and the newest readings.
+         */
+        get: operations["read_environment_api_environment_get"];
+        put?: never;
+        /**
+         * Enter the environment of the room
+         * @description Temperature, humidity and pressure of the room, logged or typed; certificates state them of their campaign.
+         */
+        post: operations["add_environment_api_environment_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/keys": {
         parameters: {
             query?: never;
@@ -1570,6 +1802,67 @@ export interface components {
              * @description What the operator must do next.
              */
             next: string;
+        };
+        /**
+         * AffectedCalibration
+         * @description A calibration that a standard was used for.
+         */
+        AffectedCalibration: {
+            /** Serial */
+            serial: string;
+            /** Version */
+            version: number;
+            /**
+             * Recordings
+             * @description Its recordings that were measured with the standard.
+             */
+            recordings: number[];
+            /** Campaigns */
+            campaigns: number[];
+            /**
+             * Performed From
+             * Format: date
+             */
+            performed_from: string;
+            /**
+             * Performed Until
+             * Format: date
+             */
+            performed_until: string;
+            /** In Force */
+            in_force: boolean;
+            /**
+             * Certificates
+             * @description Numbers of the certificates issued of it, the newest first.
+             */
+            certificates: string[];
+            /**
+             * Findings
+             * @description Findings of the standard that hold for these days.
+             */
+            findings: number[];
+        };
+        /**
+         * AffectedResponse
+         * @description The calibrations that a standard was used for between two days.
+         */
+        AffectedResponse: {
+            /** Label */
+            label: string;
+            /**
+             * Bad From
+             * @description null: from the beginning.
+             */
+            bad_from: string | null;
+            /**
+             * Bad Until
+             * @description null: until now.
+             */
+            bad_until: string | null;
+            /** Calibrations */
+            calibrations: components["schemas"]["AffectedCalibration"][];
+            /** Text */
+            text: string[];
         };
         /**
          * AllanJson
@@ -2436,6 +2729,11 @@ export interface components {
             rms_dps: number | null;
             /** Heldout Rms Dps */
             heldout_rms_dps: number | null;
+            /**
+             * Notices
+             * @description Reference standards that were found bad on the days of the measurements behind the version; no certificate.
+             */
+            notices: string[];
         };
         /**
          * CalibrationStateResponse
@@ -2807,6 +3105,11 @@ export interface components {
              *     }
              */
             method?: components["schemas"]["OrderedMethod"];
+            /**
+             * @description Environment of the room where none was recorded (`POST /api/environment`) during the campaign.
+             * @default {}
+             */
+            environment?: components["schemas"]["RoomConditions"];
             /** @description Statement of conformity to a specification; null: the certificate makes no statement. */
             conformity?: components["schemas"]["OrderedConformity"] | null;
             /**
@@ -2863,6 +3166,7 @@ export interface components {
              *         "deviations": "",
              *         "name": ""
              *       },
+             *       "environment": {},
              *       "adjustment": "",
              *       "external": "",
              *       "state_due": false
@@ -2959,6 +3263,11 @@ export interface components {
              * @description Number of the unit's valid certificate; null: it is this one, or none is valid.
              */
             valid_instead: string | null;
+            /**
+             * Notices
+             * @description Findings on the reference standards behind it since it was issued.
+             */
+            notices: string[];
         };
         /**
          * CertificationResponse
@@ -3061,6 +3370,69 @@ export interface components {
             heldout_rms_dps: number | null;
             /** Noise Floor Dps */
             noise_floor_dps: number | null;
+        };
+        /**
+         * CertifiedPointRequest
+         * @description What a certificate states at one nominal. The uncertainty is `u`, or `expanded` with its `k`.
+         */
+        CertifiedPointRequest: {
+            /**
+             * Nominal
+             * @description Nominal value that it holds for, in the unit of the standard; null: it holds for all.
+             */
+            nominal?: number | null;
+            /**
+             * Value
+             * @description Error: indicated minus true, as `value` of a bench file; null: not stated.
+             */
+            value?: number | null;
+            /**
+             * Correction
+             * @description The error with the other sign, instead of `value`.
+             */
+            correction?: number | null;
+            /**
+             * U
+             * @description Standard uncertainty.
+             */
+            u?: number | null;
+            /**
+             * Expanded
+             * @description Expanded uncertainty.
+             */
+            expanded?: number | null;
+            /**
+             * K
+             * @description Coverage factor of `expanded`.
+             * @default 2
+             */
+            k?: number;
+        };
+        /**
+         * CertifiedPointResponse
+         * @description What a certificate states at one nominal.
+         */
+        CertifiedPointResponse: {
+            /**
+             * Nominal
+             * @description Nominal value that it holds for, in the unit of the standard; null: it holds for all.
+             */
+            nominal: number | null;
+            /**
+             * Value
+             * @description Error: indicated minus true; null: not stated.
+             */
+            value: number | null;
+            /**
+             * U
+             * @description Standard uncertainty.
+             */
+            u: number;
+            /**
+             * K
+             * @description Coverage factor with which the certificate states it.
+             */
+            k: number;
         };
         /**
          * CertifyRequest
@@ -3183,6 +3555,147 @@ export interface components {
             why: string;
         };
         /**
+         * ChartLimits
+         * @description Control limits of one value: three standard deviations about the centre line.
+         */
+        ChartLimits: {
+            /**
+             * Basis
+             * @enum {string}
+             */
+            basis: "history" | "stated u";
+            /** Centre */
+            centre: number;
+            /** Sigma */
+            sigma: number;
+            /** Low */
+            low: number;
+            /** High */
+            high: number;
+            /**
+             * Values
+             * @description How many earlier values the limits are from; 0: they are stated.
+             */
+            values: number;
+        };
+        /**
+         * CheckGyroChart
+         * @description One result of a check gyro over its campaigns.
+         */
+        CheckGyroChart: {
+            /** Axis */
+            axis: string;
+            /**
+             * Result
+             * @enum {string}
+             */
+            result: "bias" | "scale_factor";
+            /** Unit */
+            unit: string;
+            /** Points */
+            points: components["schemas"]["CheckGyroPoint"][];
+        };
+        /**
+         * CheckGyroPoint
+         * @description The result of one recording.
+         */
+        CheckGyroPoint: {
+            /** Recording */
+            recording: number;
+            /**
+             * Campaign
+             * @description null: the recording was imported.
+             */
+            campaign: number | null;
+            /**
+             * At
+             * Format: date-time
+             */
+            at: string;
+            /**
+             * Version
+             * @description The newest version that was fitted to this recording alone.
+             */
+            version: number;
+            /** Value */
+            value: number;
+            /**
+             * U
+             * @description Standard uncertainty; null: unknown.
+             */
+            u: number | null;
+            /**
+             * State
+             * @description out: beyond three standard deviations by any of the limits.
+             * @enum {string}
+             */
+            state: "in" | "warning" | "out" | "unknown";
+            /** Limits */
+            limits: components["schemas"]["ChartLimits"][];
+        };
+        /**
+         * CheckGyroRequest
+         * @description Make a unit a check gyro, or end that.
+         */
+        CheckGyroRequest: {
+            /**
+             * Marked
+             * @description false: the unit is no check gyro any more.
+             * @default true
+             */
+            marked?: boolean;
+            /**
+             * Temperature C
+             * @description Temperature of the bias on the chart, deg C; default: the middle of the range of the unit's first version.
+             */
+            temperature_c?: number | null;
+            /**
+             * Chart From
+             * @description First day of the chart, such as after a repair; default: all recordings.
+             */
+            chart_from?: string | null;
+            /** Reason */
+            reason: string;
+            /** By */
+            by: string;
+        };
+        /**
+         * CheckGyroResponse
+         * @description A check gyro: a unit that is measured in each campaign to check the bench.
+         */
+        CheckGyroResponse: {
+            /** Serial */
+            serial: string;
+            /**
+             * Marked
+             * @description Whether the unit is a check gyro; its charts can be drawn in any case.
+             */
+            marked: boolean;
+            /**
+             * Temperature C
+             * @description Temperature of the bias, deg C.
+             */
+            temperature_c: number;
+            /** Chart From */
+            chart_from: string | null;
+            /**
+             * Alarm
+             * @description Whether a result of the newest recording is out of the control limits.
+             */
+            alarm: boolean;
+            /** Charts */
+            charts: components["schemas"]["CheckGyroChart"][];
+            /**
+             * Left Out
+             * @description Recordings without a point, and why.
+             */
+            left_out: {
+                [key: string]: string;
+            };
+            /** Text */
+            text: string[];
+        };
+        /**
          * CheckRequest
          * @description A check of the whole bench; it needs no answers.
          */
@@ -3271,6 +3784,32 @@ export interface components {
             unit: string;
         };
         /**
+         * ComparedCalibration
+         * @description One side of a comparison.
+         */
+        ComparedCalibration: {
+            /** Serial */
+            serial: string;
+            /** Version */
+            version: number;
+            /**
+             * Bench
+             * @description Name of the bench; empty: not known.
+             */
+            bench: string;
+            /**
+             * Laboratory
+             * @description Name of the laboratory of the bench; empty: not stated.
+             */
+            laboratory: string;
+            /**
+             * Measured On
+             * Format: date
+             * @description First day of its newest recording.
+             */
+            measured_on: string;
+        };
+        /**
          * ComparedModel
          * @description A model fitted to the recording of a draft; only the draft's own is kept as a version.
          */
@@ -3284,6 +3823,71 @@ export interface components {
              * @default
              */
             why: string;
+        };
+        /**
+         * ComparedResult
+         * @description One result of both calibrations with En number and zeta score.
+         */
+        ComparedResult: {
+            /** Axis */
+            axis: string;
+            /** Result */
+            result: string;
+            /** Unit */
+            unit: string;
+            /** Values */
+            values: [
+                number,
+                number
+            ];
+            /**
+             * Expanded
+             * @description Expanded uncertainties, probability 95.45 %.
+             */
+            expanded: [
+                number,
+                number
+            ];
+            /** K */
+            k: [
+                number,
+                number
+            ];
+            /**
+             * Difference
+             * @description First minus second.
+             */
+            difference: number;
+            /**
+             * Shared U
+             * @description Root of the covariance by the standards that both rest on; 0: independent.
+             */
+            shared_u: number;
+            /**
+             * En
+             * @description En number (ISO 13528:2015, 9.7), the shared part subtracted.
+             */
+            en: number;
+            /**
+             * En Performance
+             * @enum {string}
+             */
+            en_performance: "satisfactory" | "questionable" | "unsatisfactory";
+            /**
+             * Zeta
+             * @description Zeta score (ISO 13528:2015, 9.6), the shared part subtracted.
+             */
+            zeta: number;
+            /**
+             * Zeta Performance
+             * @enum {string}
+             */
+            zeta_performance: "satisfactory" | "questionable" | "unsatisfactory";
+            /**
+             * En If Independent
+             * @description En number without regard to what both share.
+             */
+            en_if_independent: number;
         };
         /**
          * ComparisonColumns
@@ -4133,6 +4737,57 @@ export interface components {
             high: (number | null)[];
         };
         /**
+         * DriftPrediction
+         * @description Value and uncertainty of a standard on a day, by a straight line through its certificates.
+         */
+        DriftPrediction: {
+            /**
+             * Nominal
+             * @description Nominal value that it holds for, in the unit of the standard; null: it holds for all.
+             */
+            nominal: number | null;
+            /**
+             * On
+             * Format: date
+             */
+            on: string;
+            /**
+             * Value
+             * @description Predicted error: indicated minus true; null: the certificates state none.
+             */
+            value: number | null;
+            /**
+             * U
+             * @description Standard uncertainty; it contains that of the drift where the drift is known.
+             */
+            u: number;
+            /**
+             * Per Year
+             * @description Drift per year; null: unknown, see `why`.
+             */
+            per_year: number | null;
+            /**
+             * U Per Year
+             * @description Standard uncertainty of the drift per year.
+             */
+            u_per_year: number | null;
+            /**
+             * Certificates
+             * @description How many certificates the line is from; 0: there is no line.
+             */
+            certificates: number;
+            /**
+             * Birge Ratio
+             * @description By how much the certificates scatter more than their uncertainties state; 1: they do not.
+             */
+            birge_ratio: number | null;
+            /**
+             * Why
+             * @description Why the drift is unknown; empty where it is known.
+             */
+            why: string;
+        };
+        /**
          * DriverResponse
          * @description The driver of an instrument, and the distribution that it came from.
          */
@@ -4959,6 +5614,11 @@ export interface components {
             /** In Force */
             in_force: boolean;
             /**
+             * Notices
+             * @description Reference standards that were found bad on the days of the measurements behind the version; no certificate.
+             */
+            notices: string[];
+            /**
              * Due
              * @description Date until which the certification is valid; null: no date.
              */
@@ -5098,6 +5758,37 @@ export interface components {
              * @default
              */
             procedure?: string;
+        };
+        /**
+         * LaboratoryComparison
+         * @description Two calibrations of one unit compared.
+         */
+        LaboratoryComparison: {
+            first: components["schemas"]["ComparedCalibration"];
+            second: components["schemas"]["ComparedCalibration"];
+            /** Temperature C */
+            temperature_c: number;
+            /** Results */
+            results: components["schemas"]["ComparedResult"][];
+            /**
+             * Shared
+             * @description Standards that both calibrations rest on: they are correlated by these.
+             */
+            shared: string[];
+            /**
+             * Not Compared
+             * @description Results without a comparison, and why.
+             */
+            not_compared: {
+                [key: string]: string;
+            };
+            /**
+             * Satisfactory
+             * @description Whether |En| <= 1 for every result.
+             */
+            satisfactory: boolean;
+            /** Text */
+            text: string[];
         };
         /**
          * LackOfFit
@@ -5664,7 +6355,7 @@ export interface components {
              * What
              * @enum {string}
              */
-            what: "verdict" | "worse" | "data";
+            what: "verdict" | "worse" | "data" | "standard";
             /**
              * Text
              * @description The objection, with figures in deg/s.
@@ -6789,6 +7480,141 @@ export interface components {
          */
         Role: "viewer" | "operator" | "approver";
         /**
+         * RoomConditions
+         * @description Least and largest value in the room as a person noted them; used where nothing was recorded in that time.
+         */
+        RoomConditions: {
+            /**
+             * Temperature C
+             * @description Temperature of the room, deg C.
+             */
+            temperature_c?: [
+                number,
+                number
+            ] | null;
+            /**
+             * Humidity Pct
+             * @description Relative humidity of the room, %.
+             */
+            humidity_pct?: [
+                number,
+                number
+            ] | null;
+            /**
+             * Pressure Hpa
+             * @description Air pressure of the room, hPa.
+             */
+            pressure_hpa?: [
+                number,
+                number
+            ] | null;
+        };
+        /**
+         * RoomEnvironmentRequest
+         * @description Readings of the environment of the room, by an instrument that logs or by a person who reads.
+         */
+        RoomEnvironmentRequest: {
+            /** Readings */
+            readings: components["schemas"]["RoomRecord"][];
+            /**
+             * Source
+             * @description The instrument, with its number.
+             */
+            source: string;
+            /**
+             * Bench
+             * @description Name of the bench that they hold for; empty: all benches.
+             * @default
+             */
+            bench?: string;
+            /**
+             * By
+             * @description The person who read and typed them; then the audit trail has a row. null: an instrument logged them.
+             */
+            by?: string | null;
+        };
+        /**
+         * RoomEnvironmentResponse
+         * @description The environment of the room over a time.
+         */
+        RoomEnvironmentResponse: {
+            /** Spans */
+            spans: components["schemas"]["RoomSpanResponse"][];
+            /**
+             * Readings
+             * @description The newest first, at most 1000.
+             */
+            readings: components["schemas"]["RoomReadingResponse"][];
+        };
+        /**
+         * RoomReadingResponse
+         * @description One reading.
+         */
+        RoomReadingResponse: {
+            /**
+             * Measured At
+             * Format: date-time
+             */
+            measured_at: string;
+            /** Bench */
+            bench: string;
+            /** Quantity */
+            quantity: string;
+            /** Unit */
+            unit: string;
+            /** Value */
+            value: number;
+            /** Source */
+            source: string;
+        };
+        /**
+         * RoomRecord
+         * @description Values of one time.
+         */
+        RoomRecord: {
+            /**
+             * Measured At
+             * @description Default: now.
+             */
+            measured_at?: string | null;
+            /** Values */
+            values: components["schemas"]["RoomValue"][];
+        };
+        /**
+         * RoomSpanResponse
+         * @description Least and largest reading of a quantity.
+         */
+        RoomSpanResponse: {
+            /** Quantity */
+            quantity: string;
+            /** Unit */
+            unit: string;
+            /** Low */
+            low: number;
+            /** High */
+            high: number;
+            /** Readings */
+            readings: number;
+        };
+        /**
+         * RoomValue
+         * @description One value of the environment of the room.
+         */
+        RoomValue: {
+            /**
+             * Quantity
+             * @enum {string}
+             */
+            quantity: "temperature" | "humidity" | "pressure";
+            /** Value */
+            value: number;
+            /**
+             * Unit
+             * @description deg C, K or deg F; %; hPa, mbar, kPa or Pa.
+             */
+            unit: string;
+        };
+        /**
          * RunColumns
          * @description The steps of a campaign, with what became of each.
          */
@@ -7049,6 +7875,281 @@ export interface components {
         StageResponse: {
             /** Stage */
             stage: string;
+        };
+        /**
+         * StandardBadRequest
+         * @description Say that a standard was found bad between two days, both included.
+         */
+        StandardBadRequest: {
+            /**
+             * Bad From
+             * Format: date
+             * @description First day of which it is not known that the standard was good.
+             */
+            bad_from: string;
+            /**
+             * Bad Until
+             * @description Last such day; null: it is still bad.
+             */
+            bad_until?: string | null;
+            /** Reason */
+            reason: string;
+            /** By */
+            by: string;
+        };
+        /**
+         * StandardCertificateRequest
+         * @description Enter a certificate of a standard.
+         */
+        StandardCertificateRequest: {
+            /** Number */
+            number: string;
+            /** Laboratory */
+            laboratory: string;
+            /**
+             * Calibrated
+             * Format: date
+             */
+            calibrated: string;
+            /**
+             * Due
+             * @description Last day on which the standard may be used.
+             */
+            due?: string | null;
+            /**
+             * Adjusted
+             * @description Whether the standard was adjusted or repaired before: no drift leads across it.
+             * @default false
+             */
+            adjusted?: boolean;
+            /**
+             * Traceability
+             * @default
+             */
+            traceability?: string;
+            /** Points */
+            points: components["schemas"]["CertifiedPointRequest"][];
+            /**
+             * Reason
+             * @description Why this replaces an entry of the same number that was typed wrong.
+             * @default
+             */
+            reason?: string;
+            /** By */
+            by: string;
+        };
+        /**
+         * StandardCertificateResponse
+         * @description A certificate of a standard.
+         */
+        StandardCertificateResponse: {
+            /** Number */
+            number: string;
+            /** Laboratory */
+            laboratory: string;
+            /**
+             * Calibrated
+             * Format: date
+             */
+            calibrated: string;
+            /** Due */
+            due: string | null;
+            /** Adjusted */
+            adjusted: boolean;
+            /** Traceability */
+            traceability: string;
+            /** Points */
+            points: components["schemas"]["CertifiedPointResponse"][];
+            /**
+             * Reason
+             * @description Why it replaced an entry of the same number; empty: it replaced none.
+             */
+            reason: string;
+            /** By */
+            by: string;
+            /**
+             * At
+             * Format: date-time
+             */
+            at: string;
+        };
+        /**
+         * StandardCheckRequest
+         * @description Enter an intermediate check (ISO/IEC 17025:2017, 6.4.10).
+         */
+        StandardCheckRequest: {
+            /**
+             * Value
+             * @description Error that was found: indicated minus true.
+             */
+            value: number;
+            /**
+             * U
+             * @description Standard uncertainty of the check.
+             */
+            u: number;
+            /**
+             * Nominal
+             * @description Nominal value that it holds for, in the unit of the standard; null: it holds for all.
+             */
+            nominal?: number | null;
+            /**
+             * Checked At
+             * @description Default: now.
+             */
+            checked_at?: string | null;
+            /**
+             * Note
+             * @default
+             */
+            note?: string;
+            /** By */
+            by: string;
+        };
+        /**
+         * StandardCheckResponse
+         * @description An intermediate check on the control chart of its nominal.
+         */
+        StandardCheckResponse: {
+            /**
+             * Checked At
+             * Format: date-time
+             */
+            checked_at: string;
+            /**
+             * Nominal
+             * @description Nominal value that it holds for, in the unit of the standard; null: it holds for all.
+             */
+            nominal: number | null;
+            /** Value */
+            value: number;
+            /** U */
+            u: number;
+            /** Note */
+            note: string;
+            /** By */
+            by: string;
+            /**
+             * State
+             * @description out: beyond three standard deviations by any of the limits.
+             * @enum {string}
+             */
+            state: "in" | "warning" | "out" | "unknown";
+            /** Limits */
+            limits: components["schemas"]["ChartLimits"][];
+        };
+        /**
+         * StandardFindingResponse
+         * @description A finding that a standard was bad.
+         */
+        StandardFindingResponse: {
+            /** Number */
+            number: number;
+            /**
+             * Bad From
+             * Format: date
+             */
+            bad_from: string;
+            /**
+             * Bad Until
+             * @description null: it is still bad.
+             */
+            bad_until: string | null;
+            /** Reason */
+            reason: string;
+            /** By */
+            by: string;
+            /**
+             * At
+             * Format: date-time
+             */
+            at: string;
+            /**
+             * Withdrawn
+             * @description Who withdrew it, when and why; empty: it is in force.
+             */
+            withdrawn: string;
+        };
+        /**
+         * StandardRequest
+         * @description Enter a reference standard.
+         */
+        StandardRequest: {
+            /**
+             * Label
+             * @description Name of the standard, as `name` in [[standards]] of a bench file.
+             */
+            label: string;
+            /**
+             * Quantity
+             * @description Quantity: one of a bench file, such as thermometer, clock or fixture_angle, or another one.
+             */
+            quantity: string;
+            /**
+             * Unit
+             * @description Unit of its values; default: that of a bench file.
+             */
+            unit?: string | null;
+            /**
+             * Serial
+             * @default
+             */
+            serial?: string;
+            /**
+             * Description
+             * @default
+             */
+            description?: string;
+            /** By */
+            by: string;
+        };
+        /**
+         * StandardResponse
+         * @description A reference standard: its state on a day, and what that rests on.
+         */
+        StandardResponse: {
+            /** Label */
+            label: string;
+            /** Serial */
+            serial: string;
+            /** Quantity */
+            quantity: string;
+            /** Unit */
+            unit: string;
+            /** Description */
+            description: string;
+            /**
+             * State
+             * @enum {string}
+             */
+            state: "valid" | "no certificate" | "overdue" | "check it" | "bad";
+            /**
+             * Text
+             * @description The state in sentences, with what to do.
+             */
+            text: string[];
+            /**
+             * Due
+             * @description Last day on which it may be used, of the newest certificate.
+             */
+            due: string | null;
+            /**
+             * Certificates
+             * @description By day of calibration, the newest last.
+             */
+            certificates: components["schemas"]["StandardCertificateResponse"][];
+            /**
+             * Predictions
+             * @description For each nominal, on the day that was asked for.
+             */
+            predictions: components["schemas"]["DriftPrediction"][];
+            /**
+             * Checks
+             * @description In order of time.
+             */
+            checks: components["schemas"]["StandardCheckResponse"][];
+            /** Findings */
+            findings: components["schemas"]["StandardFindingResponse"][];
         };
         /**
          * StartEventResponse
@@ -7673,6 +8774,11 @@ export interface components {
              * @default false
              */
             overdue: boolean;
+            /**
+             * Notices
+             * @description Reference standards that were found bad on the days of the measurements behind the version in force.
+             */
+            notices: string[];
             /** @description How to recalibrate the unit: the campaign behind the version in force, and its recipe; null: that version is not from a campaign, or the response lists units without `due_within`. */
             recalibration: components["schemas"]["RecalibrationResponse"] | null;
             /** @description Newest draft calibration of the unit; null: there is none, or the response lists units without `due_within`. */
@@ -7905,6 +9011,11 @@ export interface components {
             /** In Force */
             in_force: boolean;
             /**
+             * Notices
+             * @description Reference standards that were found bad on the days of the measurements behind the version; no certificate.
+             */
+            notices: string[];
+            /**
              * Due
              * @description Date until which the certification is valid; null: no date.
              */
@@ -7992,6 +9103,16 @@ export interface components {
              * @default
              */
             experiment: string;
+        };
+        /**
+         * WithdrawFindingRequest
+         * @description Withdraw a finding that was wrong.
+         */
+        WithdrawFindingRequest: {
+            /** Reason */
+            reason: string;
+            /** By */
+            by: string;
         };
         /**
          * WithdrawRequest
@@ -10408,6 +11529,476 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["MotionResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    standards_api_standards_get: {
+        parameters: {
+            query?: {
+                /** @description Day for state and prediction; default: today. */
+                on?: string | null;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["StandardResponse"][];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    add_api_standards_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["StandardRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["StandardResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    standard_api_standards__label__get: {
+        parameters: {
+            query?: {
+                /** @description Day for state and prediction; default: today. */
+                on?: string | null;
+            };
+            header?: never;
+            path: {
+                label: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["StandardResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    affected_api_standards__label__affected_get: {
+        parameters: {
+            query?: {
+                /** @description First day; default: of its findings, else all. */
+                bad_from?: string | null;
+                /** @description Last day. */
+                bad_until?: string | null;
+            };
+            header?: never;
+            path: {
+                label: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["AffectedResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    certificate_api_standards__label__certificates_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                label: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["StandardCertificateRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["StandardResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    check_api_standards__label__checks_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                label: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["StandardCheckRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["StandardResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    bad_api_standards__label__findings_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                label: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["StandardBadRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["StandardResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    withdraw_api_standards__label__findings__finding__withdraw_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                label: string;
+                finding: number;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["WithdrawFindingRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["StandardResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    check_gyros_api_check_gyros_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CheckGyroResponse"][];
+                };
+            };
+        };
+    };
+    one_check_gyro_api_check_gyros__serial__get: {
+        parameters: {
+            query?: {
+                /** @description Temperature, deg C; default: the one of the unit. */
+                temperature_c?: number | null;
+            };
+            header?: never;
+            path: {
+                serial: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CheckGyroResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    set_check_gyro_api_check_gyros__serial__post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                serial: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["CheckGyroRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["CheckGyroResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    comparison_api_comparisons_get: {
+        parameters: {
+            query: {
+                /** @description SERIAL:VERSION */
+                first: string;
+                /** @description SERIAL:VERSION of the same unit. */
+                second: string;
+                /** @description deg C; default: the middle of what both cover. */
+                temperature_c?: number | null;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["LaboratoryComparison"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    read_environment_api_environment_get: {
+        parameters: {
+            query?: {
+                /** @description Default: a day before `end`. */
+                begin?: string | null;
+                /** @description Default: now. */
+                end?: string | null;
+                /** @description Name of the bench; empty: what holds for all benches. */
+                bench?: string;
+            };
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RoomEnvironmentResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    add_environment_api_environment_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["RoomEnvironmentRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["RoomEnvironmentResponse"];
                 };
             };
             /** @description Validation Error */

@@ -22,11 +22,21 @@ from labctl.services.certificates.issue import issue
 from labctl.services.certificates.states import list_certificates
 from labctl.services.schemas.campaigns import StartRequest
 from labctl.services.schemas.certification import RevokeRequest
-from labctl.store import FetchRow, NewReleaseRequest, Release, Store, check, open_store
+from labctl.store import (
+    CheckGyroRow,
+    FetchRow,
+    NewReleaseRequest,
+    Release,
+    RoomReading,
+    Store,
+    check,
+    open_store,
+)
 from labctl.store.connection import postgresql_server
 from labctl.store.connection.database import Database
 from labctl.store.schema import tables
-from tests.helpers import certificates
+from tests.helpers import certificates, register
+from tests.helpers.certificates import simulated
 from tests.helpers.postgresql import Cluster, running_cluster
 
 pytestmark = pytest.mark.timeout(300)
@@ -261,3 +271,26 @@ def test_the_life_of_a_certificate_is_the_same_on_a_server(url: str) -> None:
         assert store.release_requests.waiting(certificates.SERIAL) == []
         assert store.calibrations.history(certificates.SERIAL)[0].release == second
     assert check(url).findings == ()
+
+
+def test_the_register_of_standards_is_the_same_as_in_a_file(url: str, tmp_path: Path) -> None:
+    path = str(tmp_path / "lab.sqlite")
+    for location in (path, url):
+        with open_store(location, write=True) as store:
+            register.add(store)
+            register.certificate(store, "T-1", AT.date(), 0.010, due="2027-01-31")
+            register.check(store, AT.date(), 0.012)
+            register.bad(store, AT.date(), None, AT.date())
+            reading = RoomReading(AT, "", "temperature", "deg C", 21.5, "TH-3")
+            store.room_environment.add([reading], AT, "T. Technician")
+            store.units.get(store.recordings.get(store.recordings.add_import(simulated(), AT)).serial)
+            store.check_gyros.add(CheckGyroRow("FOG-0001", "mark", 25.0, AT.date(), "stays", "Q", AT))
+            assert store.standards.get("SN-0815") == store.standards.all()[0]
+            assert [each.high for each in store.room_environment.spans(AT, AT, "any")] == [21.5]
+            assert [each.chart_from for each in store.check_gyros.all()] == [AT.date()]
+        assert not check(location).findings
+    in_file, on_server = rows_of(path), rows_of(url)
+    for name in ("standards", "standard_certificates", "standard_checks", "standard_findings", "check_gyros"):
+        assert len(in_file[name]) == 1
+    for name in (*in_file.keys() - {"block_digests"},):
+        assert on_server[name] == in_file[name], name

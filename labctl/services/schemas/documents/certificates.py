@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from datetime import date, datetime
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from instruments.laboratory import LINE, Laboratory
 from labctl.certificates.document import Customer, DecisionRule, Use
@@ -13,6 +14,12 @@ from labctl.services.schemas.base import BY_KEY, Request, ResponseModel
 
 TEXT = 2000
 CertificateState = Literal["valid", "amended", "superseded", "withdrawn"]
+
+
+def _in_order(given: tuple[float, float]) -> tuple[float, float]:
+    if not (math.isfinite(given[0]) and math.isfinite(given[1]) and given[0] <= given[1]):
+        raise ValueError(f"{list(given)}: give the least value, then the largest")
+    return given
 
 
 class OrderedItem(Request):
@@ -58,12 +65,27 @@ class OrderedConformity(Request):
     )
 
 
+Span = Annotated[tuple[float, float], AfterValidator(_in_order)]
+
+
+class RoomConditions(Request):
+    """Least and largest value in the room as a person noted them; used where nothing was recorded in that time."""
+
+    temperature_c: Span | None = Field(default=None, description="Temperature of the room, deg C.")
+    humidity_pct: Span | None = Field(default=None, description="Relative humidity of the room, %.")
+    pressure_hpa: Span | None = Field(default=None, description="Air pressure of the room, hPa.")
+
+
 class CertificateOrder(Request):
     """The facts of the order: what a campaign cannot know. They are kept with the certificate."""
 
     customer: Customer = Customer()
     item: OrderedItem = OrderedItem()
     method: OrderedMethod = OrderedMethod()
+    environment: RoomConditions = Field(
+        default=RoomConditions(),
+        description="Environment of the room where none was recorded (`POST /api/environment`) during the campaign.",
+    )
     conformity: OrderedConformity | None = Field(
         default=None,
         description="Statement of conformity to a specification; null: the certificate makes no statement.",
@@ -153,6 +175,9 @@ class CertificateResponse(ResponseModel):
     state_by_key: str | None = Field(default=None, description=BY_KEY)
     valid_instead: str | None = Field(
         default=None, description="Number of the unit's valid certificate; null: it is this one, or none is valid."
+    )
+    notices: list[str] = Field(
+        default_factory=list, description="Findings on the reference standards behind it since it was issued."
     )
 
 

@@ -118,6 +118,7 @@ function versions(unit, rows, issued, explore) {
               { class: "row tight" },
               h("a", { href: `${explore}&version=${row.version}` }, `${row.version}`),
               row.certified ? chip("in force", "good") : null,
+              row.notices?.length ? h("span", { title: row.notices.join("; ") }, chip("standard bad", "bad")) : null,
             ),
         },
         {

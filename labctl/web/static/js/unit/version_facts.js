@@ -2,7 +2,7 @@
 
 import { h } from "../core/elements.js";
 import { idText, number } from "../core/format.js";
-import { table } from "../core/components.js";
+import { notice, table } from "../core/components.js";
 import { jointParts } from "../joint/card.js";
 
 /** @import { Version } from "../../../types/api.js" */
@@ -10,6 +10,7 @@ import { jointParts } from "../joint/card.js";
 /** @param {Version} version */
 export function versionFacts(version) {
   return [
+    version.notices?.length ? notice("bad", standardsFoundBad(version)) : null,
     version.rate_reference ? h("p", {}, `Rates of its recordings: ${version.rate_reference}.`) : null,
     heldOutByLeg(version),
     leftOut(version),
@@ -17,6 +18,18 @@ export function versionFacts(version) {
     version.joint
       ? [h("h3", {}, `Recordings ${version.joint.recordings.join(", ")} together`), jointParts(version.joint)]
       : null,
+  ];
+}
+
+/** @param {Version} version */
+function standardsFoundBad({ notices }) {
+  return [
+    h(
+      "ul",
+      { class: "plain" },
+      (notices ?? []).map((text) => h("li", {}, text)),
+    ),
+    h("p", {}, "No certificate of this version is issued. Measure again with another standard."),
   ];
 }
 

@@ -1,0 +1,135 @@
+"""Reference standards, check gyros and comparisons as text."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from labctl.cli.output import console, format_number, table
+
+if TYPE_CHECKING:
+    from labctl.services.schemas.standards import AffectedResponse, ChartLimits, DriftPrediction, StandardResponse
+    from labctl.services.schemas.validity import CheckGyroResponse, LaboratoryComparison
+
+
+def print_list(answers: Sequence[StandardResponse]) -> None:
+    """Print one line for each standard, then what is to be done."""
+    if not answers:
+        console.print("the register holds no standard; `labctl standards add` adds one", markup=False)
+        return
+    rows = table("", "standard", "quantity", "state", "due", "certificate", "u now", "drift per year")
+    for each in answers:
+        newest = each.certificates[-1].number if each.certificates else "–"
+        largest = max(each.predictions, key=lambda one: one.u, default=None)
+        rows.add_row(
+            each.label, each.quantity, each.state, str(each.due or "–"), newest,
+            "–" if largest is None else f"{largest.u:.3g} {each.unit}", "–" if largest is None else _drift(largest),
+        )  # fmt: skip
+    console.print(rows)
+    _print_text([text for each in answers for text in each.text])
+
+
+def print_standard(answer: StandardResponse) -> None:
+    """Print a standard with its certificates, predictions, checks and findings."""
+    serial = f", serial number {answer.serial}" if answer.serial else ""
+    console.print(f"{answer.label}: {answer.quantity} in {answer.unit}{serial}; {answer.state}", markup=False)
+    if answer.certificates:
+        rows = table("certificates", "number", "laboratory", "calibrated", "due", "nominal", "error", "u", numbers=3)
+        for each in answer.certificates:
+            for point in each.points:
+                rows.add_row(
+                    each.number, each.laboratory, str(each.calibrated), str(each.due or "–"),
+                    format_number(point.nominal), format_number(point.value), format_number(point.u, 3),
+                )  # fmt: skip
+        console.print(rows)
+    for found in answer.predictions:
+        where = "" if found.nominal is None else f" at {found.nominal:g}"
+        drift = _drift(found) if found.per_year is None else f"drift per year {_drift(found)}"
+        value = "not stated" if found.value is None else f"{found.value:.4g}"
+        console.print(
+            f"on {found.on}{where}: error {value}, u = {found.u:.3g} {answer.unit}; {drift}",
+            markup=False,
+            soft_wrap=True,
+        )
+    if answer.checks:
+        rows = table("intermediate checks", "time", "by", "state", "limits", "nominal", "value", "u", numbers=3)
+        for check in answer.checks:
+            rows.add_row(
+                f"{check.checked_at:%Y-%m-%d %H:%M}", check.by, check.state, _limits(check.limits),
+                format_number(check.nominal), format_number(check.value), format_number(check.u, 3),
+            )  # fmt: skip
+        console.print(rows)
+    for finding in answer.findings:
+        until = finding.bad_until or "now"
+        withdrawn = f"; withdrawn: {finding.withdrawn}" if finding.withdrawn else ""
+        said = f"finding {finding.number}: bad from {finding.bad_from} until {until}: {finding.reason}{withdrawn}"
+        console.print(said, markup=False, soft_wrap=True)
+    _print_text(answer.text)
+
+
+def _drift(found: DriftPrediction) -> str:
+    if found.per_year is None or found.u_per_year is None:
+        return found.why or "unknown"
+    return f"{found.per_year:.3g} (u {found.u_per_year:.2g})"
+
+
+def _limits(limits: Sequence[ChartLimits]) -> str:
+    return "; ".join(f"{each.basis}: {each.low:.4g} to {each.high:.4g}" for each in limits) or "–"
+
+
+def print_affected(answer: AffectedResponse) -> None:
+    """Print the calibrations that a standard was used for."""
+    if answer.calibrations:
+        rows = table("", "unit", "version", "campaigns", "measured", "in force", "certificates")
+        for each in answer.calibrations:
+            rows.add_row(
+                each.serial, str(each.version), ", ".join(map(str, each.campaigns)) or "imported",
+                f"{each.performed_from} to {each.performed_until}", "in force" if each.in_force else "",
+                ", ".join(each.certificates) or "–",
+            )  # fmt: skip
+        console.print(rows)
+    _print_text(answer.text)
+
+
+def print_check_gyro(answer: CheckGyroResponse) -> None:
+    """Print the control charts of a check gyro."""
+    for chart in answer.charts:
+        at = f" at {answer.temperature_c:g} deg C" if chart.result == "bias" else ""
+        title = f"{chart.result} of axis {chart.axis}{at}, {chart.unit}"
+        rows = table(title, "date", "campaign", "version", "state", "limits", "value", "u", numbers=2)
+        for point in chart.points:
+            rows.add_row(
+                f"{point.at:%Y-%m-%d}", "imported" if point.campaign is None else str(point.campaign),
+                str(point.version), point.state, _limits(point.limits), format_number(point.value, 6),
+                format_number(point.u, 3),
+            )  # fmt: skip
+        console.print(rows)
+    for recording, why in answer.left_out.items():
+        console.print(f"recording {recording} is not on the charts: {why}", markup=False, soft_wrap=True)
+    if not answer.marked:
+        console.print(f"{answer.serial} is no check gyro; --mark makes it one", markup=False)
+    _print_text(answer.text)
+
+
+def print_comparison(answer: LaboratoryComparison) -> None:
+    """Print two calibrations compared."""
+    for name, side in (("first", answer.first), ("second", answer.second)):
+        where = ", ".join(filter(None, (side.laboratory, side.bench))) or "imported"
+        said = f"{name}: {side.serial} version {side.version}, {where}, measured on {side.measured_on}"
+        console.print(said, markup=False)
+    title = f"at {answer.temperature_c:g} deg C"
+    rows = table(title, "axis", "result", "unit", "first", "U", "second", "U", "En", "zeta", numbers=6)
+    for each in answer.results:
+        rows.add_row(
+            each.axis, each.result, each.unit, f"{each.values[0]:.6g}", f"{each.expanded[0]:.2g}",
+            f"{each.values[1]:.6g}", f"{each.expanded[1]:.2g}", f"{each.en:.2f}", f"{each.zeta:.2f}",
+        )  # fmt: skip
+    console.print(rows)
+    for what, why in answer.not_compared.items():
+        console.print(f"not compared: {what}: {why}", markup=False, soft_wrap=True)
+    _print_text(answer.text)
+
+
+def _print_text(text: Sequence[str]) -> None:
+    for line in text:
+        console.print(line, markup=False, soft_wrap=True)

@@ -1,0 +1,1 @@
+"""Metrology of reference standards: drift between certificates, control charts, comparisons of laboratories."""

@@ -1,0 +1,174 @@
+"""Check gyros: a unit that is measured in each campaign, its bias and scale factor on control charts.
+
+Each recording is judged by the newest version that was fitted to it alone, so that no later campaign is in its result.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from datetime import date, datetime
+from functools import lru_cache
+from typing import Literal
+
+from labctl.calibration import read_calibration
+from labctl.errors import BadInput, LabctlError, NotEnoughData
+from labctl.metrology.control_chart import ChartPoint, Judged, judged
+from labctl.services.cache import UNNAMED, compute
+from labctl.services.calibrations.uncertainty import coefficients_at
+from labctl.services.schemas.validity import CheckGyroChart, CheckGyroPoint, CheckGyroRequest, CheckGyroResponse
+from labctl.services.standards.checks import limits_answer, out_text
+from labctl.store import CheckGyroRow, RecordingRow, Store
+
+Result = Literal["bias", "scale_factor"]
+UNITS: dict[Result, str] = {"bias": "deg/s", "scale_factor": "1"}
+#: Temperature of a unit whose model knows none, deg C.
+ROOM_C = 25.0
+#: Results in memory: a monitor asks for every check gyro each time.
+MOST_RESULTS = 1024
+
+
+@dataclass(frozen=True)
+class _Found:
+    """What one recording shows: axis and result -> value and standard uncertainty."""
+
+    row: RecordingRow
+    version: int
+    values: dict[tuple[str, Result], tuple[float, float | None]]
+
+
+def set_check_gyro(store: Store, serial: str, asked: CheckGyroRequest, at: datetime) -> CheckGyroResponse:
+    """Make a unit a check gyro, or end that. Raises NotFound, NotEnoughData for a unit without a version."""
+    unit = store.units.get(serial).serial
+    temperature_c = _temperature(store, unit, asked.temperature_c) if asked.marked else None
+    act: Literal["mark", "unmark"] = "mark" if asked.marked else "unmark"
+    store.check_gyros.add(CheckGyroRow(unit, act, temperature_c, asked.chart_from, asked.reason, asked.by, at))
+    return check_gyro(store, unit)
+
+
+def list_check_gyros(store: Store) -> list[CheckGyroResponse]:
+    """Return every unit that is marked, by serial number, with its charts."""
+    return [check_gyro(store, row.serial) for row in store.check_gyros.all()]
+
+
+def check_gyro(store: Store, serial: str, temperature_c: float | None = None) -> CheckGyroResponse:
+    """Return the charts of a unit, at another temperature where one is given.
+
+    Raises NotFound; NotEnoughData for a unit without a version.
+    """
+    compute(UNNAMED)
+    unit = store.units.get(serial).serial
+    mark = next((row for row in store.check_gyros.all() if row.serial == unit), None)
+    chosen = temperature_c if temperature_c is not None else mark.temperature_c if mark else None
+    at_c = _temperature(store, unit, chosen)
+    first = mark.chart_from if mark else None
+    found, left_out = _results(store, unit, at_c, first)
+    charts = list(_charts(found))
+    newest = [(chart, judgements[-1]) for chart, judgements in charts if chart.points[-1].recording == found[-1].row.id]
+    out = [(chart, one) for chart, one in newest if one.state == "out"]
+    return CheckGyroResponse(
+        serial=unit, marked=mark is not None, temperature_c=at_c, chart_from=first, alarm=bool(out),
+        charts=[chart for chart, _ in charts], left_out=left_out,
+        text=list(_text(unit, at_c, found, newest)),
+    )  # fmt: skip
+
+
+def alarms(store: Store) -> int:
+    """Return of how many check gyros the newest result is out of limits; one that cannot be judged is none."""
+    count = 0
+    for row in store.check_gyros.all():
+        try:
+            count += check_gyro(store, row.serial).alarm
+        except LabctlError:
+            continue
+    return count
+
+
+def _temperature(store: Store, serial: str, given: float | None) -> float:
+    if given is not None:
+        return given
+    versions = store.calibrations.of_unit(serial)
+    if not versions:
+        raise NotEnoughData(f"unit {serial} has no version; fit one with `labctl fit {serial}`")
+    low, high = read_calibration(versions[-1].document).temperature_c
+    return (low + high) / 2 if math.isfinite(low) and math.isfinite(high) else ROOM_C
+
+
+def _results(store: Store, serial: str, at_c: float, first: date | None) -> tuple[list[_Found], dict[int, str]]:
+    """Return the results of the recordings in order of time, and why others have none."""
+    versions = store.calibrations.of_unit(serial)
+    found, left_out = list[_Found](), dict[int, str]()
+    measured = [
+        row
+        for row in store.recordings.of_unit(serial)
+        if row.kind != "coefficients" and row.datasets and (first is None or _begun(row).date() >= first)
+    ]
+    for row in sorted(measured, key=lambda each: (_begun(each), each.id)):
+        own = next((each for each in versions if each.recordings == (row.id,)), None)
+        if own is None:
+            left_out[row.id] = f"no version is fitted to it alone: `labctl fit {serial} --recording {row.id}`"
+            continue
+        try:
+            values = _values(own.hash, own.document, at_c)
+        except (BadInput, NotEnoughData) as error:
+            left_out[row.id] = f"version {own.version}: {error}"
+            continue
+        found.append(_Found(row, own.version, dict(values)))
+    return found, left_out
+
+
+def _begun(row: RecordingRow) -> datetime:
+    return datetime.fromisoformat(str(row.info["started_at"]))
+
+
+@lru_cache(maxsize=MOST_RESULTS)
+def _values(
+    _hash: str, document: bytes, at_c: float
+) -> tuple[tuple[tuple[str, Result], tuple[float, float | None]], ...]:
+    """Return the results of a version at a temperature; a document never changes. Raises BadInput, NotEnoughData."""
+    return tuple(
+        ((axis, name), (budget.value, budget.combined))
+        for axis, budgets in coefficients_at(read_calibration(document), at_c).items()
+        for name in UNITS
+        if (budget := budgets.get(name)) is not None and budget.value is not None
+    )
+
+
+def _charts(found: Sequence[_Found]) -> Iterator[tuple[CheckGyroChart, list[Judged]]]:
+    for key in dict.fromkeys(key for each in found for key in each.values):
+        those = [each for each in found if key in each.values]
+        judgements = judged([ChartPoint(*each.values[key]) for each in those])
+        points = [_point(each, one) for each, one in zip(those, judgements, strict=True)]
+        axis, result = key
+        yield CheckGyroChart(axis=axis, result=result, unit=UNITS[result], points=points), judgements
+
+
+def _point(found: _Found, one: Judged) -> CheckGyroPoint:
+    return CheckGyroPoint(
+        recording=found.row.id, campaign=found.row.campaign, at=_begun(found.row), version=found.version,
+        value=one.point.value, u=one.point.u, state=one.state, limits=[limits_answer(each) for each in one.limits],
+    )  # fmt: skip
+
+
+def _text(
+    serial: str, at_c: float, found: Sequence[_Found], judgements: Sequence[tuple[CheckGyroChart, Judged]]
+) -> Iterator[str]:
+    if not found:
+        yield f"Check gyro {serial}: no recording has a version of its own; there is nothing to judge."
+        return
+    newest = found[-1]
+    where = f"campaign {newest.row.campaign}" if newest.row.campaign is not None else f"recording {newest.row.id}"
+    states = {one.state for _, one in judgements}
+    for chart, one in judgements:
+        if one.state == "out":
+            at = f" at {at_c:g} deg C" if chart.result == "bias" else ""
+            yield (
+                f"ALARM, check gyro {serial}, {where}, {chart.result} of axis {chart.axis}{at}: "
+                f"{out_text(one.point.value, chart.unit, one)}. Check the bench and its standards before the results "
+                "of this campaign are used."
+            )
+    if states == {"unknown"}:
+        yield f"Check gyro {serial}, {where}: the first result; control limits need a second one."
+    elif "out" not in states:
+        yield f"Check gyro {serial}, {where}: every result is within the control limits."

@@ -1,0 +1,63 @@
+"""Intermediate checks of a standard on control charts, one for each nominal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict
+
+from labctl.metrology.control_chart import ChartPoint, Judged, Limits, judged
+from labctl.services.schemas.standards import ChartLimits, StandardCheckResponse
+from labctl.services.standards.predictions import prediction_at
+from labctl.store import RegisteredStandard, StandardCheck
+
+BASES = {"history": "its history", "stated u": "the stated uncertainties"}
+
+
+def charted(standard: RegisteredStandard) -> list[tuple[StandardCheck, Judged]]:
+    """Return every check of a standard in order of time, judged on the chart of its nominal."""
+    found: list[tuple[StandardCheck, Judged]] = []
+    for nominal in dict.fromkeys(each.nominal for each in standard.checks):
+        checks = [each for each in standard.checks if each.nominal == nominal]
+        found += zip(checks, judged([_point(standard, each) for each in checks]), strict=True)
+    return sorted(found, key=lambda each: each[0].checked_at)
+
+
+def _point(standard: RegisteredStandard, check: StandardCheck) -> ChartPoint:
+    """Return a check with what the certificates predict for its day; nothing where they state no value."""
+    on = check.checked_at.date()
+    expected = prediction_at(standard, check.nominal, on) or prediction_at(standard, None, on)
+    if expected is None or expected.value is None:
+        return ChartPoint(check.value, check.u)
+    return ChartPoint(check.value, check.u, expected.value, expected.u)
+
+
+def to_be_checked(standard: RegisteredStandard) -> Iterator[tuple[StandardCheck, Judged]]:
+    """Yield the newest check of each nominal that is out of limits, unless a certificate came after it."""
+    newest = {check.nominal: (check, found) for check, found in charted(standard)}
+    last = standard.in_force[-1].calibrated if standard.in_force else None
+    for check, found in newest.values():
+        if found.state == "out" and (last is None or check.checked_at.date() >= last):
+            yield check, found
+
+
+def check_answer(check: StandardCheck, found: Judged) -> StandardCheckResponse:
+    """Return a judged check as an answer."""
+    return StandardCheckResponse(
+        checked_at=check.checked_at, nominal=check.nominal, value=check.value, u=check.u, note=check.note, by=check.by,
+        state=found.state, limits=[limits_answer(each) for each in found.limits],
+    )  # fmt: skip
+
+
+def limits_answer(limits: Limits) -> ChartLimits:
+    """Return control limits as an answer."""
+    return ChartLimits(**asdict(limits), low=limits.low, high=limits.high)
+
+
+def out_text(value: float, unit: str, found: Judged) -> str:
+    """Return by which limits a value is out, in words."""
+    said = "; ".join(
+        f"by {BASES[each.basis]} {each.low:.6g} to {each.high:.6g}"
+        for each in found.limits
+        if each.state_of(value) == "out"
+    )
+    return f"{value:.6g} {unit} is out of the control limits ({said})"

@@ -1,0 +1,196 @@
+"""The acts on the register, and a standard as the register answers it: state, drift, checks and findings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from datetime import date, datetime
+from typing import cast, get_args
+
+from instruments.standards import UNITS, Quantity
+from labctl.errors import BadInput, Conflict, NotFound
+from labctl.services.schemas.standards import (
+    CertifiedPointRequest,
+    CertifiedPointResponse,
+    StandardBadRequest,
+    StandardCertificateRequest,
+    StandardCertificateResponse,
+    StandardCheckRequest,
+    StandardFindingResponse,
+    StandardRequest,
+    StandardResponse,
+    StandardState,
+    WithdrawFindingRequest,
+)
+from labctl.services.standards.checks import charted, check_answer, out_text, to_be_checked
+from labctl.services.standards.predictions import prediction_answer, predictions_of
+from labctl.services.standards.usage import finding_text
+from labctl.store import (
+    CertifiedPoint,
+    RegisteredStandard,
+    StandardCertificate,
+    StandardCheck,
+    StandardFinding,
+    StandardRow,
+    Store,
+)
+
+
+def add_standard(store: Store, asked: StandardRequest, at: datetime) -> StandardResponse:
+    """Enter a standard. Raises BadInput for a unit that its quantity has not, Conflict for a label that is taken."""
+    units = UNITS.get(cast(Quantity, asked.quantity))
+    unit = asked.unit or (units[0] if units else None)
+    if unit is None:
+        raise BadInput(f"standard {asked.label}: no usual unit of {asked.quantity!r} is known; give its unit")
+    if units and unit not in units:
+        raise BadInput(
+            f"standard {asked.label}: unit {unit!r} is not accepted for {asked.quantity}; give {' or '.join(units)}"
+        )
+    store.standards.add(
+        StandardRow(asked.label, asked.serial, asked.quantity, unit, asked.description, asked.by, at)
+    )  # fmt: skip
+    return one_standard(store, asked.label, at.date())
+
+
+def add_certificate(store: Store, label: str, asked: StandardCertificateRequest, at: datetime) -> StandardResponse:
+    """Enter a certificate. Raises NotFound; BadInput for a day to come; Conflict for a number that is there."""
+    standard = store.standards.get(label)
+    if asked.calibrated > at.date():
+        raise BadInput(f"certificate {asked.number}: calibrated {asked.calibrated} is a day to come; correct the date")
+    there = any(each.number == asked.number for each in standard.certificates)
+    if there and not asked.reason:
+        raise Conflict(
+            f"certificate {asked.number} of standard {standard.row.label} is in the register; to correct it, send it "
+            "again with the reason (--reason TEXT)"
+        )
+    points = tuple(_point(each) for each in asked.points)
+    new = StandardCertificate(
+        asked.number, asked.laboratory, asked.calibrated, asked.due, asked.adjusted, asked.traceability, points,
+        asked.reason, asked.by, at,
+    )  # fmt: skip
+    store.standards.add_certificate(label, new)
+    return one_standard(store, label, at.date())
+
+
+def _point(asked: CertifiedPointRequest) -> CertifiedPoint:
+    value = asked.value if asked.correction is None else -asked.correction
+    if asked.u is not None:
+        return CertifiedPoint(asked.nominal, value, asked.u, 1.0)
+    return CertifiedPoint(asked.nominal, value, (asked.expanded or 0.0) / asked.k, asked.k)
+
+
+def add_check(store: Store, label: str, asked: StandardCheckRequest, at: datetime) -> StandardResponse:
+    """Enter an intermediate check. Raises NotFound, BadInput for a time to come."""
+    checked_at = asked.checked_at or at
+    if checked_at > at:
+        raise BadInput(f"checked_at {checked_at:%Y-%m-%d %H:%M} is a time to come; correct it")
+    new = StandardCheck(checked_at, asked.nominal, asked.value, asked.u, asked.note, asked.by, at)
+    store.standards.add_check(label, new)
+    return one_standard(store, label, at.date())
+
+
+def mark_bad(store: Store, label: str, asked: StandardBadRequest, at: datetime) -> StandardResponse:
+    """Enter that a standard was found bad. Raises NotFound."""
+    new = StandardFinding(0, "bad", None, asked.bad_from, asked.bad_until, asked.reason, asked.by, at)
+    store.standards.add_finding(label, new)
+    return one_standard(store, label, at.date())
+
+
+def withdraw_finding(
+    store: Store, label: str, number: int, asked: WithdrawFindingRequest, at: datetime
+) -> StandardResponse:
+    """Withdraw a finding. Raises NotFound for one that is not there, or is withdrawn."""
+    standard = store.standards.get(label)
+    if number not in {each.id for each in standard.bad}:
+        raise NotFound(
+            f"standard {standard.row.label} has no finding {number} in force; `labctl standards show "
+            f"{standard.row.label}` lists its findings"
+        )
+    store.standards.add_finding(
+        label, StandardFinding(0, "withdraw", number, None, None, asked.reason, asked.by, at)
+    )  # fmt: skip
+    return one_standard(store, label, at.date())
+
+
+def list_standards(store: Store, on: date) -> list[StandardResponse]:
+    """Return every standard, by label, as it is on a day."""
+    return [answer_of(each, on) for each in store.standards.all()]
+
+
+def count_by_state(store: Store, on: date) -> dict[str, int]:
+    """Return how many standards are in each state on a day; every state has a number."""
+    found: dict[str, int] = dict.fromkeys(get_args(StandardState), 0)
+    for each in store.standards.all():
+        found[answer_of(each, on).state] += 1
+    return found
+
+
+def one_standard(store: Store, label: str, on: date) -> StandardResponse:
+    """Return a standard by label or serial number as it is on a day. Raises NotFound."""
+    return answer_of(store.standards.get(label), on)
+
+
+def answer_of(standard: RegisteredStandard, on: date) -> StandardResponse:
+    """Return a standard as an answer."""
+    row = standard.row
+    found = dict(_states(standard, on))
+    state = next((each for each in ("bad", "check it", "overdue", "no certificate") if each in found), "valid")
+    withdrawn = {each.finding: each for each in standard.findings if each.act == "withdraw"}
+    return StandardResponse(
+        label=row.label, serial=row.serial, quantity=row.quantity, unit=row.unit, description=row.description,
+        state=cast(StandardState, state), text=[text for texts in found.values() for text in texts],
+        due=due_of(standard),
+        certificates=[_certificate(each) for each in standard.in_force],
+        predictions=[prediction_answer(nominal, each) for nominal, each in predictions_of(standard, on)],
+        checks=[check_answer(check, judged) for check, judged in charted(standard)],
+        findings=[
+            _finding(each, withdrawn.get(each.id)) for each in standard.findings if each.act == "bad"
+        ],
+    )  # fmt: skip
+
+
+def due_of(standard: RegisteredStandard) -> date | None:
+    """Return the last day on which a standard may be used: that of its newest certificate; None: none is stated."""
+    return standard.in_force[-1].due if standard.in_force else None
+
+
+def _states(standard: RegisteredStandard, on: date) -> Iterator[tuple[StandardState, list[str]]]:
+    """Yield each state that a standard is in, beside `valid`, with its sentences."""
+    label = standard.row.label
+    now = [each for each in standard.bad if each.bad_until is None or each.bad_until >= on]
+    if now:
+        yield "bad", [f"{finding_text(standard, each)}; do not use it." for each in now]
+    if out := list(to_be_checked(standard)):
+        yield (
+            "check it",
+            [
+                f"Check standard {label}: on {check.checked_at:%Y-%m-%d} its check of "
+                f"{out_text(check.value, standard.row.unit, judged)}. Repeat the check or have the standard "
+                "calibrated; if it is bad, say so with `labctl standards bad`."
+                for check, judged in out
+            ],
+        )
+    due = due_of(standard)
+    if due is not None and due < on:
+        yield "overdue", [f"Standard {label} was due on {due}, {(on - due).days} days ago; have it calibrated."]
+    if not standard.certificates:
+        yield "no certificate", [f"Standard {label} has no certificate; add it with `labctl standards certificate`."]
+
+
+def _certificate(given: StandardCertificate) -> StandardCertificateResponse:
+    return StandardCertificateResponse(
+        number=given.number, laboratory=given.laboratory, calibrated=given.calibrated, due=given.due,
+        adjusted=given.adjusted, traceability=given.traceability, reason=given.reason, by=given.by, at=given.at,
+        points=[
+            CertifiedPointResponse(nominal=each.nominal, value=each.value, u=each.u, k=each.k) for each in given.points
+        ],
+    )  # fmt: skip
+
+
+def _finding(given: StandardFinding, withdrawn: StandardFinding | None) -> StandardFindingResponse:
+    if given.bad_from is None:
+        raise BadInput(f"finding {given.id} has no first day; check the database with `labctl check`")
+    said = "" if withdrawn is None else f"{withdrawn.by}, {withdrawn.at:%Y-%m-%d}: {withdrawn.reason}"
+    return StandardFindingResponse(
+        number=given.id, bad_from=given.bad_from, bad_until=given.bad_until, reason=given.reason, by=given.by,
+        at=given.at, withdrawn=said,
+    )  # fmt: skip

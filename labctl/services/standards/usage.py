@@ -1,0 +1,165 @@
+"""Where a standard was used: the calibrations that are touched when it is found bad between two days."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from datetime import date, timedelta
+
+from instruments.standards import Standard
+from labctl.recording import RecordingInfo
+from labctl.services.schemas.standards import AffectedCalibration, AffectedResponse
+from labctl.store import CalibrationRecord, RecordingRow, RegisteredStandard, StandardFinding, Store
+
+
+def performed(store: Store, row: RecordingRow) -> tuple[date, date | None]:
+    """Return the first and the last day (UTC) of a campaign or of an imported recording; None: the last is unknown."""
+    if row.campaign is not None:
+        campaign = store.campaigns.get(row.campaign)
+        begun = campaign.started_at or campaign.created_at
+        return begun.date(), None if campaign.ended_at is None else campaign.ended_at.date()
+    begun = RecordingInfo.model_validate(row.info).started_at
+    ends = [each.t_until_s for each in store.recordings.data_sets(row.id) if each.t_until_s is not None]
+    return begun.date(), (begun + timedelta(seconds=max(ends))).date() if ends else None
+
+
+def is_entry_of(standard: RegisteredStandard, entry: Standard) -> bool:
+    """Return whether an entry of a bench file is this standard: by its label or serial number, or a certificate."""
+    numbers = {each.number for each in standard.certificates}
+    by_certificate = entry.certificate in numbers and entry.quantity == standard.row.quantity
+    return by_certificate or is_named(standard, entry)
+
+
+def is_named(standard: RegisteredStandard, entry: Standard) -> bool:
+    """Return whether an entry of a bench file has the label or the serial number of a standard as its name."""
+    return bool(entry.name) and entry.name in (standard.row.label, standard.row.serial)
+
+
+def uses(row: RecordingRow, standard: RegisteredStandard) -> bool:
+    """Return whether a recording was measured with a standard."""
+    return any(is_entry_of(standard, each) for each in RecordingInfo.model_validate(row.info).standards)
+
+
+def overlaps(first: date, last: date | None, bad_from: date | None, bad_until: date | None) -> bool:
+    """Return whether days of a measurement are among those between two others; None: open, or its end unknown."""
+    return (bad_until is None or first <= bad_until) and (bad_from is None or last is None or last >= bad_from)
+
+
+def affected(store: Store, label: str, bad_from: date | None = None, bad_until: date | None = None) -> AffectedResponse:
+    """Return the calibrations that rest on measurements with a standard between two days, both included.
+
+    Without days: those of its findings that are in force, else all. Raises NotFound.
+    """
+    standard = store.standards.get(label)
+    spans = [(bad_from, bad_until)]
+    if bad_from is None and bad_until is None and standard.bad:
+        spans = [(each.bad_from, each.bad_until) for each in standard.bad]
+    touched = [row for row in store.recordings.all() if uses(row, standard)]
+    days = {row.id: performed(store, row) for row in touched}
+    inside = {
+        row.id: row for row in touched if any(overlaps(*days[row.id], *span) for span in spans)
+    }  # fmt: skip
+    serials = sorted({row.serial for row in inside.values()})
+    found = [
+        _affected(store, version, [inside[n] for n in version.recordings if n in inside], days, standard)
+        for serial in serials
+        for version in reversed(store.calibrations.of_unit(serial))
+        if not inside.keys().isdisjoint(version.recordings)
+    ]
+    starts, ends = [each[0] for each in spans], [each[1] for each in spans]
+    return AffectedResponse(
+        label=standard.row.label,
+        bad_from=None if None in starts else min(each for each in starts if each is not None),
+        bad_until=None if None in ends else max(each for each in ends if each is not None),
+        calibrations=found,
+        text=list(_text(standard, found)),
+    )
+
+
+def _affected(
+    store: Store,
+    version: CalibrationRecord,
+    rows: Sequence[RecordingRow],
+    days: dict[int, tuple[date, date | None]],
+    standard: RegisteredStandard,
+) -> AffectedCalibration:
+    first = min(days[row.id][0] for row in rows)
+    last = max(days[row.id][1] or days[row.id][0] for row in rows)
+    history = store.calibrations.history(version.serial)
+    return AffectedCalibration(
+        serial=version.serial,
+        version=version.version,
+        recordings=[row.id for row in rows],
+        campaigns=sorted({row.campaign for row in rows if row.campaign is not None}),
+        performed_from=first,
+        performed_until=last,
+        in_force=bool(history) and history[0].act == "certify" and history[0].version == version.version,
+        certificates=[
+            each.number for each in store.certificates.of_unit(version.serial) if each.version == version.version
+        ],
+        findings=[
+            each.id
+            for each in standard.bad
+            if any(overlaps(*days[row.id], each.bad_from, each.bad_until) for row in rows)
+        ],
+    )
+
+
+def _text(standard: RegisteredStandard, found: Sequence[AffectedCalibration]) -> Iterator[str]:
+    label = standard.row.label
+    if not found:
+        yield f"No calibration was measured with standard {label} on these days."
+        return
+    units = len({each.serial for each in found})
+    issued = [number for each in found for number in each.certificates]
+    what = "calibration" if len(found) == 1 else "calibrations"
+    of, was = ("unit", "was") if units == 1 == len(found) else ("unit" if units == 1 else "units", "were")
+    yield f"{len(found)} {what} of {units} {of} {was} measured with standard {label} on these days."
+    if issued:
+        yield f"Certificates issued of them: {', '.join(issued)}. Inform those who hold them, and measure again."
+    if any(each.in_force for each in found):
+        yield "Versions in force are among them: revoke them, or state why they remain usable."
+
+
+@dataclass(frozen=True)
+class Notices:
+    """The standards that were found bad, read once for many versions."""
+
+    store: Store
+    bad: tuple[tuple[RegisteredStandard, StandardFinding], ...]
+    _days: dict[int, tuple[date, date | None]] = field(default_factory=dict)
+
+    @staticmethod
+    def of(store: Store) -> Notices:
+        """Return what the register says now; one point query where no standard was ever found bad."""
+        if not store.standards.has_findings():
+            return Notices(store, ())
+        return Notices(store, tuple((each, finding) for each in store.standards.all() for finding in each.bad))
+
+    def of_recordings(self, recordings: Sequence[int]) -> list[str]:
+        """Return a sentence for each finding on a standard that the recordings were measured with, on those days."""
+        if not self.bad:
+            return []
+        rows = [self.store.recordings.get(number) for number in recordings]
+        return list(
+            dict.fromkeys(
+                finding_text(standard, finding)
+                for standard, finding in self.bad
+                for row in rows
+                if uses(row, standard) and overlaps(*self._performed(row), finding.bad_from, finding.bad_until)
+            )
+        )
+
+    def _performed(self, row: RecordingRow) -> tuple[date, date | None]:
+        if row.id not in self._days:
+            self._days[row.id] = performed(self.store, row)
+        return self._days[row.id]
+
+
+def finding_text(standard: RegisteredStandard, finding: StandardFinding) -> str:
+    """Return a finding in one sentence."""
+    until = f"until {finding.bad_until}" if finding.bad_until else "until now"
+    return (
+        f"standard {standard.row.label} was found bad from {finding.bad_from} {until} ({finding.reason}; {finding.by}, "
+        f"{finding.at:%Y-%m-%d})"
+    )

@@ -1,0 +1,263 @@
+"""The register of reference standards: certificates, intermediate checks and findings; rows are only ever added."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from datetime import date, datetime
+from typing import Any, Literal
+
+import sqlalchemy as sa
+from sqlalchemy import exc
+
+from labctl.errors import Conflict, NotFound
+from labctl.store.connection.database import Database
+from labctl.store.connection.transactions import transaction
+from labctl.store.manifests.contents import STANDARD, STANDARD_CERTIFICATE, STANDARD_CHECK, STANDARD_FINDING
+from labctl.store.repositories.audit import append
+from labctl.store.schema import tables
+from labctl.store.sealing.seals import seal
+
+
+@dataclass(frozen=True)
+class StandardRow:
+    """A reference standard: artefact or instrument."""
+
+    label: str
+    serial: str
+    quantity: str
+    unit: str
+    description: str
+    by: str
+    at: datetime
+
+
+@dataclass(frozen=True)
+class CertifiedPoint:
+    """What a certificate states at one nominal, in the unit of the standard; None: no nominal, no value."""
+
+    nominal: float | None
+    value: float | None
+    u: float
+    k: float
+
+
+@dataclass(frozen=True)
+class StandardCertificate:
+    """One certificate of a standard."""
+
+    number: str
+    laboratory: str
+    calibrated: date
+    due: date | None
+    adjusted: bool
+    traceability: str
+    points: tuple[CertifiedPoint, ...]
+    reason: str  #: why it replaces an earlier row of its number; empty: it is the first
+    by: str
+    at: datetime
+
+
+@dataclass(frozen=True)
+class StandardCheck:
+    """One intermediate check of a standard."""
+
+    checked_at: datetime
+    nominal: float | None
+    value: float
+    u: float
+    note: str
+    by: str
+    at: datetime
+
+
+@dataclass(frozen=True)
+class StandardFinding:
+    """An act on the state of a standard: it was found bad, or such a finding is withdrawn."""
+
+    id: int
+    act: Literal["bad", "withdraw"]
+    finding: int | None  #: that is withdrawn
+    bad_from: date | None
+    bad_until: date | None  #: None: still
+    reason: str
+    by: str
+    at: datetime
+
+
+@dataclass(frozen=True)
+class RegisteredStandard:
+    """A standard with all that is known of it, each list in the order in which it was written."""
+
+    row: StandardRow
+    certificates: tuple[StandardCertificate, ...] = ()
+    checks: tuple[StandardCheck, ...] = ()
+    findings: tuple[StandardFinding, ...] = ()
+
+    @property
+    def in_force(self) -> tuple[StandardCertificate, ...]:
+        """The certificates by day, of each number the newest row."""
+        newest = {each.number: each for each in self.certificates}
+        return tuple(sorted(newest.values(), key=lambda each: each.calibrated))
+
+    @property
+    def bad(self) -> tuple[StandardFinding, ...]:
+        """The findings that are not withdrawn."""
+        withdrawn = {each.finding for each in self.findings if each.act == "withdraw"}
+        return tuple(each for each in self.findings if each.act == "bad" and each.id not in withdrawn)
+
+
+def _day(text: str | None) -> date | None:
+    return None if text is None else date.fromisoformat(text)
+
+
+def _certificate(row: sa.Row[Any]) -> StandardCertificate:
+    return StandardCertificate(
+        row.number, row.laboratory, date.fromisoformat(row.calibrated), _day(row.due), bool(row.adjusted),
+        row.traceability, tuple(CertifiedPoint(**each) for each in row.points), row.reason, row.by, row.at,
+    )  # fmt: skip
+
+
+def _check(row: sa.Row[Any]) -> StandardCheck:
+    return StandardCheck(row.checked_at, row.nominal, row.value, row.u, row.note, row.by, row.at)
+
+
+def _finding(row: sa.Row[Any]) -> StandardFinding:
+    return StandardFinding(
+        row.id, row.act, row.finding, _day(row.bad_from), _day(row.bad_until), row.reason, row.by, row.at
+    )
+
+
+class Standards:
+    """The register of reference standards."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def all(self) -> list[RegisteredStandard]:
+        """Return every standard, by label; one query where there is none."""
+        with self._database.reading() as connection:
+            return self._registered(connection, sa.true())
+
+    def find(self, label: str) -> RegisteredStandard | None:
+        """Return a standard by label or serial; None: it is not in the register."""
+        s = tables.standards.c
+        with self._database.reading() as connection:
+            found = self._registered(connection, sa.or_(s.label == label, sa.and_(s.serial == label, s.serial != "")))
+        return next(iter(sorted(found, key=lambda each: each.row.label != label)), None)
+
+    def get(self, label: str) -> RegisteredStandard:
+        """Return a standard by label or serial. Raises NotFound."""
+        if (found := self.find(label)) is None:
+            raise NotFound(
+                f"standard {label!r} is not in the register; `labctl standards list` lists those that are, "
+                "`labctl standards add` adds one"
+            )
+        return found
+
+    def has_findings(self) -> bool:
+        """Return whether any standard was ever found bad: a point query before anything is compared."""
+        with self._database.reading() as connection:
+            return connection.execute(sa.select(tables.standard_findings.c.id).limit(1)).first() is not None
+
+    def _registered(self, connection: sa.Connection, which: sa.ColumnElement[bool]) -> list[RegisteredStandard]:
+        rows = connection.execute(sa.select(tables.standards).where(which).order_by(tables.standards.c.label)).all()
+        if not rows:
+            return []
+        numbers = [row.id for row in rows]
+
+        def of(table: sa.Table, order: str = "id") -> dict[int, list[sa.Row[Any]]]:
+            found: dict[int, list[sa.Row[Any]]] = {}
+            query = sa.select(table).where(table.c.standard_id.in_(numbers)).order_by(table.c[order], table.c.id)
+            for row in connection.execute(query):
+                found.setdefault(row.standard_id, []).append(row)
+            return found
+
+        certificates, findings = of(tables.standard_certificates), of(tables.standard_findings)
+        checks = of(tables.standard_checks, "checked_at")
+        return [
+            RegisteredStandard(
+                StandardRow(row.label, row.serial, row.quantity, row.unit, row.description, row.by, row.at),
+                tuple(_certificate(each) for each in certificates.get(row.id, ())),
+                tuple(_check(each) for each in checks.get(row.id, ())),
+                tuple(_finding(each) for each in findings.get(row.id, ())),
+            )
+            for row in rows
+        ]
+
+    @transaction
+    def add(self, row: StandardRow) -> None:
+        """Enter a standard. Raises Conflict for a label, or a serial number, that another one has."""
+        taken = self.find(row.label) or (self.find(row.serial) if row.serial else None)
+        if taken is not None:
+            raise Conflict(_taken(taken.row, row))
+        try:
+            with self._database.writing() as connection:
+                t = tables.standards
+                number = connection.scalar(sa.insert(t).values(**asdict(row)).returning(t.c.id))
+                detail = {"serial": row.serial, "quantity": row.quantity, "unit": row.unit}
+                append(connection, row.at, "standard add", f"standard {row.label}", detail, who=row.by)
+                seal(connection, (STANDARD.name, str(number)), row.at, "added")
+        except exc.IntegrityError as error:
+            raise Conflict(f"standard {row.label} was added by another request in the meantime; list it") from error
+
+    @transaction
+    def add_certificate(self, label: str, new: StandardCertificate) -> None:
+        """Enter a certificate of a standard."""
+        values: dict[str, Any] = {
+            **{name: getattr(new, name) for name in ("number", "laboratory", "adjusted", "traceability", "reason")},
+            "calibrated": new.calibrated.isoformat(), "due": None if new.due is None else new.due.isoformat(),
+            "points": [asdict(each) for each in new.points],
+        }  # fmt: skip
+        self._add(label, tables.standard_certificates, STANDARD_CERTIFICATE.name, values, "certificate", new.by, new.at)
+
+    @transaction
+    def add_check(self, label: str, new: StandardCheck) -> None:
+        """Enter an intermediate check of a standard."""
+        values = {name: getattr(new, name) for name in ("nominal", "value", "u", "note")}
+        audited = {**values, "checked_at": new.checked_at.isoformat()}
+        stored = {**values, "checked_at": new.checked_at}
+        self._add(label, tables.standard_checks, STANDARD_CHECK.name, stored, "check", new.by, new.at, audited)
+
+    @transaction
+    def add_finding(self, label: str, new: StandardFinding) -> int:
+        """Enter that a standard was found bad, or that such a finding is withdrawn; returns its number.
+
+        The number in `new` is not used.
+        """
+        values: dict[str, Any] = {
+            "act": new.act, "finding": new.finding, "reason": new.reason,
+            **{name: None if (day := getattr(new, name)) is None else day.isoformat()
+               for name in ("bad_from", "bad_until")},
+        }  # fmt: skip
+        return self._add(label, tables.standard_findings, STANDARD_FINDING.name, values, new.act, new.by, new.at)
+
+    def _add(
+        self,
+        label: str,
+        table: sa.Table,
+        kind: str,
+        values: Mapping[str, Any],
+        act: str,
+        by: str,
+        at: datetime,
+        audited: Mapping[str, Any] | None = None,
+    ) -> int:
+        """Add a row of a standard with its audit row and its manifest; returns its number. Raises NotFound."""
+        found = self.get(label).row.label
+        with self._database.writing() as connection:
+            s = tables.standards.c
+            standard = connection.scalar(sa.select(s.id).where(s.label == found))
+            row = sa.insert(table).values(standard_id=standard, by=by, at=at, **values).returning(table.c.id)
+            number = int(connection.scalar(row) or 0)
+            append(connection, at, f"standard {act}", f"standard {found}", dict(audited or values), who=by)
+            seal(connection, (kind, str(number)), at, act)
+        return number
+
+
+def _taken(there: StandardRow, new: StandardRow) -> str:
+    named = new.label if new.label in (there.label, there.serial) else new.serial
+    return (
+        f"{named!r} is already standard {there.label} of the register (serial number "
+        f"{there.serial or 'not stated'}); give another label, or add certificates to that one"
+    )
