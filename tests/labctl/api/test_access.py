@@ -34,9 +34,10 @@ def operations() -> list[tuple[str, str]]:
 
 def needs(method: str, path: str) -> Role:
     """What an operation asks for, as the access policy states it."""
-    if path.startswith("/api/keys") or path.endswith(("/certify", "/calibrations/{version}/revoke")):
+    if path.startswith("/api/keys") or path.endswith(("/certify", "/calibrations/{version}/revoke", "/release")):
         return Role.APPROVER
-    if method == "post" and path.endswith(("/calibrations/{version}/certificate", "/findings/{finding}/withdraw")):
+    withdraws = ("/certificates/withdraw", "/findings/{finding}/withdraw")
+    if method == "post" and path.endswith(("/calibrations/{version}/certificate", *withdraws)):
         return Role.APPROVER
     return Role.VIEWER if method == "get" or path in ASKING else Role.OPERATOR
 
