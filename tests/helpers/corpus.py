@@ -40,6 +40,8 @@ class Entry:
         """Write the database into a folder, as this version left it; returns its path."""
         path = folder / "lab.sqlite"
         path.write_bytes(lzma.decompress((self.folder / "lab.sqlite.xz").read_bytes()))
+        if (anchor := self.folder / "lab.sqlite.anchor").exists():
+            (folder / anchor.name).write_bytes(anchor.read_bytes())
         return path
 
 

@@ -264,6 +264,13 @@ ELSEWHERE = {
     "/api/units/{serial}/calibrations/{version}/certificate": "tests/labctl/services/certificates/test_issue.py",
     "/api/certificates/withdraw": "tests/labctl/services/certificates/test_states.py",
     "/api/units/{serial}/calibrations/{version}/release": "tests/labctl/services/test_release.py",
+    "/api/standards": "tests/labctl/services/standards/test_story.py",
+    "/api/standards/{label}/certificates": "tests/labctl/services/standards/test_story.py",
+    "/api/standards/{label}/checks": "tests/labctl/services/standards/test_story.py",
+    "/api/standards/{label}/findings": "tests/labctl/services/standards/test_story.py",
+    "/api/standards/{label}/findings/{finding}/withdraw": "tests/labctl/services/standards/test_story.py",
+    "/api/check-gyros/{serial}": "tests/labctl/services/test_check_gyros.py",
+    "/api/environment": "tests/labctl/api/test_standards.py",
 }
 
 
