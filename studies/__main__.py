@@ -12,6 +12,7 @@ STUDIES = (
     "rate_vector_coverage",
     "single_outputs",
     "conformity",
+    "figures_agree",
     "hand_turns",
     "poses",
     "joint_recordings",

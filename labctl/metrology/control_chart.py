@@ -78,7 +78,10 @@ class Judged:
         """The worst state by any of the limits."""
         found = {limits.state_of(self.point.value) for limits in self.limits}
         order: tuple[State, ...] = ("out", "warning", "in")
-        return next((state for state in order if state in found), "unknown")
+        for state in order:
+            if state in found:
+                return state
+        return "unknown"
 
 
 def limits_from_history(values: Sequence[float]) -> Limits:

@@ -14,6 +14,7 @@ from labctl.certificates.signing import libraries
 from labctl.errors import BadInput
 from labctl.services.certificates.served import CertificateFormat
 from labctl.services.certificates.states import certificate_by_number
+from labctl.services.schemas.documents.certificates import SignatoryResponse
 from labctl.services.schemas.documents.signatures import SignatureResponse, VerifiedFileResponse
 from labctl.store import Store
 
@@ -97,7 +98,7 @@ def _answer(found: SignatureFound) -> SignatureResponse:
         form=found.form,
         valid=found.valid,
         problem=found.problem,
-        signed_by=None if found.signatory is None else found.signatory.model_dump(),
+        signed_by=None if found.signatory is None else SignatoryResponse.model_validate(found.signatory.model_dump()),
         signed_at=found.signed_at,
         trust=found.trust,
         reason=found.reason,
