@@ -14,7 +14,7 @@ from procedures.contracts.campaign_state import STOPPED_EARLY, UNDER_WAY
 
 if TYPE_CHECKING:
     from labctl.services.schemas.campaigns import CampaignResponse
-    from labctl.services.schemas.plans import AttendanceResponse, PlanResponse
+    from labctl.services.schemas.plans import AttendanceResponse, MisalignmentOutlook, PlanResponse
     from labctl.services.schemas.reports.drafts import DraftResponse
     from labctl.services.schemas.schedule import ScheduledResponse
 
@@ -29,6 +29,9 @@ def print_plan(answer: PlanResponse) -> None:
             f"  {answer.verification_datasets} of them verify and are never fitted, about "
             f"{hours(answer.verification_s)} ({share:.0f} %)"
         )
+    if (angles := answer.misalignment) is not None:
+        said = f"  misalignment: U {angles.expanded:.2g} rad at best, by fixture and table{_opposite(angles)}"
+        console.print(said, soft_wrap=True)
     for left_out in answer.clipped:
         console.print(f"  left out: {left_out}", style="yellow")
     if answer.attendance is not None:
@@ -170,3 +173,15 @@ def print_start(answer: ScheduledResponse) -> None:
         console.print(f"  due {event.due_at:%Y-%m-%d %H:%M %z}: {event.outcome}: {event.message}")
     if answer.note:
         console.print(f"  {answer.note}", style="yellow")
+
+
+def _opposite(angles: MisalignmentOutlook) -> str:
+    """Return in words what opposite mountings are worth; nothing where the plan has them."""
+    if angles.with_opposite is None or angles.more_s is None:
+        return ""
+    warm = ", ".join(f"{each:g}" for each in angles.inverted_temperatures_c)
+    rates = ", ".join(f"{each:g}" for each in angles.inverted_rates_dps)
+    return (
+        f"; {angles.with_opposite:.2g} with opposite mountings, {hours(angles.more_s)} more: add [inverted] with "
+        f"temperatures_c = [{warm}] and rates_dps = [{rates}]"
+    )

@@ -9,7 +9,7 @@ import numpy as np
 from labctl.fitting.data.covered import Covered
 from labctl.fitting.data.earth import turning_size_dps, up_rate_dps
 from labctl.fitting.data.fit_data import FitData, fit_data_of
-from labctl.fitting.data.mountings import mountings_of
+from labctl.fitting.data.mountings import fitted_shares, mountings_of
 from labctl.fitting.data.noise_floor import AxisNoise
 from labctl.fitting.data.temperature.channel import is_chambers
 from labctl.fitting.data.temperature.history import TemperatureHistory
@@ -84,7 +84,7 @@ def fit_preset(data: FitData, preset: Preset) -> FitResult:
         residual,
         left_out_dps=_left_out_dps(fitted, data),
         joint=joint_findings(data, model, preset, found),
-        mountings=mountings_of(data.channels),
+        mountings=fitted_shares(mountings_of(data.channels)),
     )
 
 

@@ -21,6 +21,7 @@ from instruments.toml_documents import read_toml_text, shown
 from labctl.errors import BadBench
 from labctl.services.planning.attendance import attendance, visits_s
 from labctl.services.planning.fit_rules import check_fit
+from labctl.services.planning.mountings import misalignment_outlook
 from labctl.services.schemas.plans import PlanResponse, Visibility
 from procedures.contracts.errors import PlanRefused
 from procedures.contracts.steps import Acquire
@@ -180,6 +181,7 @@ def plan_answer(
         verification_s=math.fsum(step.expected_s for step in plan.verification_steps),
         clipped=list(plan.clipped),
         schedule_hash=plan.schedule_hash,
+        misalignment=misalignment_outlook(plan, bench_file, limits_of(bench_file)),
         visibility=look(plan, bench_file) if look else None,
         attendance=attendance(visits_s(plan, bench_file), *start) if start else None,
     )

@@ -82,6 +82,20 @@ class Visibility(ResponseModel):
     experiment: str = ""
 
 
+class MisalignmentOutlook(ResponseModel):
+    """How well a misalignment can be known at best: what fixture and table leave, whatever the noise; k = 2, rad."""
+
+    expanded: float = Field(description="U of a misalignment with the mountings of the plan.")
+    with_opposite: float | None = Field(
+        default=None, description="U with each position upside down too; null: the plan has these mountings already."
+    )
+    more_s: float | None = Field(default=None, description="Expected time that this adds, s.")
+    inverted_temperatures_c: list[float] = Field(
+        default_factory=list, description="Temperatures of a table [inverted] of the recipe that adds them."
+    )
+    inverted_rates_dps: list[float] = Field(default_factory=list, description="Its rates, deg/s.")
+
+
 class PlanResponse(ResponseModel):
     """What a campaign would do, before anything moves."""
 
@@ -94,6 +108,11 @@ class PlanResponse(ResponseModel):
     verification_s: float = Field(description="Expected time of these, with their mountings and soaks, s.")
     clipped: list[str] = Field(description="Points left out because the bench or the unit cannot do them.")
     schedule_hash: str
+    misalignment: MisalignmentOutlook | None = Field(
+        default=None,
+        description="How well a misalignment can be known at best; null: no unit turns across one of its outputs, or "
+        "the bench states neither fixture_angle nor tilt.",
+    )
     visibility: list[Visibility] | None = Field(
         default=None, description="Which effects the plan could and could not detect; null: not requested."
     )

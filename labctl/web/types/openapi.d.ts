@@ -6147,6 +6147,37 @@ export interface components {
             datasets: number | null;
         };
         /**
+         * MisalignmentOutlook
+         * @description How well a misalignment can be known at best: what fixture and table leave, whatever the noise; k = 2, rad.
+         */
+        MisalignmentOutlook: {
+            /**
+             * Expanded
+             * @description U of a misalignment with the mountings of the plan.
+             */
+            expanded: number;
+            /**
+             * With Opposite
+             * @description U with each position upside down too; null: the plan has these mountings already.
+             */
+            with_opposite: number | null;
+            /**
+             * More S
+             * @description Expected time that this adds, s.
+             */
+            more_s: number | null;
+            /**
+             * Inverted Temperatures C
+             * @description Temperatures of a table [inverted] of the recipe that adds them.
+             */
+            inverted_temperatures_c: number[];
+            /**
+             * Inverted Rates Dps
+             * @description Its rates, deg/s.
+             */
+            inverted_rates_dps: number[];
+        };
+        /**
          * ModelLines
          * @description The model's error (output minus true rate) of one output axis in one position.
          *
@@ -6679,6 +6710,8 @@ export interface components {
             clipped: string[];
             /** Schedule Hash */
             schedule_hash: string;
+            /** @description How well a misalignment can be known at best; null: no unit turns across one of its outputs, or the bench states neither fixture_angle nor tilt. */
+            misalignment: components["schemas"]["MisalignmentOutlook"] | null;
             /**
              * Visibility
              * @description Which effects the plan could and could not detect; null: not requested.
