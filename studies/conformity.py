@@ -74,6 +74,8 @@ class Calibrated:
     fitted: FittedModel
     evidence: Mapping[str, AxisEvidence]
     bench: BenchConditions
+    seen_dps: float  #: the largest error of the data sets that were fitted
+    seen: int
 
     @staticmethod
     def of(plan: Plan, recording: Recording) -> Calibrated:
@@ -81,7 +83,8 @@ class Calibrated:
         data, preset = fit_data_of(recording), preset_for(None, list(MODEL))
         result = fit_preset(data, preset)
         bench = conditions_of(recording.info, result.environment, mountings=result.mountings)
-        return Calibrated(plan, result.fitted, use_evidence(data, preset), bench)
+        left = max(float(np.abs(values).max()) for values in result.residual_dps.values())
+        return Calibrated(plan, result.fitted, use_evidence(data, preset), bench, left, len(data))
 
     def at(self, rates_dps: Mapping[str, float], temperature_c: float) -> RateVectorUncertainty:
         """Return the uncertainty at a rate vector."""
@@ -119,7 +122,7 @@ class Calibrated:
                 VerifiedError(axis, (rates[0], rates[1], rates[2]), float(warm[row]), float(errors[row, k]), budget)
                 for k, (axis, budget) in enumerate(known.budgets.items())
             ]
-        return Errors("verification", float(np.abs(errors).max()), len(unseen), tuple(found))
+        return Errors(self.seen_dps, self.seen, tuple(found), len(unseen), is_anew=True)
 
 
 @single_threaded

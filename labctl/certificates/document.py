@@ -199,6 +199,7 @@ class StabilityResult(Part):
     per_year_dps: float | None  #: root mean square over the intervals, at the worst place
     intervals: int  #: between calibrations of this item
     drift_dps: float | None  #: half width, with the coverage of U
+    about: Use = "own axis"  #: rotations at which the errors were compared
     why: str = ""
 
 

@@ -267,7 +267,9 @@ def _conformity(given: Certificate) -> Mapping[str, object] | None:
 
 def percent(probability: float) -> str:
     """Return a probability in percent, to two digits; one that is too small to matter as a bound."""
-    return f"{100.0 * probability:.2g} %" if probability >= LEAST_RISK else f"below {100.0 * LEAST_RISK:g} %"
+    if probability < LEAST_RISK:
+        return f"below {100.0 * LEAST_RISK:g} %"
+    return f"{100.0 * probability:.2g} %" if probability < 0.99 else "above 99 %"
 
 
 def _outcome(passed: bool) -> str:

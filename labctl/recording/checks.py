@@ -54,7 +54,7 @@ def checked(path: Path, info: RecordingInfo, columns: dict[str, Column]) -> dict
     _datasets(path, np.asarray(columns["dataset"], dtype=np.int64), points=info.kind == "points")
     if info.kind == "samples" and info.motion == "rates":
         _one_rate(path, columns)
-    _one_mark(path, columns)
+    _one_mark(path, info, columns)
     if info.motion == "turns":
         check_turns(path, info, columns)
     return _defaults(path, info, columns)
@@ -171,10 +171,15 @@ def _one_rate(path: Path, columns: dict[str, Column]) -> None:
         )
 
 
-def _one_mark(path: Path, columns: dict[str, Column]) -> None:
-    """Raise BadRecording for a mark other than 0 and 1, or one that changes within a data set."""
+def _one_mark(path: Path, info: RecordingInfo, columns: dict[str, Column]) -> None:
+    """Raise BadRecording for a mark other than 0 and 1, one that changes within a data set, or any in poses."""
     if VERIFICATION not in columns:
         return
+    if info.motion == "poses":
+        raise BadRecording(
+            f"{path}: column {VERIFICATION!r}: a recording in poses has no data sets that could be kept from a fit; "
+            "leave the column out, and verify with another recording (`labctl verify --recording`)"
+        )
     marks, dataset = np.asarray(columns[VERIFICATION]), np.asarray(columns["dataset"])
     wrong = (marks != 0) & (marks != 1)
     changes = np.concatenate([[False], (marks[1:] != marks[:-1]) & (dataset[1:] == dataset[:-1])])

@@ -57,9 +57,11 @@ def _in_any_order(values: NDArray[np.float64], lot: np.random.Generator) -> tupl
 
 
 def _drawn(listed: tuple[float, ...], number: int, lot: np.random.Generator) -> NDArray[np.float64]:
-    """Return values (number,), one at random in each of as many equal parts of the listed range, to 0.01."""
+    """Return values (number,), one at random in each of as many equal parts of the listed range, to 1e-4 of it."""
     edges = np.linspace(min(listed), max(listed), number + 1)
-    return np.round(lot.uniform(edges[:-1], edges[1:]), 2)
+    span = max(listed) - min(listed)
+    decimals = 2 if span == 0 else max(2, 4 - int(np.floor(np.log10(span))))
+    return np.round(lot.uniform(edges[:-1], edges[1:]), decimals)
 
 
 def upside_down(position: str) -> str:

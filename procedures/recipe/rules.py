@@ -85,7 +85,7 @@ class Verification(Table):
     """
 
     temperatures: Whole = Field(default=1, ge=1, le=50)  #: in each mounting
-    rates: Whole = Field(default=5, ge=2, le=200)  #: at each temperature
+    rates: Whole = Field(default=5, ge=3, le=200)  #: at each temperature: one at least near either end
     positions: tuple[Position, ...] = ()  #: absent: those of the recipe
     seed: Whole = Field(default=1, ge=0)
 

@@ -15,6 +15,7 @@ from pyhanko.sign.signers.constants import ESIC_EXTENSION_1
 from pyhanko_certvalidator.registry import SimpleCertificateStore
 
 from labctl.certificates.signing.keys import SigningKey
+from labctl.certificates.signing.own_thread import in_own_thread
 
 #: Name of the field in the form of the PDF. It has no place on a page: the pages say in words who signs.
 FIELD = "Signature"
@@ -29,8 +30,8 @@ def sign_pdf(pdf: bytes, key: SigningKey, at: datetime) -> bytes:
     meta = PdfSignatureMetadata(
         field_name=FIELD, md_algorithm=key.digest, subfilter=SigSeedSubFilter.PADES, reason=REASON
     )
-    signed = _PdfSigner(meta, _CmsSigner(key), at).sign_pdf(writer)
-    return bytes(signed.getbuffer())
+    signer = _PdfSigner(meta, _CmsSigner(key), at)
+    return bytes(in_own_thread(lambda: signer.sign_pdf(writer)).getbuffer())
 
 
 class _Writer(IncrementalPdfFileWriter):

@@ -28,6 +28,7 @@ from signxml.xades.xades import XAdESSignatureConfiguration, XAdESVerifier, XAdE
 
 from labctl.certificates.document import Signatory
 from labctl.certificates.signing.keys import signatory_of
+from labctl.certificates.signing.own_thread import in_own_thread
 from labctl.certificates.signing.xades import XADES
 from labctl.errors import BadInput
 
@@ -148,7 +149,7 @@ def _with_trust(
     context = ValidationContext(trust_roots=[_asn1(each) for each in roots], allow_fetching=False, moment=at)
     validator = CertificateValidator(_asn1(own), [_asn1(each) for each in chain], validation_context=context)
     try:
-        asyncio.run(validator.async_validate_path())
+        in_own_thread(lambda: asyncio.run(validator.async_validate_path()))
     except (PathBuildingError, PathError, ValidationError) as error:
         return replace(found, trust="not trusted", reason=" ".join(str(error).split()))
     return replace(found, trust="trusted", reason=f"issued by {own.issuer.rfc4514_string()}, valid on {at:%Y-%m-%d}")

@@ -26,5 +26,10 @@ def face_columns(channels: Channels, axis: str) -> dict[str, Array]:
     for other in BODY_AXES:
         up = channels.up(other)
         if other != axis and all(np.any(table_dps[up == way]) for way in (1.0, -1.0)):
-            found[other] = np.asarray(np.abs(up) * table_dps)
+            found[other] = face_column(channels, other)
     return found
+
+
+def face_column(channels: Channels, other: str) -> Array:
+    """Return the regressor of one axis, (n,) deg/s, whichever of its mountings the rows hold."""
+    return np.asarray(np.abs(channels.up(other)) * channels.table_rate_dps())

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from labctl.errors import NotEnoughData
 from labctl.fitting.data.earth import turning_columns, turning_size_dps, with_known_size, with_prior
-from labctl.fitting.data.faces import WIDE_RAD, face_columns
+from labctl.fitting.data.faces import WIDE_RAD, face_column
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.data.rate_profile import TIME_CONSTANT
 from labctl.fitting.data.shifts import KINDS, shifts_of
@@ -53,8 +53,8 @@ class Nuisance:
                 error += columns @ self.turning
         for shift in shifts_of(data.channels, axis) if self.shifts else ():
             error += self.shifts.get(shift.name, 0.0) * shift.values
-        for other, values in face_columns(data.channels, axis).items() if self.faces else ():
-            error += self.faces.get(other, 0.0) * values
+        for other, angle_rad in self.faces.items():  # also where only one of the two mountings is left
+            error += angle_rad * face_column(data.channels, other)
         return error
 
 

@@ -36,9 +36,11 @@ def widening(found: Sequence[RateVectorUncertainty], seen: Sequence[Sequence[str
     size = max((abs(rate) for each in found for rate in each.rates_dps.values()), default=0.0) or 1.0
     terms = np.array([[1.0, *(each.rates_dps[axis] / size for axis in BODY_AXES)] for each in found])
     covariance = np.array([each.covariance for each in found])
-    if not np.isfinite(covariance).all():
+    own = np.einsum("pii->pi", covariance)
+    if not np.isfinite(own[counts]).all():
         return float("nan")
-    u = np.sqrt(np.einsum("pii->pi", covariance))[counts].max()
+    covariance = np.nan_to_num(covariance)
+    u = np.sqrt(own[counts]).max()
     drawn = np.random.default_rng(SEED).normal(size=(DRAWS, len(outputs) * terms.shape[1])) @ _root(terms, covariance).T
     errors = np.einsum("dit,pt->dpi", drawn.reshape(DRAWS, len(outputs), -1), terms)
     largest = np.abs(errors)[:, counts].max(axis=1)

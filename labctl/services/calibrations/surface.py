@@ -14,6 +14,7 @@ from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.models.true_rate_error import errors_at_true_rates
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording.recording import Column
+from labctl.recording.verification import fitted_part
 from labctl.services.schemas.calibrations import Validity
 from labctl.services.schemas.uncertainty import Surface, SurfaceResponse
 from labctl.store import CalibrationRecord, Store
@@ -75,7 +76,7 @@ def _held(store: Store, row: CalibrationRecord, calibration: Calibration) -> dic
     needs = calibration.fitted.model.needs
     if not needs:
         return {}
-    columns = store.recordings.points(row.recording).columns if row.recording is not None else {}
+    columns = fitted_part(store.recordings.points(row.recording)).columns if row.recording is not None else {}
     if lacking := [name for name in needs if name not in columns]:
         raise BadInput(
             f"{calibration.serial} version {calibration.version}: its model also needs {', '.join(lacking)}, "

@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Literal
 
+import numpy as np
+
 from labctl.calibration import Calibration, read_calibration
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import BODY_AXES
@@ -177,7 +179,8 @@ def widening_of(calibration: Calibration, about: Literal["any axis", "own axis"]
     else:
         places = [{axis: rate} for axis in calibration.axes for rate in rates]
         seen = [list(place) for place in places]
-    return max(widening([known.at_vector(place, warm) for place in places], seen) for warm in temperatures)
+    every = [widening([known.at_vector(place, warm) for place in places], seen) for warm in temperatures]
+    return float(np.max(every))  # NaN where one of them is
 
 
 def budgets_at(

@@ -74,7 +74,7 @@ def assembled(
         as_left=left,
         adjustment=adjustment,
         conformity=None if order.conformity is None else conformity(
-            order.conformity, errors_of(measurements, facts.calibration, left, order.conformity.about),
+            order.conformity, errors_of(measurements, facts.calibration, order.conformity.about),
             found.results.points, found.results.any_axis, found.results.left_out,
             widening_of(facts.calibration, order.conformity.about), stability,
         ),
@@ -92,15 +92,16 @@ def assembled(
 
 def _stability(store: Store, facts: Facts, until: datetime) -> StabilityResult:
     """Return what the item is expected to drift by until a date."""
-    known, years = stability_of(store, facts.row.serial, facts.row.version), years_until(store, facts.row, until)
-    if known is None:
+    about = "own axis" if facts.order.conformity is None else facts.order.conformity.about
+    known, years = stability_of(store, facts.row.serial, facts.row.version, about), years_until(store, facts.row, until)
+    if isinstance(known, str):
         return StabilityResult(
-            until=until.date(), years=years, per_year_dps=None, intervals=0, drift_dps=None,
-            why="this item has no earlier certified calibration to compare with",
-        )  # fmt: skip
+            until=until.date(), years=years, per_year_dps=None, intervals=0, drift_dps=None, about=about, why=known
+        )
+    per_year, intervals = known.worst
     return StabilityResult(
-        until=until.date(), years=years, per_year_dps=known.per_year_dps, intervals=known.intervals,
-        drift_dps=known.expanded_dps(years),
+        until=until.date(), years=years, per_year_dps=per_year, intervals=intervals,
+        drift_dps=known.expanded_dps(years), about=about,
     )  # fmt: skip
 
 

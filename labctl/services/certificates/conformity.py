@@ -18,9 +18,11 @@ RISKS = {
 #: What the errors are of, in the sentence that compares them with the limit.
 OF_FITTED = "over the {n} data sets that the calibration was fitted to"
 OF_VERIFICATION = (
-    "over {n} data sets that were measured to verify, at {rates} and {temperatures}, mounted and switched on anew, and "
-    "that the calibration was not fitted to"
+    "over {n} data sets that were measured to verify, at {rates} and {temperatures}, {how}, and that the calibration "
+    "was not fitted to ({verified:.3g} °/s), and over the {fitted} that it was fitted to ({seen:.3g} °/s)"
 )
+OWN_AXIS = ', or order about = "own axis" if the item turns about one axis at a time'
+ANEW, SHARED = "mounted and switched on anew", "in a mounting or a powered session of the others"
 
 
 class NoAcceptance(BadInput):
@@ -49,11 +51,22 @@ def conformity(
     expanded, where = _about_any(ordered, any_axis) if ordered.about == "any axis" else _about_own(results)
     if left_out:
         raise NoDecision(f"conformity to {ordered.specification}: {' '.join(left_out)} {_MEASURE}")
-    decided = tuple(_decided(ordered, each) for each in errors.verified)
     drift = 0.0 if stability is None else stability.drift_dps or 0.0
-    expanded = math.hypot(max(expanded, *(each.expanded_dps for each in decided), 0.0), drift)
+    decided = tuple(_decided(ordered, each, drift) for each in errors.verified)
+    expanded = max(math.hypot(expanded, drift), *(each.expanded_dps for each in decided), 0.0)
     band = widening * expanded if ordered.rule == "guard-band" else 0.0
+    if not math.isfinite(expanded) or not math.isfinite(band):
+        raise NoDecision(
+            f"conformity to {ordered.specification}: U is not known for all outputs, so that the largest error has no "
+            f"bound. {_MEASURE}"
+        )
     acceptance = ordered.limit_dps - band
+    if ordered.rule == "simple" and expanded >= ordered.limit_dps:
+        raise NoAcceptance(
+            f"conformity to {ordered.specification}: U = {expanded:.3g} deg/s is not smaller than the limit, "
+            f"{ordered.limit_dps:g} deg/s, so nothing can be decided; measure with a smaller uncertainty"
+            f"{OWN_AXIS * (ordered.about == 'any axis')}"
+        )
     if acceptance <= 0:
         raise NoAcceptance(
             f"conformity to {ordered.specification}: the guard band, {band:.3g} deg/s, is not smaller than the "
@@ -91,8 +104,8 @@ def specific_risk(error_dps: float, u_dps: float, limit_dps: float) -> float:
     return 0.5 * (math.erfc(above / math.sqrt(2.0)) + math.erfc(-below / math.sqrt(2.0)))
 
 
-def _decided(ordered: OrderedConformity, verified: VerifiedError) -> ConformityResult:
-    """Decide at one place that was verified. Raises NoDecision where U is unknown there."""
+def _decided(ordered: OrderedConformity, verified: VerifiedError, drift_dps: float) -> ConformityResult:
+    """Decide at one place that was verified; the drift widens U. Raises NoDecision where U is unknown there."""
     budget = verified.budget
     if budget.expanded is None or budget.k is None:
         unknown = "; ".join(f"{line.source}: {line.why}" for line in budget.lines if line.contribution is None)
@@ -101,12 +114,13 @@ def _decided(ordered: OrderedConformity, verified: VerifiedError) -> ConformityR
             f"conformity to {ordered.specification}: the uncertainty of output {verified.output} is not known at "
             f"{rates} deg/s about x, y, z, where it was verified ({unknown}). {_MEASURE}"
         )
-    acceptance = ordered.limit_dps - (budget.expanded if ordered.rule == "guard-band" else 0.0)
+    expanded = math.hypot(budget.expanded, drift_dps)
+    acceptance = ordered.limit_dps - (expanded if ordered.rule == "guard-band" else 0.0)
     return ConformityResult(
         output=verified.output, rates_dps=verified.rates_dps, temperature_c=verified.temperature_c,
-        error_dps=verified.error_dps, expanded_dps=budget.expanded, k=budget.k, acceptance_dps=acceptance,
+        error_dps=verified.error_dps, expanded_dps=expanded, k=budget.k, acceptance_dps=acceptance,
         passed=abs(verified.error_dps) <= acceptance,
-        risk=specific_risk(verified.error_dps, budget.expanded / budget.k, ordered.limit_dps),
+        risk=specific_risk(verified.error_dps, expanded / budget.k, ordered.limit_dps),
     )  # fmt: skip
 
 
@@ -129,6 +143,8 @@ def _of(errors: Errors) -> str:
     return OF_VERIFICATION.format(
         n=errors.datasets, rates=f"{min(rates):.4g} to {max(rates):.4g} °/s",
         temperatures=f"{min(warm):.1f} to {max(warm):.1f} °C" if warm else "the temperature of the room",
+        how=ANEW if errors.is_anew else SHARED, fitted=errors.fitted_datasets, seen=errors.fitted_dps,
+        verified=max(abs(each.error_dps) for each in errors.verified),
     )  # fmt: skip
 
 

@@ -1,20 +1,31 @@
-"""What a statement of conformity rests on: errors that were measured to verify, or those that the fit has seen."""
+"""What a statement of conformity rests on: errors that were measured to verify, and those that the fit has seen."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from labctl.calibration import Calibration
-from labctl.certificates.document import Evidence, StateOfItem, Use
+from labctl.certificates.document import Evidence, Use
+from labctl.errors import BadInput
 from labctl.fitting.data.channels import BODY_AXES
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.uncertainty.budget import Budget
-from labctl.recording.verification import verification_part
+from labctl.recording import Recording
+from labctl.recording.verification import fitted_part, verification_part
 from labctl.services.calibrations.uncertainty import budgets_at
 from labctl.services.criticism.measurements import Measurements
 from labctl.services.criticism.verification.of_version import applied_errors
+
+#: A verification has to reach into this share of the range of rates at either end.
+END_SHARE = 1.0 / 3.0
+
+
+class NotVerified(BadInput):
+    """A verification part is there, but does not cover what a statement is to hold for; nothing was written."""
 
 
 @dataclass(frozen=True)
@@ -30,44 +41,120 @@ class VerifiedError:
 
 @dataclass(frozen=True)
 class Errors:
-    """The errors that are compared with a limit."""
+    """The errors that are compared with a limit: of a verification part, and of what was fitted."""
 
-    evidence: Evidence
-    largest_dps: float
-    datasets: int
-    verified: tuple[VerifiedError, ...] = ()  #: of a verification part, one by one
+    fitted_dps: float  #: the largest error of the data sets that were fitted
+    fitted_datasets: int
+    verified: tuple[VerifiedError, ...] = ()
+    verified_datasets: int = 0
+    is_anew: bool = False  #: whether the verification has mountings and powered sessions of its own
+
+    @property
+    def evidence(self) -> Evidence:
+        """What a statement rests on."""
+        return "verification" if self.verified else "fitted"
+
+    @property
+    def datasets(self) -> int:
+        """How many data sets that are."""
+        return self.verified_datasets if self.verified else self.fitted_datasets
+
+    @property
+    def largest_dps(self) -> float:
+        """The largest error of all: what the fit has seen is in the range too."""
+        return max([self.fitted_dps, *(abs(each.error_dps) for each in self.verified)])
 
 
-def errors_of(measured: Measurements, calibration: Calibration, left: StateOfItem, about: Use) -> Errors:
-    """Return the errors of a verification part, or of what was fitted where the recordings have none.
+@dataclass(frozen=True)
+class _Part:
+    """Data sets of one recording, with the errors that a user has there."""
+
+    data: FitData
+    errors_dps: Mapping[str, np.ndarray]
+    outside: np.ndarray
+
+    @staticmethod
+    def of(calibration: Calibration, points: Recording) -> _Part:
+        """Correct without the rates about axes that have no output, which a user does not know."""
+        errors, outside = applied_errors(calibration, points, across_known=False)
+        return _Part(fit_data_of(points), errors, outside)
+
+    def belongs(self, row: int, axis: str, about: Use) -> bool:
+        """Return whether a data set shows an error of an output in a use."""
+        if about == "any axis" or not self.data.channels.table_rate_dps()[row]:
+            return True
+        return bool(self.data.channels.up(axis)[row])
+
+    def largest(self, about: Use) -> list[float]:
+        """Return the largest error of each data set that shows one."""
+        rows = [
+            [abs(float(values[row])) for axis, values in self.errors_dps.items() if self.belongs(row, axis, about)]
+            for row in range(len(self.data))
+        ]
+        return [max(row) for row in rows if row]
+
+    def at(self, row: int, calibration: Calibration, about: Use) -> Iterator[VerifiedError]:
+        """Yield the error of each output at one data set, as far as it belongs to the use."""
+        rates = {axis: float(self.data.true_rate_dps(axis)[row]) for axis in BODY_AXES}
+        knows = math.isfinite(calibration.temperature_c[0])
+        for axis, values in self.errors_dps.items():
+            if self.belongs(row, axis, about):
+                warm = float(self.data.channels.temperature_c(axis)[row])
+                budget = budgets_at(calibration, rates if about == "any axis" else rates[axis], warm)[axis]
+                place = (rates["x"], rates["y"], rates["z"])
+                yield VerifiedError(axis, place, warm if knows else None, float(values[row]), budget)
+
+
+def errors_of(measured: Measurements, calibration: Calibration, about: Use) -> Errors:
+    """Return the errors of the rates that a user has, of what was fitted and of a verification part.
 
     About the own axis the errors of an output are those of the data sets that turned about its axis, or about none.
-    Data sets outside the range of the calibration are no evidence for it. Raises BadInput, NotEnoughData.
+    Raises NotVerified where a verification part does not cover the use; BadInput, NotEnoughData.
     """
-    parts = [part for each in measured.of_each.values() if (part := verification_part(each)) is not None]
+    recordings = list(measured.of_each.values())
+    fitted = [error for each in recordings for error in _Part.of(calibration, fitted_part(each)).largest(about)]
+    aside = [(each, part) for each in recordings if (part := verification_part(each)) is not None]
     found: list[VerifiedError] = []
-    datasets = 0
-    for part in parts:
-        errors, outside = applied_errors(calibration, part)
-        data = fit_data_of(part)
-        datasets += int((~outside).sum())
-        for row in (~outside).nonzero()[0].tolist():
-            found += _at(data, row, {axis: float(values[row]) for axis, values in errors.items()}, calibration, about)
-    if not found:
-        return Errors("fitted", max(axis.max_dps for axis in left.axes), left.datasets)
-    return Errors("verification", max(abs(each.error_dps) for each in found), datasets, tuple(found))
+    datasets = outside = 0
+    for _, points in aside:
+        seen = _Part.of(calibration, points)
+        outside += int(seen.outside.sum())
+        for row in np.flatnonzero(~seen.outside).tolist():
+            shown = list(seen.at(row, calibration, about))
+            found += shown
+            datasets += bool(shown)
+    if aside:
+        _require_cover(found, calibration, about, outside)
+    is_anew = bool(aside) and all(_is_anew(whole, part) for whole, part in aside)
+    return Errors(max(fitted, default=0.0), len(fitted), tuple(found), datasets, is_anew)
 
 
-def _at(
-    data: FitData, row: int, errors_dps: dict[str, float], calibration: Calibration, about: Use
-) -> Iterator[VerifiedError]:
-    """Yield the error of each output at one data set, as far as it belongs to the use."""
-    rates = {axis: float(data.true_rate_dps(axis)[row]) for axis in BODY_AXES}
-    turned = {axis for axis in BODY_AXES if data.channels.table_rate_dps()[row] and data.channels.up(axis)[row]}
-    knows = math.isfinite(calibration.temperature_c[0])
-    for axis, error in errors_dps.items():
-        if about == "own axis" and not turned <= {axis}:
-            continue
-        warm = float(data.channels.temperature_c(axis)[row])
-        budget = budgets_at(calibration, rates if about == "any axis" else rates[axis], warm)[axis]
-        yield VerifiedError(axis, (rates["x"], rates["y"], rates["z"]), warm if knows else None, error, budget)
+def _is_anew(whole: Recording, part: Recording) -> bool:
+    """Return whether the data sets that verify share no mounting and no powered session with those that were fitted."""
+    rest = fitted_part(whole)
+    return all(
+        name in part.columns and not set(part.columns[name].tolist()) & set(rest.columns[name].tolist())
+        for name in ("run", "mounting")
+    )
+
+
+def _require_cover(verified: Sequence[VerifiedError], calibration: Calibration, about: Use, outside: int) -> None:
+    """Raise NotVerified unless each output was turned near both ends of the range, about each axis of the use."""
+    low, high = calibration.rate_dps
+    if not math.isfinite(high - low):
+        low, high = 0.0, 0.0
+    third = END_SHARE * (high - low)
+    for output in calibration.axes:
+        for place, turned in enumerate(BODY_AXES):
+            if about == "own axis" and turned != output:
+                continue
+            rates = [each.rates_dps[place] for each in verified if each.output == output]
+            if rates and min(rates) <= low + third + 1e-9 and max(rates) >= high - third - 1e-9:
+                continue
+            said = f"at {min(rates):.4g} to {max(rates):.4g} deg/s" if rates else "at no rate"
+            beyond = f" ({outside} data sets lie beyond the range of the calibration)" if outside else ""
+            raise NotVerified(
+                f"output {output} was verified about {turned} {said}{beyond}; a statement about {about} for {low:.4g} "
+                f"to {high:.4g} deg/s needs rates in the outer thirds of this range. Verify there ([verification] of "
+                "the recipe), or leave [conformity] out of the order"
+            )

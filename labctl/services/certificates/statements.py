@@ -41,8 +41,13 @@ def until(stability: StabilityResult | None, results: Sequence[ResultPoint]) -> 
     text = (
         f"The uncertainties hold at the time of the calibration. By {stability.intervals} "
         f"{'interval' if stability.intervals == 1 else 'intervals'} between calibrations, the errors of this item "
-        f"change by {stability.per_year_dps:.3g} °/s per year (root mean square, at the worst rate and temperature): "
+        f"change by {stability.per_year_dps:.3g} °/s per year (root mean square at the worst place, "
+        f"{_turned(stability)}): "
         f"until {stability.until} by {stability.drift_dps:.3g} °/s at most (95.45 %, Student's t). With it, the "
         f"largest U of the results is {math.hypot(largest, stability.drift_dps):.3g} °/s."
     )
     return (text,)
+
+
+def _turned(stability: StabilityResult) -> str:
+    return "turned about any axis" if stability.about == "any axis" else "turned about the axis of one output"

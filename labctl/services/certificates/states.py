@@ -51,7 +51,10 @@ def stated(rows: Sequence[CertificateRow], acts: Sequence[CertificationRow]) -> 
     order = [act.version for act in reversed(acts) if act.act == "certify" and act is certified[act.version]]
     newest = {row.version: row for row in reversed(rows)}  # of each version
     last = next((newest[version] for version in reversed(order) if version in newest), None)
-    changes = {row.number: _change(row, amended_by, last, certified) for row in rows}
+    revoked = {act.version: act for act in acts[::-1] if act.act == "revoke"}
+    newest_acts = {act.version: act.act for act in acts[::-1]}
+    gone = {version: act for version, act in revoked.items() if newest_acts[version] == "revoke"}
+    changes = {row.number: _change(row, amended_by, last, certified, gone) for row in rows}
     valid = next((number for number, change in changes.items() if change.state == "valid"), None)
     return [_response(row, changes[row.number], amended_by.get(row.number), last, valid) for row in rows]
 
@@ -61,9 +64,12 @@ def _change(
     amended_by: Mapping[str, CertificateRow],
     last: CertificateRow | None,
     certified: Mapping[int, CertificationRow],
+    revoked: Mapping[int, CertificationRow],
 ) -> _Change:
     if (gone := row.withdrawal) is not None:
         return _Change("withdrawn", gone.at, gone.reason, gone.by, gone.by_key)
+    if (act := revoked.get(row.version)) is not None:  # revoked while the certificate was being written
+        return _Change("withdrawn", act.at, act.reason, act.by, act.by_key)
     if (amendment := amended_by.get(row.number)) is not None:
         return _Change("amended", amendment.at, amendment.reason, amendment.by, amendment.by_key)
     if last is not None and last.version != row.version:

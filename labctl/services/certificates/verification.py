@@ -45,7 +45,9 @@ def verify_file(store: Store, path: Path, ca: Path | None) -> VerifiedFileRespon
     found = _signatures(content, form, path, ca)
     against = in_register == "differs" or not all(each.valid for each in found)
     against = against or any(each.trust == "not trusted" for each in found)
-    vouched = in_register == "same" or any(each.trust == "trusted" for each in found)
+    # a DCC that is attached to a PDF is signed by itself, which says nothing of the pages
+    own = {"pdf": "PAdES", "xml": "XAdES"}.get(form)
+    vouched = in_register == "same" or any(each.trust == "trusted" and each.form == own for each in found)
     return VerifiedFileResponse(
         format=form,
         sha256=hashlib.sha256(content).hexdigest(),

@@ -90,7 +90,7 @@ class Measurements:
         """The range of the readings behind the means; None where it is not known."""
         return joined_coverage(
             [
-                covered_of(self.inspections[row.id], self.of_each[row.id].info) if row.kind == "samples" else None
+                covered_of(self.inspections[row.id], self.of_each[row.id]) if row.kind == "samples" else None
                 for row in self.rows
             ]
         )

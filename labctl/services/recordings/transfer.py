@@ -15,6 +15,7 @@ from labctl.errors import BadRecording
 from labctl.fitting.estimation.suggestion import suggested_model
 from labctl.recording import read_recording, write_recording
 from labctl.recording.files import FILE_NAMES
+from labctl.recording.verification import is_marked
 from labctl.services.recordings.inspection import inspect_stored
 from labctl.services.recordings.loading import points_of
 from labctl.services.recordings.staging import staging_folder
@@ -47,7 +48,10 @@ def model_for(store: Store, row: RecordingRow) -> str:
     """Return the fullest published model that a stored recording determines."""
     if row.kind == "samples" and not row.datasets:
         return "bias"
-    return suggested_model(points_of(store, row))
+    points = points_of(store, row)
+    if len(points) and is_marked(points).all():
+        return "bias"  # all of it verifies, and is fitted by no model
+    return suggested_model(points)
 
 
 def import_files(

@@ -81,8 +81,8 @@ class StandardCertificateRequest(Request):
         if self.due is not None and self.due < self.calibrated:
             raise ValueError(f"due {self.due} is before calibrated {self.calibrated}; correct the dates")
         nominals = [each.nominal for each in self.points]
-        if twice := next((each for each in nominals if nominals.count(each) > 1), None):
-            raise ValueError(f"two points have the nominal {twice:g}; remove one")
+        if twice := [each for each in nominals if each is not None and nominals.count(each) > 1]:
+            raise ValueError(f"two points have the nominal {twice[0]:g}; remove one")
         if len(nominals) > 1 and None in nominals:
             raise ValueError("one of several points has no nominal; give each point a nominal")
         return self

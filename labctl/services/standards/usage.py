@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from datetime import date, timedelta
 
 from instruments.standards import Standard
+from labctl.errors import BadInput
 from labctl.recording import RecordingInfo
 from labctl.services.schemas.standards import AffectedCalibration, AffectedResponse
 from labctl.store import CalibrationRecord, RecordingRow, RegisteredStandard, StandardFinding, Store
@@ -48,8 +49,10 @@ def overlaps(first: date, last: date | None, bad_from: date | None, bad_until: d
 def affected(store: Store, label: str, bad_from: date | None = None, bad_until: date | None = None) -> AffectedResponse:
     """Return the calibrations that rest on measurements with a standard between two days, both included.
 
-    Without days: those of its findings that are in force, else all. Raises NotFound.
+    Without days: those of its findings that are in force, else all. Raises NotFound, BadInput for days in reverse.
     """
+    if bad_from is not None and bad_until is not None and bad_until < bad_from:
+        raise BadInput(f"from {bad_from} until {bad_until}: the last day is before the first; exchange them")
     standard = store.standards.get(label)
     spans = [(bad_from, bad_until)]
     if bad_from is None and bad_until is None and standard.bad:

@@ -80,3 +80,16 @@ def test_only_what_turns_with_either_end_up_has_a_column(positions: Any, rates: 
     assert list(face_columns(channels, "z")) == axes
     for other, values in face_columns(channels, "z").items():
         assert np.array_equal(values, np.where(np.char.endswith(position, other), table, 0.0))
+
+
+def test_held_out_errors_know_the_faces_where_one_mounting_is_left_out(made: tuple[Recording, Unit, Bench]) -> None:
+    """Opposite mountings at two of the temperatures, as [inverted] has them: a part left out has one of them alone."""
+    columns = made[0].columns
+    down = np.char.startswith(np.asarray(columns["position"]).astype(str), "-")
+    warm = np.asarray(columns["chamber_c"])
+    kept = ~down | (np.abs(warm - np.median(warm)) < 20.0)
+    part = Recording(made[0].info, {name: values[kept] for name, values in columns.items()})
+    error = fit_preset(fit_data_of(part), preset_for(None, list(MODEL))).error
+    assert error.heldout_rms_dps is not None
+    assert error.noise_floor_dps is not None
+    assert error.heldout_rms_dps < 2.0 * error.noise_floor_dps

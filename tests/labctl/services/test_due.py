@@ -255,7 +255,7 @@ def test_the_client_library_tells_of_an_overdue_and_of_a_revoked_calibration(cli
             assert vehicle.calibration(FOG, held=held).content is held.content  # not downloaded again, but warned of
         client.post(f"/api/units/{FOG}/calibrations/1/revoke", json={"by": "B", "reason": "the unit fell"})
         with pytest.warns(CalibrationWarning, match=r"was revoked at .* by B \(the unit fell\)"):
-            revoked = vehicle.calibration(FOG, 1, held=held)
+            revoked = vehicle.calibration(FOG, 1, held=held, accept_withdrawn=True)
         assert (revoked.state, revoked.due, revoked.etag == held.etag) == ("revoked", None, False)
         assert vehicle.fit(FOG, FitRequest(effects=["bias"])).version == 3
         assert vehicle.calibration(FOG, 3).state == "not-certified"  # and no warning

@@ -74,10 +74,11 @@ def verify(store: Store, row: CalibrationRecord, measured: Measurements) -> Veri
 
 
 def applied_errors(
-    calibration: Calibration, points: Recording
+    calibration: Calibration, points: Recording, *, across_known: bool = True
 ) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.bool_]]:
     """Return axis -> corrected minus true rate of each data set, (m,) deg/s, and which lie outside the validity, (m,).
 
+    With `across_known` the table's rates about axes without an output enter the correction; a user does not have them.
     Raises BadInput where the recording lacks an axis or a channel of the model, NotEnoughData.
     """
     data = fit_data_of(points)
@@ -91,8 +92,9 @@ def applied_errors(
     raw = np.column_stack([data.outputs[axis] for axis in calibration.axes])
     warm = np.column_stack([data.channels.temperature_c(axis) for axis in calibration.axes])
     found = compensator.compensate(
-        raw, warm, _channels(compensator, data), history=data.channels.history, cross_rates_dps=data.across_dps or None
-    )
+        raw, warm, _channels(compensator, data), history=data.channels.history,
+        cross_rates_dps=(data.across_dps or None) if across_known else None,
+    )  # fmt: skip
     errors = {axis: found.rate_dps[:, i] - data.true_rate_dps(axis) for i, axis in enumerate(calibration.axes)}
     return errors, found.outside
 

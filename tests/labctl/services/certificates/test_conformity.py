@@ -20,17 +20,19 @@ decided = partial(conformity, widening=1.0)
 
 
 def fitted(*largest_dps: float) -> Errors:
-    return Errors("fitted", max(largest_dps), 5)
+    return Errors(max(largest_dps), 5)
 
 
-def verified(*errors_dps: float, expanded_dps: float | None = 0.2) -> Errors:
+def verified(
+    *errors_dps: float, expanded_dps: float | None = 0.2, fitted_dps: float = 0.05, is_anew: bool = True
+) -> Errors:
     k = None if expanded_dps is None else 2.0
     unknown = BudgetLine("repeatability", "", "A", "normal", None, "deg/s", 1.0, None, why="one power-on only")
     why = () if k else (unknown,)
     budget = Budget("corrected_rate", "deg/s", None, why, None if k is None else 0.1, None, k, expanded_dps)
     places = [(0.0, 0.0, 40.0 * i - 40.0) for i in range(len(errors_dps))]
     found = tuple(VerifiedError("z", place, 20.0, e, budget) for place, e in zip(places, errors_dps, strict=True))
-    return Errors("verification", max(map(abs, errors_dps)), len(errors_dps), found)
+    return Errors(fitted_dps, 5, found, len(errors_dps), is_anew=is_anew)
 
 
 def point(expanded_dps: float) -> ResultPoint:
@@ -102,7 +104,10 @@ def test_what_was_verified_is_decided_place_by_place_and_named_as_unseen() -> No
     assert (found.passed, found.evidence, found.datasets, found.expanded_dps) == (True, "verification", 3, 0.2)
     assert [each.passed for each in found.results] == [True, True, True]
     assert "over 3 data sets that were measured to verify, at -40 to 40 °/s and 20.0 to 20.0 °C" in found.statement
-    assert "that the calibration was not fitted to" in found.statement
+    assert (
+        "mounted and switched on anew, and that the calibration was not fitted to (0.79 °/s), and over the 5 that "
+        in (found.statement)
+    )
     assert f"the limit is {100 * found.results[1].risk:.2g} % (JCGM 106:2012" in found.statement
     failed = decided(ordered, verified(0.1, -0.81, 0.3), (point(0.15),), (), ())
     assert (failed.passed, [each.passed for each in failed.results]) == (False, [True, False, True])
@@ -145,3 +150,24 @@ def test_the_guard_band_covers_the_largest_of_all_errors() -> None:
     assert "guard band w = 1.5 U, which covers the largest of all errors" in found.statement
     simple = OrderedConformity.model_validate({**OWN, "limit_dps": 1.0, "rule": "simple"})
     assert conformity(simple, fitted(0.6), (point(0.25),), (), (), 1.5).guard_band_dps == 0.0
+
+
+def test_errors_that_the_fit_has_seen_count_too() -> None:
+    """A few data sets that happen to be good do not make an item conform whose fitted data sets do not."""
+    ordered = OrderedConformity.model_validate({**OWN, "limit_dps": 1.0, "rule": "guard-band"})
+    found = decided(ordered, verified(0.1, -0.2, 0.3, fitted_dps=0.9), (point(0.15),), (), ())
+    assert (found.passed, found.largest_error_dps) == (False, 0.9)
+    shared = decided(ordered, verified(0.1, -0.2, 0.3, is_anew=False), (point(0.15),), (), ())
+    assert "in a mounting or a powered session of the others" in shared.statement
+
+
+def test_simple_acceptance_is_refused_where_u_reaches_the_limit() -> None:
+    ordered = OrderedConformity(specification="S", limit_dps=1.0, rule="simple")
+    with pytest.raises(NoAcceptance, match=r"U = 1.2 deg/s is not smaller than the limit.*order about = .own axis"):
+        decided(ordered, fitted(0.1), (point(0.1),), (about_any("x", 1.2),), ())
+
+
+def test_nothing_is_decided_where_the_largest_error_has_no_bound() -> None:
+    ordered = OrderedConformity.model_validate({**OWN, "limit_dps": 1.0, "rule": "guard-band"})
+    with pytest.raises(NoDecision, match="the largest error has no bound"):
+        conformity(ordered, fitted(0.1), (point(0.1),), (), (), float("nan"))

@@ -12,14 +12,16 @@ from scipy.stats import t as student
 
 from labctl.certificates.document import Certificate
 from labctl.errors import BadInput
-from labctl.recording import Recording
+from labctl.recording import Recording, to_points
 from labctl.services.calibrations.fitting import fit_unit
-from labctl.services.calibrations.stability import stability_of, years_until
+from labctl.services.calibrations.stability import NO_HISTORY, NOT_COMPARABLE, Stability, stability_of, years_until
 from labctl.services.certificates.issue import issue
 from labctl.services.schemas.calibrations import FitRequest
 from labctl.store import Store, open_store
 from tests.helpers.certificates import AT, SERIAL, request, simulated
+from tests.helpers.simulated_recordings import three_axes
 
+EFFECTS = ["bias", "bias_temperature:3", "scale_factor", "scale_factor_temperature:2", "misalignment"]
 BEGUN = datetime(2026, 2, 1, tzinfo=UTC)
 
 
@@ -51,14 +53,15 @@ def certificate(store: Store, version: int, **order: object) -> Certificate:
 
 
 def test_the_drift_is_that_of_the_unit_per_year(store: Store) -> None:
-    assert stability_of(store, SERIAL, add(store, later(0.0, 0.0))) is None
+    assert stability_of(store, SERIAL, add(store, later(0.0, 0.0))) == NO_HISTORY
     add(store, later(0.5, 0.010))
     version = add(store, later(2.5, 0.030))
     found = stability_of(store, SERIAL, version)
-    assert found is not None
-    assert found.intervals == 2
-    assert found.per_year_dps == pytest.approx(np.sqrt((0.02**2 + 0.01**2) / 2), rel=1e-3)
-    assert found.expanded_dps(2.0) == pytest.approx(student(2).ppf(0.97725) * found.per_year_dps * 2.0, rel=1e-3)
+    assert isinstance(found, Stability)
+    per_year_dps, intervals = found.worst
+    assert intervals == 2
+    assert per_year_dps == pytest.approx(np.sqrt((0.02**2 + 0.01**2) / 2), rel=1e-3)
+    assert found.expanded_dps(2.0) == pytest.approx(student(2).ppf(0.97725) * per_year_dps * 2.0, rel=1e-3)
     row = store.calibrations.get(SERIAL, version)
     assert years_until(store, row, BEGUN + timedelta(days=365.25 * 4.0)) == pytest.approx(1.5)
     assert years_until(store, row, BEGUN) == 0.0
@@ -67,13 +70,13 @@ def test_the_drift_is_that_of_the_unit_per_year(store: Store) -> None:
 def test_it_is_that_of_the_worst_place(store: Store) -> None:
     add(store, later(0.0, 0.0))
     found = stability_of(store, SERIAL, add(store, later(1.0, 0.0, scale=1e-4)))
-    assert found is not None
-    assert found.per_year_dps == pytest.approx(1e-4 * 100.0, rel=0.02)  # of 100 deg/s
+    assert isinstance(found, Stability)
+    assert found.worst[0] == pytest.approx(1e-4 * 100.0, rel=0.02)  # of 100 deg/s
 
 
 def test_two_versions_of_one_day_are_no_interval(store: Store) -> None:
     add(store, later(0.0, 0.0))
-    assert stability_of(store, SERIAL, add(store, later(0.01, 0.05))) is None
+    assert stability_of(store, SERIAL, add(store, later(0.01, 0.05))) == NO_HISTORY
 
 
 def test_a_due_date_that_nothing_states_is_an_error(store: Store) -> None:
@@ -106,3 +109,36 @@ def test_with_a_history_the_promise_contains_the_drift(store: Store) -> None:
     assert conformity.expanded_dps == pytest.approx(np.hypot(largest, stated.drift_dps), rel=1e-9)
     assert f"U contains a drift of {stated.drift_dps:.3g} °/s until {due.date()}" in conformity.statement
     assert f"the largest U of the results is {conformity.expanded_dps:.3g} °/s" in " ".join(found.statements)
+
+
+def test_versions_that_share_a_recording_are_no_interval(store: Store) -> None:
+    add(store, later(0.0, 0.0))
+    store.recordings.add_import(later(1.0, 0.02), AT)
+    joint = FitRequest(effects=["bias", "scale_factor"], recordings=[1, 2])
+    version = fit_unit(store, SERIAL, joint, AT).version
+    store.calibrations.certify(SERIAL, version, "certify", by="A", reason="meets the criteria", at=AT)
+    assert stability_of(store, SERIAL, version) == NO_HISTORY
+
+
+def test_a_place_that_an_earlier_version_does_not_cover_is_not_known(store: Store) -> None:
+    narrow = later(0.0, 0.0)
+    cool = np.asarray(narrow.columns["temperature_c"]) < 35.0
+    add(store, Recording(narrow.info, {name: values[cool] for name, values in narrow.columns.items()}, None))
+    assert stability_of(store, SERIAL, add(store, later(1.0, 0.02))) == NOT_COMPARABLE
+
+
+def test_about_any_axis_the_drift_of_a_misalignment_counts(tmp_path: Path) -> None:
+    with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
+        for years, angle in ((0.0, 0.0), (1.0, 1e-3)):
+            found = to_points(three_axes(1))
+            info = found.info.model_copy(update={"started_at": BEGUN + timedelta(days=365.25 * years)})
+            about_y = np.where(found.columns["position"] == "y", found.columns["table_rate_dps"], 0.0)
+            columns = {**found.columns, "gyro_x": found.columns["gyro_x"] + angle * about_y}
+            number = store.recordings.add_import(Recording(info, columns, found.environment), AT)
+            made = fit_unit(store, found.info.serial, FitRequest(effects=EFFECTS, recording=number), AT).version
+            store.calibrations.certify(found.info.serial, made, "certify", by="A", reason="meets the criteria", at=AT)
+        own, any_axis = (stability_of(store, "STIM-0001", 2, about) for about in ("own axis", "any axis"))
+    assert isinstance(own, Stability)
+    assert isinstance(any_axis, Stability)
+    assert own.worst[0] < 0.01
+    assert any_axis.worst[0] == pytest.approx(1e-3 * 400.0, rel=0.02)

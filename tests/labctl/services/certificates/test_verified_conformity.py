@@ -17,6 +17,7 @@ from labctl.recording import Recording
 from labctl.recording.verification import verification_part
 from labctl.services.calibrations.fitting import fit_unit
 from labctl.services.calibrations.uncertainty import budgets_at
+from labctl.services.certificates.evidence import NotVerified
 from labctl.services.certificates.issue import issue
 from labctl.services.planning.loading import limits_of, load_bench, load_recipe
 from labctl.services.schemas.calibrations import FitRequest
@@ -74,7 +75,9 @@ def test_it_states_each_error_that_was_verified(recording: Recording, tmp_path: 
             each.output
         ]
         assert each.expanded_dps == pytest.approx(budget.expanded, rel=1e-9)
-    assert found.largest_error_dps == max(abs(each.error_dps) for each in found.results)
+    largest = max(abs(each.error_dps) for each in found.results)
+    assert found.largest_error_dps >= largest  # the fitted data sets are in the range too
+    assert f"not fitted to ({largest:.3g} °/s)" in found.statement
     assert all(each.expanded_dps <= found.expanded_dps for each in found.results)
 
 
@@ -97,3 +100,21 @@ def test_about_its_own_axis_an_output_is_judged_where_it_turned_about_it(recordi
     for each in found.results:
         others = [rate for axis, rate in zip("xyz", each.rates_dps, strict=True) if axis != each.output]
         assert np.abs(others).max() < 0.01  # the Earth's rate
+
+
+@pytest.mark.parametrize(
+    ("part", "about"),
+    [(Verification(rates=4, positions=("z",)), "own axis"), (Verification(rates=4, positions=("z",)), "any axis")],
+)
+def test_a_verification_that_does_not_cover_the_use_decides_nothing(
+    part: Verification, about: Any, tmp_path: Path
+) -> None:
+    recipe = load_recipe("table1-x-table2").model_copy(update={"verification": part})
+    bench = load_bench("triaxial-sim")
+    gyro = bench.gyros[0].model_copy(update={"sample_rate_hz": 1.0})
+    recording = hidden_recording(make_plan(recipe, limits_of(bench)), bench, gyro, 4, {})
+    with (
+        open_store(str(tmp_path / "lab.sqlite"), write=True) as store,
+        pytest.raises(NotVerified, match=r"output x was verified about x .* needs rates in the outer thirds"),
+    ):
+        issued(store, recording, about=about)

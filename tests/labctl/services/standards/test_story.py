@@ -96,7 +96,13 @@ def test_new_certificates_of_them_are_refused_and_the_others_are_issued(laborato
     with pytest.raises(CertificateRefused, match=REFUSED):
         issue(store, "FOG-B", 2, request(), at)
     with pytest.raises(CertificateRefused, match=REFUSED):  # neither an amended one
-        issue(store, "FOG-A", 2, request(state_due=True).model_copy(update={"amend": "with a due date"}), at)
+        issue(
+            store,
+            "FOG-A",
+            2,
+            request(external="Other Laboratory").model_copy(update={"amend": "other laboratory"}),
+            at,
+        )
     with pytest.raises(CertificationRefused, match="measure again with another standard"):
         certify(store, "FOG-B", 2, CertifyRequest(by="Ada", reason="again"), at)
     kept = issue(store, "FOG-A", 2, request(), at)
