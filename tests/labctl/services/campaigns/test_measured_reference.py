@@ -67,7 +67,7 @@ def campaign(
     record["simulation"]["table"] |= simulated
     linear = {"profile": "mems-triaxial", "white_dps_rthz": 0.001, "instability_dps": 0.0002}
     record["simulation"]["units"] = {"fog": linear}
-    record["gyros"][0] |= {"datasheet": {}, "datasheet_conventions": {}}
+    record["gyros"][0].update(datasheet={}, datasheet_conventions={})
     location = str(folder / "lab.sqlite")
     with open_store(location, write=True) as store:
         prepared = prepare(store, RECIPE, resolve(BenchFile.model_validate(record)), VirtualClock(), clip=False)
