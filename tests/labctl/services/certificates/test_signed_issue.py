@@ -193,6 +193,19 @@ def test_another_laboratory_verifies_by_the_authority(
     assert not verify_file(store, path, tmp_path / "other.pem").ok  # in the register, but not by whom it should be
 
 
+def test_a_signed_dcc_does_not_vouch_for_the_pages_of_a_pdf(
+    store: Store, tmp_path: Path, signer: Owner, authority: Owner
+) -> None:
+    """The signature of the PDF cut off, the signed DCC still attached: the pages may say anything."""
+    number = issue(store, SERIAL, 1, request(), AT).number
+    (tmp_path / "cut.pdf").write_bytes(unsigned(store.certificates.forms(number)))
+    (tmp_path / "ca.pem").write_bytes(authority.pem)
+    with open_store(str(tmp_path / "customer.sqlite"), write=True) as other:
+        said = verify_file(other, tmp_path / "cut.pdf", tmp_path / "ca.pem")
+    assert [(each.form, each.trust) for each in said.signatures] == [("XAdES", "trusted")]
+    assert (said.ok, said.in_register) == (False, "unknown")
+
+
 def test_a_replaced_certificate_is_said_to_be(store: Store, tmp_path: Path) -> None:
     first = issue(store, SERIAL, 1, request(), AT).number
     second = issue(store, SERIAL, 1, request().model_copy(update={"amend": "address"}), AT).number

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing
+from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
 
@@ -102,6 +103,18 @@ def test_a_revocation_withdraws_every_certificate_of_the_version_and_of_no_other
     rows = [row for row in store.audit.rows() if row.action == "certificate withdraw"]
     assert [row.detail["number"] for row in rows] == [FIRST, SECOND]
     assert {row.who for row in rows} == {"Rita"}
+
+
+def test_a_certificate_that_is_issued_while_its_version_is_revoked_is_withdrawn(store: Store) -> None:
+    """The revocation finds no row to withdraw yet: the state follows from the act."""
+    number = issue(store, SERIAL, 1, request(), AT).number
+    row = store.certificates.get(number)
+    forms = store.certificates.forms(number)
+    revoke(store, SERIAL, 1, RevokeRequest(by="Rita", reason="was dropped"), AT + timedelta(days=1))
+    late = replace(row, number="ICL-2099-0001", replaces=number, withdrawal=None)
+    store.certificates.add(late, forms)
+    state = {each.number: each for each in list_certificates(store, SERIAL)}["ICL-2099-0001"]
+    assert (state.state, state.state_reason, state.state_by) == ("withdrawn", "was dropped", "Rita")
 
 
 def test_the_file_says_its_state_beside_its_bytes_which_stay(store: Store) -> None:
