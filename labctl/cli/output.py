@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from labctl.services.schemas.warnings import DataWarning
 
 #: Without a terminal, lines are not cut to its width. Texts are printed as they are: a word in brackets is no markup.
-console = Console(highlight=False, markup=False, width=None if sys.stdout.isatty() else 160)
-stderr = Console(stderr=True, highlight=False, markup=False, soft_wrap=True)
+console = Console(highlight=False, markup=False, emoji=False, width=None if sys.stdout.isatty() else 160)
+stderr = Console(stderr=True, highlight=False, markup=False, emoji=False, soft_wrap=True)
 
 
 #: A reader of standard error that takes nothing for so long is given up, s.

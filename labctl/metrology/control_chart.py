@@ -112,5 +112,6 @@ def _limits(point: ChartPoint, history: Sequence[ChartPoint]) -> Iterator[Limits
         centre = float(np.mean([each.value for each in history]))
         u_centre = math.sqrt(sum(u**2 for u in known)) / len(history)
         yield Limits("stated u", centre, math.hypot(point.u, u_centre), len(history))
-    if len(history) >= LEAST_HISTORY:
-        yield limits_from_history([each.value for each in history])
+    values = [each.value for each in history]
+    if len(history) >= LEAST_HISTORY and len(set(values)) > 1:  # equal values, as coarse steps give, say nothing of it
+        yield limits_from_history(values)

@@ -10,7 +10,7 @@ def list_line(row: CertificateResponse) -> str:
     said = f"{row.number}  version {row.version}, issued {row.issued_at:%Y-%m-%d} by {row.by}"
     said += f", signed by {row.signed_by.subject}" if row.signed_by else ""
     said += f", replaces {row.replaces}: {row.reason}" if row.replaces else ""
-    return f"{said}; {state_text(row)}"
+    return "; ".join([said, state_text(row), *row.notices])
 
 
 def state_text(answer: CertificateResponse) -> str:

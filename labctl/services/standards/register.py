@@ -89,7 +89,9 @@ def add_check(store: Store, label: str, asked: StandardCheckRequest, at: datetim
 
 
 def mark_bad(store: Store, label: str, asked: StandardBadRequest, at: datetime) -> StandardResponse:
-    """Enter that a standard was found bad. Raises NotFound."""
+    """Enter that a standard was found bad. Raises NotFound, BadInput for a first day to come."""
+    if asked.bad_from > at.date():
+        raise BadInput(f"bad_from {asked.bad_from} is a day to come; give the first day on which it was bad")
     new = StandardFinding(0, "bad", None, asked.bad_from, asked.bad_until, asked.reason, asked.by, at)
     store.standards.add_finding(label, new)
     return one_standard(store, label, at.date())

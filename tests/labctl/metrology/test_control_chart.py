@@ -68,3 +68,10 @@ def test_without_an_expected_value_it_is_judged_by_the_mean_of_those_before() ->
     assert [one.state for one in found] == ["unknown", "in", "out"]
     assert found[2].limits[0].centre == pytest.approx(1.1)
     assert found[2].limits[0].sigma == pytest.approx(0.3 * math.sqrt(1 + 1 / 2))
+
+
+def test_equal_values_of_a_coarse_display_give_no_limits() -> None:
+    """Eight times 0.01, then one step more: a moving range of 0 would call it out of any limits."""
+    found = judged([ChartPoint(0.01, 0.02)] * LEAST_HISTORY + [ChartPoint(0.02, 0.02)])
+    assert [each.basis for each in found[-1].limits] == ["stated u"]
+    assert found[-1].state == "in"

@@ -8,8 +8,9 @@ from labctl.services.schemas.criticism import VerificationResponse
 def verification_sentence(found: VerificationResponse) -> str:
     """Return what a version leaves of a recording in words."""
     of = "" if found.recorded_unit == found.serial else f" of unit {found.recorded_unit}"
+    part = f"the {found.datasets} data sets that verify of " if found.part == "verification" else ""
     text = (
-        f"Version {found.version} applied without refitting to recording {found.recording}{of}: error "
+        f"Version {found.version} applied without refitting to {part}recording {found.recording}{of}: error "
         f"{found.rms_dps:.3g} deg/s "
         f"RMS, {found.max_dps:.3g} deg/s at most"
     )
