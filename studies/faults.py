@@ -116,7 +116,7 @@ def benches() -> list[BenchFile]:
     single, triaxial, star = (load_bench(f"{name}-sim") for name in ("single-axis", "triaxial", "gyrostar"))
     dsp = single.gyros[0].model_copy(
         update={"name": "dsp", "driver": "kvh-dsp3000", "port": "sim://kvh-dsp3000/dsp", "serial": "DSP-1",
-                "sample_rate_hz": 100.0, "datasheet": {}}
+                "sample_rate_hz": 100.0, "datasheet": {}, "datasheet_conventions": {}}
     )  # fmt: skip
     two = single.model_copy(update={"chamber": triaxial.chamber, "gyros": (*single.gyros, dsp)})
     stim = triaxial.gyros[0].model_copy(update={"sample_rate_hz": 25.0})

@@ -55,24 +55,7 @@ def conformity(
     decided = tuple(_decided(ordered, each, drift) for each in errors.verified)
     expanded = max(math.hypot(expanded, drift), *(each.expanded_dps for each in decided), 0.0)
     band = widening * expanded if ordered.rule == "guard-band" else 0.0
-    if not math.isfinite(expanded) or not math.isfinite(band):
-        raise NoDecision(
-            f"conformity to {ordered.specification}: U is not known for all outputs, so that the largest error has no "
-            f"bound. {_MEASURE}"
-        )
-    acceptance = ordered.limit_dps - band
-    if ordered.rule == "simple" and expanded >= ordered.limit_dps:
-        raise NoAcceptance(
-            f"conformity to {ordered.specification}: U = {expanded:.3g} deg/s is not smaller than the limit, "
-            f"{ordered.limit_dps:g} deg/s, so nothing can be decided; measure with a smaller uncertainty"
-            f"{OWN_AXIS * (ordered.about == 'any axis')}"
-        )
-    if acceptance <= 0:
-        raise NoAcceptance(
-            f"conformity to {ordered.specification}: the guard band, {band:.3g} deg/s, is not smaller than the "
-            f"limit, {ordered.limit_dps:g} deg/s; measure with a smaller uncertainty, or agree with the customer on "
-            f"{_otherwise(ordered)}"
-        )
+    acceptance = _acceptance(ordered, expanded, band)
     passed = errors.largest_dps <= acceptance
     statement = (
         f"{'PASS' if passed else 'FAIL'}: {where}{_temperatures(results)}, the largest error of the corrected rate, "
@@ -88,6 +71,28 @@ def conformity(
         acceptance_dps=acceptance, largest_error_dps=errors.largest_dps, expanded_dps=expanded, passed=passed,
         about=ordered.about, evidence=errors.evidence, datasets=errors.datasets, results=decided, statement=statement,
     )  # fmt: skip
+
+
+def _acceptance(ordered: OrderedConformity, expanded: float, band: float) -> float:
+    """Return the acceptance limit, deg/s. Raises NoDecision where U is unknown, NoAcceptance where it is too large."""
+    if not math.isfinite(expanded) or not math.isfinite(band):
+        raise NoDecision(
+            f"conformity to {ordered.specification}: U is not known for all outputs, so that the largest error has no "
+            f"bound. {_MEASURE}"
+        )
+    if ordered.rule == "simple" and expanded >= ordered.limit_dps:
+        raise NoAcceptance(
+            f"conformity to {ordered.specification}: U = {expanded:.3g} deg/s is not smaller than the limit, "
+            f"{ordered.limit_dps:g} deg/s, so nothing can be decided; measure with a smaller uncertainty"
+            f"{OWN_AXIS * (ordered.about == 'any axis')}"
+        )
+    if band >= ordered.limit_dps:
+        raise NoAcceptance(
+            f"conformity to {ordered.specification}: the guard band, {band:.3g} deg/s, is not smaller than the "
+            f"limit, {ordered.limit_dps:g} deg/s; measure with a smaller uncertainty, or agree with the customer on "
+            f"{_otherwise(ordered)}"
+        )
+    return ordered.limit_dps - band
 
 
 _MEASURE = "Measure more data sets there, fit again, and certify that version; or leave the statement out of the order"
