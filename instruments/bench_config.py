@@ -10,6 +10,7 @@ model.
 
 from __future__ import annotations
 
+import math
 import tomllib
 from importlib import resources
 from pathlib import Path
@@ -101,6 +102,9 @@ class GyroSettings(DeviceSettings):
 
     @model_validator(mode="after")
     def _conventions_of_figures(self) -> GyroSettings:
+        for name, value in self.datasheet.items():
+            if not 0.0 <= value < math.inf:  # also true for NaN
+                raise ValueError(f"datasheet: {name} = {value} is negative or no number; correct it, or leave it out")
         if text := undeclared(self.datasheet, self.datasheet_conventions):
             raise ValueError(f"datasheet_conventions: {text}")
         return self

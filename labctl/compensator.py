@@ -207,20 +207,18 @@ class Compensator:
     def _correct_across(self, cross_rates_dps: Mapping[str, ArrayLike], n: int) -> Correct:
         """Return the correction at known rates about axes without an output; raises BadInput for any other axis."""
         beside = [axis for axis in BODY_AXES if axis not in self.axes]
-        for axis in cross_rates_dps:
+        for axis, rates in cross_rates_dps.items():
             if axis not in beside:
                 raise BadInput(
                     f"cross_rates_dps of axis {axis!r}: {self.calibration.serial} has outputs {', '.join(self.axes)}; "
                     f"give rates about {' and '.join(beside) or 'no axis'} only"
                 )
-        across = {axis: np.asarray(rates, dtype=np.float64) for axis, rates in cross_rates_dps.items()}
-        for axis, rates in across.items():
-            if rates.shape not in {(), (n,)}:
+            if np.shape(rates) not in {(), (n,)}:
                 raise BadInput(
-                    f"cross_rates_dps of axis {axis!r} has shape {rates.shape}; give one rate, or one for each of the "
-                    f"{n} samples"
+                    f"cross_rates_dps of axis {axis!r} has shape {np.shape(rates)}; give one rate, or one for each of "
+                    f"the {n} samples"
                 )
-        across = {axis: np.broadcast_to(rates, (n,)) for axis, rates in across.items()}
+        across = {axis: np.broadcast_to(np.asarray(r, np.float64), (n,)) for axis, r in cross_rates_dps.items()}
         return partial(correct_across, self._model, self.axes, across)
 
     def _held(self, raw: Array, warm: Array, known: Mapping[str, Array], correct: Correct) -> Compensated:

@@ -35,6 +35,7 @@ POSITIONS = frozenset(sign + axis for sign in ("", "-") for axis in "xyz")
 
 def checked(path: Path, info: RecordingInfo, columns: dict[str, Column]) -> dict[str, Column]:
     """Return the columns with the format's defaults filled in; raises BadRecording on the first thing that is wrong."""
+    _datasheet(path, info)
     for name in needed(info):
         if name not in columns:
             raise _missing(path, info, name)
@@ -169,6 +170,14 @@ def _one_rate(path: Path, columns: dict[str, Column]) -> None:
             f"{change.dataset}, which began at {change.before_dps:g} deg/s; a data set has one rate: give the "
             "readings at another rate a separate data set number, or mark them with valid = 0"
         )
+
+
+def _datasheet(path: Path, info: RecordingInfo) -> None:
+    for name, value in info.datasheet.items():
+        if not 0.0 <= value < LARGEST:  # also true for NaN
+            raise BadRecording(
+                f"{path}: datasheet.{name} = {value}: give a number that is not negative, or leave it out"
+            )
 
 
 def _one_mark(path: Path, info: RecordingInfo, columns: dict[str, Column]) -> None:

@@ -15,6 +15,7 @@ from typing import Literal
 from labctl.calibration import read_calibration
 from labctl.errors import BadInput, LabctlError, NotEnoughData
 from labctl.metrology.control_chart import ChartPoint, Judged, judged
+from labctl.recording.checks import POSSIBLE
 from labctl.services.cache import UNNAMED, compute
 from labctl.services.calibrations.uncertainty import coefficients_at
 from labctl.services.schemas.validity import CheckGyroChart, CheckGyroPoint, CheckGyroRequest, CheckGyroResponse
@@ -87,6 +88,9 @@ def alarms(store: Store) -> int:
 
 def _temperature(store: Store, serial: str, given: float | None) -> float:
     if given is not None:
+        low, high = POSSIBLE["temperature_c"]
+        if not low <= given <= high:  # also true for NaN
+            raise BadInput(f"temperature_c = {given} deg C: give a temperature between {low:g} and {high:g} deg C")
         return given
     versions = store.calibrations.of_unit(serial)
     if not versions:

@@ -21,7 +21,7 @@ def correct_across(
     fitted: FittedModel, axes: tuple[str, ...], across_dps: Mapping[str, Array],
     raw: Array, temperature_c: Array, channels: Mapping[str, Array],
 ) -> Array:  # fmt: skip
-    """Apply any model to rates (n, axes) at temperatures (n,) or (n, axes), deg/s: no form is faster than exact.
+    """Apply any model to rates (n, axes) at temperatures (n,) or (n, axes), deg/s, in its general form.
 
     `across_dps` are true rates about axes without an output, axis -> (n,) deg/s; one that is absent is at rest.
     """

@@ -44,14 +44,18 @@ class Stability:
 
     def expanded_dps(self, years: float) -> float:
         """Return the half width that covers the drift at the worst place over some years, as often as U (GUM G.3)."""
-        factor = np.asarray(stdtrit(self.intervals, 0.5 * (1.0 + LEVEL)))
-        return float(np.max(factor * self.per_year_dps)) * years
+        return float(np.max(self._covering_dps)) * years
 
     @property
     def worst(self) -> tuple[float, int]:
         """The drift per year, deg/s, and the number of intervals at the place that the half width is of."""
-        place = int(np.argmax(np.asarray(stdtrit(self.intervals, 0.5 * (1.0 + LEVEL))) * self.per_year_dps))
+        place = int(np.argmax(self._covering_dps))
         return float(self.per_year_dps[place]), int(self.intervals[place])
+
+    @property
+    def _covering_dps(self) -> Array:
+        """Half width of the drift of a year, (places,)."""
+        return np.asarray(stdtrit(self.intervals, 0.5 * (1.0 + LEVEL)) * self.per_year_dps)
 
 
 def stability_of(

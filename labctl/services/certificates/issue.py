@@ -7,6 +7,7 @@ from datetime import date, datetime
 from instruments.standards import Standard
 from labctl.acting_user import acting_key
 from labctl.certificates.document import hash_of_certificate
+from labctl.config import SIGN_KEY_VARIABLE
 from labctl.errors import Conflict
 from labctl.services.calibrations.release import needs_second_person
 from labctl.services.certificates.assembly import assembled
@@ -48,6 +49,11 @@ def issue(store: Store, serial: str, version: int, request: CertificateRequest, 
     refuse(facts, found)
     _refuse_bad(store, facts)
     with signing_key(at) as key:
+        if kept is not None and kept.signed_by is not None and key is None:
+            raise CertificateRefused(
+                f"certificate {kept.number} is signed, and no key is set to sign the one that replaces it; name the "
+                f"key by {SIGN_KEY_VARIABLE}"
+            )
         certificate = to_be_signed(assembled(store, facts, found, request, at, kept), key)
         forms = forms_of(certificate, key, at)
     row = CertificateRow(

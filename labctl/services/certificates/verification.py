@@ -21,6 +21,8 @@ from labctl.store import Store
 if TYPE_CHECKING:
     from labctl.certificates.signing.verification import SignatureFound
 
+#: A number that a laboratory can have has at most so many characters.
+MOST_DIGITS = 100
 #: Where a file states its number: in the metadata of a PDF, which are readable in PDF/A, and in a DCC. The last counts.
 _NUMBER = {
     "pdf": re.compile(rb"<rdf:li[^>]*>" + TITLE.encode() + rb" ([^<]+)</rdf:li>"),
@@ -74,10 +76,12 @@ def _number_in(content: bytes, form: CertificateFormat) -> str | None:
     """Return the number that a file states, whatever else is wrong with it."""
     try:
         if form == "json":
-            return str(json.loads(content)["number"])
-        found = _NUMBER[form].findall(content)
-        return html.unescape(found[-1].decode()) if found else None
-    except (ValueError, KeyError, TypeError):
+            number = str(json.loads(content)["number"])
+        else:
+            found = _NUMBER[form].findall(content)
+            number = html.unescape(found[-1].decode()) if found else ""
+        return number if 0 < len(number) <= MOST_DIGITS and number.isprintable() else None
+    except (ValueError, KeyError, TypeError, RecursionError):
         return None
 
 
@@ -93,6 +97,10 @@ def _signatures(content: bytes, form: CertificateFormat, path: Path, ca: Path | 
         return look(content, roots)
     except BadInput as error:
         raise BadInput(f"{path}: {error}") from error
+    except Exception as error:  # a damaged file makes the libraries raise errors of many kinds
+        raise BadInput(
+            f"{path}: its signature cannot be read ({type(error).__name__}: {error}); give the file as it was issued"
+        ) from error
 
 
 def _answer(found: SignatureFound) -> SignatureResponse:

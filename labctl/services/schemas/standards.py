@@ -8,10 +8,12 @@ from typing import Literal
 from pydantic import AwareDatetime, Field, model_validator
 
 from instruments.bench_config import SERIAL
-from instruments.laboratory import LINE
+from instruments.laboratory import LINE, ONE_LINE
 from labctl.services.schemas.base import Request, ResponseModel
 
 TEXT = 2000
+#: No certificate states a smaller uncertainty; the square of a much smaller one has no number.
+LEAST_U = 1e-12
 Name = Field(min_length=1, max_length=200, pattern=LINE)
 NOMINAL = "Nominal value that it holds for, in the unit of the standard; null: it holds for all."
 #: valid: may be used. no certificate: nothing is known. check it: an intermediate check is out of limits.
@@ -46,8 +48,8 @@ class CertifiedPointRequest(Request):
     correction: float | None = Field(
         default=None, allow_inf_nan=False, description="The error with the other sign, instead of `value`."
     )
-    u: float | None = Field(default=None, gt=0, allow_inf_nan=False, description="Standard uncertainty.")
-    expanded: float | None = Field(default=None, gt=0, allow_inf_nan=False, description="Expanded uncertainty.")
+    u: float | None = Field(default=None, ge=LEAST_U, allow_inf_nan=False, description="Standard uncertainty.")
+    expanded: float | None = Field(default=None, ge=LEAST_U, allow_inf_nan=False, description="Expanded uncertainty.")
     k: float = Field(default=2.0, gt=0, allow_inf_nan=False, description="Coverage factor of `expanded`.")
 
     @model_validator(mode="after")
@@ -104,7 +106,7 @@ class StandardBadRequest(Request):
 
     bad_from: date = Field(description="First day of which it is not known that the standard was good.")
     bad_until: date | None = Field(default=None, description="Last such day; null: it is still bad.")
-    reason: str = Field(min_length=1, max_length=TEXT)
+    reason: str = Field(min_length=1, max_length=TEXT, pattern=ONE_LINE)
     by: str = Name
 
     @model_validator(mode="after")
@@ -117,7 +119,7 @@ class StandardBadRequest(Request):
 class WithdrawFindingRequest(Request):
     """Withdraw a finding that was wrong."""
 
-    reason: str = Field(min_length=1, max_length=TEXT)
+    reason: str = Field(min_length=1, max_length=TEXT, pattern=ONE_LINE)
     by: str = Name
 
 

@@ -85,7 +85,7 @@ _NOTHING: JsonObject = digest_of_rows(()).as_json()
 def differing(sealed: Parts, now: Parts) -> list[str]:
     """Return the names of the parts that are not what they were.
 
-    Of a part that a later schema added a record that was sealed before had nothing; other parts that only one of both
+    A record that was sealed before a part with `was_empty` existed had nothing of it. Other parts that only one of both
     has are not compared.
     """
     before = dict.fromkeys(_LATER & set(now), _NOTHING) | dict(sealed)

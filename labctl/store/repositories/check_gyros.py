@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import sqlalchemy as sa
 
+from labctl.acting_user import acting_key
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.manifests.contents import CHECK_GYRO
@@ -51,7 +52,7 @@ class CheckGyros:
         with self._database.writing() as connection:
             t = tables.check_gyros
             number = connection.scalar(sa.insert(t).values(**values).returning(t.c.id))
-            append(connection, row.at, f"check gyro {row.act}", row.serial, detail, who=row.by)
+            append(connection, row.at, f"check gyro {row.act}", row.serial, detail, who=acting_key() or row.by)
             seal(connection, (CHECK_GYRO.name, str(number)), row.at, row.act)
 
 

@@ -8,6 +8,7 @@ from datetime import datetime
 
 import sqlalchemy as sa
 
+from labctl.acting_user import acting_key
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.repositories.audit import append
@@ -54,7 +55,9 @@ class RoomEnvironment:
             connection.execute(sa.insert(tables.room_environment), [{**asdict(row), "at": at} for row in rows])
             if by is not None:
                 typed = {f"{row.quantity} {row.unit}": row.value for row in rows}
-                append(connection, at, "environment", rows[0].bench_name or "all benches", typed, who=by)
+                append(
+                    connection, at, "environment", rows[0].bench_name or "all benches", typed, who=acting_key() or by
+                )
 
     def readings(self, first: datetime, last: datetime, bench: str, limit: int) -> list[RoomReading]:
         """Return the newest readings between two instants that hold for a bench, at most `limit`, newest first."""

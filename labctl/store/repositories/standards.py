@@ -10,6 +10,7 @@ from typing import Any, Literal
 import sqlalchemy as sa
 from sqlalchemy import exc
 
+from labctl.acting_user import acting_key
 from labctl.errors import Conflict, NotFound
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
@@ -196,7 +197,7 @@ class Standards:
                 t = tables.standards
                 number = connection.scalar(sa.insert(t).values(**asdict(row)).returning(t.c.id))
                 detail = {"serial": row.serial, "quantity": row.quantity, "unit": row.unit}
-                append(connection, row.at, "standard add", f"standard {row.label}", detail, who=row.by)
+                append(connection, row.at, "standard add", f"standard {row.label}", detail, who=acting_key() or row.by)
                 seal(connection, (STANDARD.name, str(number)), row.at, "added")
         except exc.IntegrityError as error:
             raise Conflict(f"standard {row.label} was added by another request in the meantime; list it") from error
@@ -250,7 +251,9 @@ class Standards:
             standard = connection.scalar(sa.select(s.id).where(s.label == found))
             row = sa.insert(table).values(standard_id=standard, by=by, at=at, **values).returning(table.c.id)
             number = int(connection.scalar(row) or 0)
-            append(connection, at, f"standard {act}", f"standard {found}", dict(audited or values), who=by)
+            append(
+                connection, at, f"standard {act}", f"standard {found}", dict(audited or values), who=acting_key() or by
+            )
             seal(connection, (kind, str(number)), at, act)
         return number
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from datetime import date
 from typing import Any
 
+import pytest
 from fastapi.testclient import TestClient
 from prometheus_client.parser import text_string_to_metric_families
 
@@ -97,3 +98,34 @@ def test_a_logger_sends_the_environment_of_the_room(client: TestClient) -> None:
     sent(client, "/api/environment", {"readings": readings, "source": "TH-3", "by": "T. Technician"})
     (typed,) = [row for row in service_of(client).store.audit.rows() if row.action == "environment"]
     assert typed.who == "T. Technician"
+
+
+@pytest.mark.parametrize(
+    "points",
+    [
+        [{"nominal": 0.0, "value": 0.01, "expanded": 0.02}, {"nominal": 0.0, "value": 0.5, "expanded": 0.02}],
+        [{"nominal": 1.0, "value": 1.0, "u": 1e-200}],
+    ],
+    ids=["two at 0", "no uncertainty"],
+)
+def test_points_that_give_no_prediction_are_refused(client: TestClient, points: list[dict[str, float]]) -> None:
+    sent(client, "/api/standards", STANDARD)
+    sent(client, "/api/standards/Pt100-7/certificates", {
+        "number": "T-1", "laboratory": "DKD", "calibrated": "2024-01-10", "points": points, "by": "M",
+    }, 422)  # fmt: skip
+
+
+def test_a_finding_is_of_days_that_were_and_in_one_line(client: TestClient) -> None:
+    sent(client, "/api/standards", STANDARD)
+    bad = {"bad_from": "2099-01-01", "reason": "broken", "by": "M"}
+    assert "day to come" in sent(client, "/api/standards/Pt100-7/findings", bad, 400)["detail"]
+    sent(client, "/api/standards/Pt100-7/findings", {**bad, "bad_from": "2024-01-01", "reason": "a\nT-2 valid"}, 422)
+    reverse = client.get("/api/standards/Pt100-7/affected?bad_from=2024-05-01&bad_until=2024-01-01")
+    assert (reverse.status_code, "exchange them" in reverse.json()["detail"]) == (400, True)
+
+
+def test_a_temperature_that_is_no_number_is_refused(client: TestClient) -> None:
+    register.measured(service_of(client).store, "FOG-B", date(2025, 7, 7), COUNTER, thermometer("T-1"))
+    for given in ("nan", "5000"):
+        answer = client.get(f"/api/check-gyros/FOG-B?temperature_c={given}")
+        assert (answer.status_code, "deg C" in answer.json()["detail"]) == (400, True)

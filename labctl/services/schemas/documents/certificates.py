@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 
-from instruments.laboratory import LINE, Laboratory
+from instruments.laboratory import LINE, ONE_LINE, Laboratory
 from labctl.certificates.document import Customer, DecisionRule, Use
 from labctl.services.schemas.base import BY_KEY, Request, ResponseModel
 
@@ -135,7 +135,9 @@ class WithdrawRequest(Request):
 
     number: str = Field(min_length=1, max_length=100, pattern=LINE, description="Number of the certificate.")
     by: str = Field(min_length=1, max_length=200, pattern=LINE, description="Name of the person who withdraws it.")
-    reason: str = Field(min_length=1, max_length=TEXT, description="Why; the list, the file and the page say it.")
+    reason: str = Field(
+        min_length=1, max_length=TEXT, pattern=ONE_LINE, description="Why; the list, the file and the page say it."
+    )
 
 
 class CertificateResponse(ResponseModel):

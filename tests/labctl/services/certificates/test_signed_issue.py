@@ -16,7 +16,7 @@ from cryptography.hazmat.primitives.hashes import SHA256
 
 from labctl.errors import BadInput
 from labctl.services.admin.seal_keys import refuse_unusable_keys
-from labctl.services.certificates.issue import issue
+from labctl.services.certificates.issue import CertificateRefused, issue
 from labctl.services.certificates.served import list_certificates
 from labctl.services.certificates.verification import verify_file
 from labctl.services.schemas.documents.certificates import SignatoryResponse
@@ -27,6 +27,11 @@ from tests.helpers.service import open_client
 from tests.helpers.signing import Owner, key_file, owner, pdf_verifies, xml_verifies
 
 LONG = (-3650, 3650)  #: days; commands and services read the real date
+
+#: A signature whose certificate (X.509) is empty.
+EMPTY_CERTIFICATE = (
+    b'<a xmlns:ds="http://www.w3.org/2000/09/xmldsig#"><ds:Signature><ds:X509Certificate/></ds:Signature></a>'
+)
 
 
 @pytest.fixture(scope="module")
@@ -89,7 +94,9 @@ def test_what_was_issued_stays_as_it_is(store: Store, signer: Owner, monkeypatch
     assert issue(store, SERIAL, 1, request(), AT) == first
     assert store.certificates.forms(first.number) == before
     amended = request().model_copy(update={"amend": "address"})
-    assert issue(store, SERIAL, 1, amended, AT).signed_by is None
+    with pytest.raises(CertificateRefused, match=f"{first.number} is signed.*name the key by .*LABCTL_SIGN_KEY"):
+        issue(store, SERIAL, 1, amended, AT)
+    assert [row.number for row in store.certificates.of_unit(SERIAL)] == [first.number]
     assert signer.pem not in before.xml
 
 
@@ -152,6 +159,30 @@ def test_a_file_as_it_was_issued_is_verified(
 def unsigned(forms: CertificateForms) -> bytes:
     """Return the PDF without what was appended to it."""
     return forms.pdf[: forms.pdf.index(b"%%EOF") + 6]
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"[" * 200_000, None),
+        (b'{"number": "\\ud800"}', None),
+        (
+            b'<a xmlns:ds="http://www.w3.org/2000/09/xmldsig#"><ds:Signature><ds:X509Certificate/></ds:Signature></a>',
+            "",
+        ),
+    ],
+    ids=["nested", "surrogate", "empty certificate"],
+)
+def test_a_damaged_file_is_no_traceback(store: Store, tmp_path: Path, content: bytes, said: str | None) -> None:
+    (tmp_path / "file").write_bytes(content)
+    if content.startswith(b"["):
+        with pytest.raises(BadInput, match="this is no PDF, XML or JSON file"):
+            verify_file(store, tmp_path / "file", None)
+    elif said is None:
+        assert not verify_file(store, tmp_path / "file", None).ok
+    else:
+        with pytest.raises(BadInput, match="its signature cannot be read"):
+            verify_file(store, tmp_path / "file", None)
 
 
 @pytest.mark.parametrize(

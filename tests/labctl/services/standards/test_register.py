@@ -82,7 +82,7 @@ def test_a_correction_is_the_error_with_the_other_sign(store: Store) -> None:
         ([{"value": 0.1, "correction": -0.1, "u": 0.1}], "value or correction, not both"),
         ([{"u": 0.1}, {"u": 0.2, "nominal": 3}], "give each point a nominal"),
         ([{"u": 0.1, "nominal": 3}, {"u": 0.2, "nominal": 3}], "two points have the nominal 3"),
-        ([{"u": 0.0}], "greater than 0"),
+        ([{"u": 0.0}], "greater than or equal to"),
         ([{"u": float("nan")}], "finite number"),
     ],
 )
