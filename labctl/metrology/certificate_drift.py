@@ -40,11 +40,6 @@ class Drift:
     certificates: int
     birge_ratio: float  #: by which the certificates scatter more than they state, 1 where they do not
 
-    @property
-    def is_significant(self) -> bool:
-        """Whether the slope is more than twice its standard uncertainty."""
-        return abs(self.per_year) > 2.0 * self.u_per_year
-
 
 @dataclass(frozen=True)
 class Prediction:
