@@ -19,6 +19,7 @@ import pytest
 from dcclib.validation import SchematronValidator
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from lxml import etree
 
 from labctl.certificates.signing import SigningSettings
 from labctl.certificates.signing.keys import open_signing_key
@@ -102,6 +103,12 @@ def test_a_changed_digit_of_the_dcc_is_found_by_each(data: st.DataObject) -> Non
     digits = [i for i in range(200, end) if made.xml[i : i + 1].isdigit()]
     where = data.draw(st.sampled_from(digits))
     changed = made.xml[:where] + bytes([ord("0") + (made.xml[where] - ord("0") + 1) % 10]) + made.xml[where + 1 :]
+    try:
+        etree.fromstring(changed)
+    except etree.XMLSyntaxError:  # the digit is of one of the two names of an element
+        with pytest.raises(BadInput):
+            found(changed)
+        return
     assert not xml_verifies(changed, made.signer.certificate)
     said = found(changed)
     assert not said.valid
