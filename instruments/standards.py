@@ -14,11 +14,13 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 #: clock: the time base that rates follow from. table_rate: the table's rate beside its time base. thermometer: the
 #: temperature that units are fitted by. chamber_gradient: the unit's temperature against that thermometer.
-#: fixture_angle: the unit's axis against its mounting. tilt: the mounting plate against the axis of rotation. level:
-#: the axis of rotation against the vertical. turn_angle: of a turn by hand.
+#: fixture_angle: the unit's axis against its mounting, of each face. tilt: the mounting plate against the axis of
+#: rotation. mounting_repeatability: the unit in one mounting against the same mounting another time. level: the axis of
+#: rotation against the vertical. turn_angle: of a turn by hand.
 Quantity = Literal[
-    "clock", "table_rate", "thermometer", "chamber_gradient", "fixture_angle", "tilt", "level", "supply", "turn_angle"
-]
+    "clock", "table_rate", "thermometer", "chamber_gradient", "fixture_angle", "tilt", "mounting_repeatability",
+    "level", "supply", "turn_angle",
+]  # fmt: skip
 Unit = Literal["ppm", "deg/s", "deg C", "deg", "V"]
 Distribution = Literal["normal", "rectangular", "triangular", "u-shaped"]
 
@@ -30,6 +32,7 @@ UNITS: dict[Quantity, tuple[Unit, ...]] = {
     "chamber_gradient": ("deg C",),
     "fixture_angle": ("deg",),
     "tilt": ("deg",),
+    "mounting_repeatability": ("deg",),
     "level": ("deg",),
     "supply": ("V",),
     "turn_angle": ("deg",),

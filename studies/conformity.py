@@ -131,7 +131,7 @@ def outcomes(number: int) -> list[Outcome]:
     case = TRIAXIAL[number % len(TRIAXIAL)]
     rng, stated, noise, plan = np.random.default_rng([FIRST_SEED, number]), Statement(), Noise(), case.plan
     unit = Unit.of(rng, 0.0 if case.is_adequate else HIDDEN_DPS)
-    bench = Bench.of(rng, stated, plan.positions)
+    bench = Bench.of(rng, stated, plan.mountings)
     low, high, reach = min(plan.temperatures_c), max(plan.temperatures_c), plan.reach_dps
 
     def measured(rates: tuple[float, ...], temperatures: tuple[float, ...]) -> Recording:

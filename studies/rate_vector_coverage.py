@@ -71,7 +71,7 @@ def scores(number: int) -> Scores:
     case = CASES[number % len(CASES)]
     rng, stated, noise, plan = np.random.default_rng([FIRST_SEED, number]), Statement(), Noise(), case.plan
     unit = Unit.of(rng, 0.0 if case.is_adequate else HIDDEN_DPS)
-    bench = Bench.of(rng, stated, plan.positions)
+    bench = Bench.of(rng, stated, plan.mountings)
     columns = campaign(unit, bench, plan, noise, stated.turn_on_dps, rng)
     recording = with_temperature(Recording(info_of(case, stated), columns))
     data, preset = fit_data_of(recording), preset_for(None, list(MODEL))
@@ -106,6 +106,7 @@ def info_of(case: Case, stated: Statement) -> RecordingInfo:
         Standard(quantity="thermometer", u=stated.thermometer_c),
         Standard(quantity="chamber_gradient", half_width=stated.gradient_half_width_c, distribution="rectangular"),
         Standard(quantity="fixture_angle", u=stated.fixture_deg),
+        Standard(quantity="mounting_repeatability", u=stated.mounting_deg),
         Standard(quantity="tilt", half_width=stated.tilt_half_width_deg, distribution="rectangular"),
     )
     return RecordingInfo(

@@ -24,6 +24,19 @@ class Plan:
     positions: tuple[str, ...]
     rates_dps: tuple[float, ...]
     temperatures_c: tuple[float, ...]
+    turned: tuple[str, ...] = ()  #: further mountings, at the two fastest rates and one temperature
+
+    @property
+    def mountings(self) -> tuple[str, ...]:
+        """Every position."""
+        return (*self.positions, *self.turned)
+
+    @property
+    def rows(self) -> list[tuple[str, float, tuple[float, ...]]]:
+        """Mountings, temperatures and their rates, in order."""
+        middle, ends = self.temperatures_c[len(self.temperatures_c) // 2], (-self.reach_dps, self.reach_dps)
+        every = [(position, warm, self.rates_dps) for position in self.positions for warm in self.temperatures_c]
+        return [*every, *((position, middle, ends) for position in self.turned)]
 
     @property
     def reach_dps(self) -> float:
@@ -39,6 +52,10 @@ PLANS = (
         "six faces, 250 deg/s", SIX, tuple(np.linspace(-250, 250, 7)),
         tuple(np.linspace(0, 50, 5)),
     ),
+    Plan(
+        "three mountings, each turned by 180 deg too, 400 deg/s", THREE, tuple(np.linspace(-400, 400, 11)),
+        (-10.0, 15.0, 40.0, 65.0), ("x@180", "y@180", "z@180"),
+    ),
 )  # fmt: skip
 
 
@@ -51,6 +68,7 @@ class Statement:
     gradient_half_width_c: float = 0.5
     fixture_deg: float = 0.025
     tilt_half_width_deg: float = 0.02
+    mounting_deg: float = 0.003
     turn_on_dps: float = 1e-3
 
 
@@ -91,20 +109,36 @@ class Bench:
 
     @staticmethod
     def of(rng: np.random.Generator, stated: Statement, positions: tuple[str, ...]) -> Bench:
-        """Draw a bench by what it states; each mounting lies on the table top in one of four directions."""
+        """Draw a bench by what it states; each face lies on the table top in one of four directions.
+
+        `x@180` is the unit turned by 180 deg on the face that holds it with x up, `x@0/180` the fixture on the table.
+        """
         warm = rng.normal(0, stated.thermometer_c) + rng.uniform(-1, 1) * stated.gradient_half_width_c
         top = np.radians(rng.uniform(-1, 1, 2) * stated.tilt_half_width_deg)
         lean = {}
+        faces: dict[str, tuple[Array, Array]] = {}
         for position in positions:
-            number, sign = AXES.index(position[-1]), -1.0 if position.startswith("-") else 1.0
-            quarter = np.pi / 2 * rng.integers(4)
-            turned = np.array([[np.cos(quarter), -np.sin(quarter)], [np.sin(quarter), np.cos(quarter)]]) @ top
-            two = np.radians(rng.normal(0, stated.fixture_deg, 2)) + turned
+            end, _, angles = position.partition("@")
+            of_unit, _, of_fixture = angles.partition("/")
+            number, sign = AXES.index(end[-1]), -1.0 if end.startswith("-") else 1.0
+            if end not in faces:
+                quarter = 90 * int(rng.integers(4))
+                faces[end] = np.radians(rng.normal(0, stated.fixture_deg, 2)), _seen(top, quarter)
+            face, below = faces[end]
+            unit_deg = sign * float(of_unit or 0)
+            two = _seen(face + _seen(below, sign * float(of_fixture or 0)), unit_deg)
+            two = two + np.radians(rng.normal(0, stated.mounting_deg, 2))
             axis = np.zeros(3)
             axis[[(number + 1) % 3, (number + 2) % 3]] = two
             axis[number] = sign * np.sqrt(1 - two @ two)
             lean[position] = axis
         return Bench(1e-6 * float(rng.normal(0, stated.clock_ppm)), float(warm), lean)
+
+
+def _seen(direction: Array, turned_deg: float) -> Array:
+    """Return a level direction (2,) in a frame that is turned above it, counter-clockwise."""
+    turned = np.radians(turned_deg)
+    return np.array([[np.cos(turned), np.sin(turned)], [-np.sin(turned), np.cos(turned)]]) @ direction
 
 
 @dataclass(frozen=True)
@@ -134,14 +168,9 @@ def campaign(
 
     The unit's law is over `reach_dps`; absent: the plan's fastest rate.
     """
-    rows = [
-        (position, warm, rate)
-        for position in plan.positions
-        for warm in plan.temperatures_c
-        for rate in rng.permutation(plan.rates_dps)
-    ]
-    n, per_level = len(rows), len(plan.rates_dps)
-    t_s = 75.0 * np.arange(n) + 5400.0 * np.repeat(np.arange(n // per_level), per_level)
+    rows = [(position, warm, rate) for position, warm, rates in plan.rows for rate in rng.permutation(rates)]
+    n = len(rows)
+    t_s = 75.0 * np.arange(n) + 5400.0 * np.repeat(np.arange(len(plan.rows)), [len(rates) for *_, rates in plan.rows])
     warm = np.array([row[1] for row in rows]) + rng.normal(0, 0.02, n)
     rates = np.array([row[2] / (1 + bench.clock) * bench.lean[row[0]] for row in rows])
     output = unit.output(rates, warm, reach_dps or plan.reach_dps) + rng.normal(0, noise.white_dps, (n, 3))

@@ -15,6 +15,7 @@ from labctl.recording.data_set_limits import refuse_large_numbers, refuse_too_ma
 from labctl.recording.info import RecordingInfo
 from labctl.recording.motions.constant_rate import rate_change
 from labctl.recording.motions.turns import check_turns, mean_rate_dps
+from labctl.recording.positions import EXPECTED, Position
 from labctl.recording.recording import Column
 
 #: Values outside of these ranges are in another unit, or mistakes.
@@ -30,7 +31,6 @@ NO_REFERENCE = (
     "angles, or 'poses' with "
     "columns accel_x_g, accel_y_g and accel_z_g for turns by hand between rests"
 )
-POSITIONS = frozenset(sign + axis for sign in ("", "-") for axis in "xyz")
 
 
 def checked(path: Path, info: RecordingInfo, columns: dict[str, Column]) -> dict[str, Column]:
@@ -211,7 +211,7 @@ def _defaults(path: Path, info: RecordingInfo, columns: dict[str, Column]) -> di
         columns["table_rate_dps"] = mean_rate_dps(info, columns)
     if "position" not in columns:
         columns["position"] = np.full(n, info.axes[0])
-    _positions(path, columns["position"])
+    columns["position"] = _positions(path, columns["position"])
     columns.setdefault("run", np.ones(n, dtype=np.int64))
     if "mounting" not in columns:
         changed = (columns["run"][1:] != columns["run"][:-1]) | (columns["position"][1:] != columns["position"][:-1])
@@ -229,11 +229,16 @@ def _refuse_unknown_up(path: Path, info: RecordingInfo, columns: dict[str, Colum
         )
 
 
-def _positions(path: Path, position: Column) -> None:
-    for word in np.unique(position):
-        if word not in POSITIONS:
+def _positions(path: Path, position: Column) -> Column:
+    """Return positions as they are written here: `x@0` is x."""
+    words, of = np.unique(position, return_inverse=True)
+    found = []
+    for word in words:
+        try:
+            found.append(str(Position.of(str(word))))
+        except ValueError:
             row = int(np.argmax(position == word))
             raise BadRecording(
-                f"{path}: column 'position', row {row + 1}: {str(word)!r} is not a body axis (expected"
-                " x, -x, y, -y, z or -z)"
-            )
+                f"{path}: column 'position', row {row + 1}: {str(word)!r} is not a body axis (expected {EXPECTED})"
+            ) from None
+    return np.array(found, dtype=np.str_)[of]

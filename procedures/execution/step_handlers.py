@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from instruments.errors import LinkError
 from instruments.interfaces.gyro import Gyro
 from instruments.interfaces.table import OpenLoopTable
+from instruments.positions import Position
 from procedures.contracts.errors import GuardTripped, SoakFailed, StepFailed, TableStopped
 from procedures.contracts.journal import DataSetState, Event
 from procedures.contracts.operator import Prompt
@@ -99,11 +100,22 @@ def power_off(context: ExecutionContext, step: PowerOff) -> Figures:
 def mount(context: ExecutionContext, step: Mount) -> Figures:
     """Have a person turn the units."""
     context.soaked = None
-    text = f"turn the units so that body axis {step.position} points up along the table axis"
+    text = mounting_text(step.position)
     if (rules := context.recipe.turns) is not None:
         text = rules.ask.of(rules.ask.place, step.position)
     ask(context, Prompt(context.new_prompt_id(), "mount", text, step.position))
     return {"mounting": float(step.mounting)}
+
+
+def mounting_text(position: str) -> str:
+    """Return what a person is asked for to mount the units in a position."""
+    asked = Position.of(position)
+    text = f"turn the units so that body axis {asked.end} points up along the table axis"
+    if asked.unit_deg:
+        text += f", and each unit on the same face of its fixture by {asked.unit_deg} deg from where it was first"
+    if asked.fixture_deg:
+        text += f", and the fixture with the units on the table by {asked.fixture_deg} deg from where it was first"
+    return f"{text} (counter-clockwise seen from above)" if asked.turned_deg else text
 
 
 def move_chamber(context: ExecutionContext, step: MoveChamber) -> Figures:

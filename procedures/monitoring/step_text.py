@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from instruments.positions import Position
 from procedures.contracts.steps import (
     Acquire,
     CheckHome,
@@ -33,7 +34,7 @@ _TEXTS: Mapping[type[Step], Callable[[Any], str]] = {
     Turn: lambda step: f"{step.turn_deg:+g} deg by hand, {step.position} up",
     Soak: lambda step: f"soak at {step.temperature_c:g} deg C for {step.hold_s / 60:g} min",
     MoveChamber: lambda step: f"chamber to {step.temperature_c:g} deg C",
-    Mount: lambda step: f"turn the units: {step.position} up",
+    Mount: lambda step: f"turn the units: {Position.of(step.position).in_words}",
     PowerOn: lambda step: f"switch the units on, session {step.run}",
     PowerOff: lambda step: f"switch the units off, session {step.run}",
     Home: lambda _: "home the table",

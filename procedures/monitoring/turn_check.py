@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from instruments.interfaces.gyro import Readings
+from instruments.positions import Position
 from procedures.contracts.steps import Turn
 from procedures.monitoring.turn_course import Array, Course, Nominal
 from procedures.recipe.turns import TurnRules
@@ -86,7 +87,8 @@ class TurnResult:
 
 def check_turn(step: Turn, rules: TurnRules, unit: UnitTurn) -> TurnResult:
     """Return what came out of a turn of one unit, and why it is refused."""
-    axis, sign = step.position.lstrip("-"), -1.0 if step.position.startswith("-") else 1.0
+    up = Position.of(step.position)
+    axis, sign = up.axis, up.sign
     angles = unit.angles_deg()
     came = sign * angles[axis] if axis in angles else None
     refused = (

@@ -137,8 +137,9 @@ def fit_to_bench(recipe: Recipe, limits: BenchLimits, *, clip: bool) -> tuple[Re
 def _point_lists(recipe: Recipe) -> list[tuple[str, str]]:
     """Return where the recipe lists points, as (table, key)."""
     lists = [("", "temperatures_c"), ("", "rates_dps")]
-    if recipe.inverted is not None:
-        lists += [("inverted", "temperatures_c"), ("inverted", "rates_dps")]
+    for name in ("indexing", "inverted"):
+        if getattr(recipe, name) is not None:
+            lists += [(name, "temperatures_c"), (name, "rates_dps")]
     if recipe.power_cycle is not None:
         lists += [("power_cycle", "rates_dps")]
     return lists

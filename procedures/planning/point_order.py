@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from instruments.positions import Position
 from procedures.recipe.recipe import Recipe
+from procedures.recipe.rules import Indexing, Inverted
 
 
 @dataclass(frozen=True)
@@ -26,6 +28,7 @@ class MountingBlock:
     levels: tuple[Level, ...]
     same_session: bool = False  #: turned without being switched off, whatever the recipe says of other mountings
     verification: bool = False  #: mounted and switched on anew, and never fitted
+    hold_s: float | None = None  #: of its soaks; None: that of the recipe
 
 
 def order_points(recipe: Recipe) -> list[MountingBlock]:
@@ -64,11 +67,6 @@ def _drawn(listed: tuple[float, ...], number: int, lot: np.random.Generator) -> 
     return np.round(lot.uniform(edges[:-1], edges[1:]), decimals)
 
 
-def upside_down(position: str) -> str:
-    """Return the position with the same axis along the table axis, the other way up."""
-    return position.removeprefix("-") if position.startswith("-") else f"-{position}"
-
-
 def temperature_sequence(recipe: Recipe) -> tuple[float, ...]:
     """Return the temperatures of one mounting in the order in which they are visited."""
     listed = recipe.temperatures_c
@@ -93,19 +91,28 @@ def _blocks(recipe: Recipe) -> list[MountingBlock]:
     blocks: list[MountingBlock] = []
     for position, levels in visits:
         blocks.append(MountingBlock(position, tuple(Level(each, recipe.rates_dps) for each in levels)))
-        blocks += _inverted(recipe, position, levels)
+        blocks += _turned(recipe, position, levels)
     return _merged(blocks)
 
 
-def _inverted(recipe: Recipe, position: str, visited: tuple[float, ...]) -> list[MountingBlock]:
-    """Return the upside-down mounting that follows a mounting, if one does."""
-    if recipe.inverted is None:
-        return []
-    wanted = recipe.inverted.temperatures_c
-    if recipe.order == "temperature-major":
-        wanted = tuple(each for each in wanted if each in visited)
-    levels = tuple(Level(each, recipe.inverted.rates_dps) for each in wanted)
-    return [MountingBlock(upside_down(position), levels, same_session=True)] if levels else []
+def _turned(recipe: Recipe, position: str, visited: tuple[float, ...]) -> list[MountingBlock]:
+    """Return the mountings that follow a mounting in its powered session: turned about the table axis, upside down."""
+    straight = Position.of(position)
+    tables: list[tuple[Inverted | Indexing, list[Position]]] = []
+    if (rules := recipe.indexing) is not None:
+        of_unit = [replace(straight, unit_deg=angle) for angle in rules.unit_deg]
+        tables.append((rules, [*of_unit, *(replace(straight, fixture_deg=angle) for angle in rules.fixture_deg)]))
+    if recipe.inverted is not None:
+        tables.append((recipe.inverted, [straight.upside_down]))
+    found = []
+    for table, positions in tables:
+        wanted = table.temperatures_c
+        if recipe.order == "temperature-major":
+            wanted = tuple(each for each in wanted if each in visited)
+        levels = tuple(Level(each, table.rates_dps) for each in wanted)
+        hold_s = table.hold_s if isinstance(table, Indexing) else None
+        found += [MountingBlock(str(each), levels, same_session=True, hold_s=hold_s) for each in positions if levels]
+    return found
 
 
 def _merged(blocks: list[MountingBlock]) -> list[MountingBlock]:
@@ -113,7 +120,7 @@ def _merged(blocks: list[MountingBlock]) -> list[MountingBlock]:
     merged: list[MountingBlock] = []
     for block in blocks:
         if merged and merged[-1].position == block.position:
-            merged[-1] = MountingBlock(block.position, merged[-1].levels + block.levels, merged[-1].same_session)
+            merged[-1] = replace(merged[-1], levels=merged[-1].levels + block.levels)
         else:
             merged.append(block)
     return merged
@@ -130,7 +137,7 @@ def _with_rates(recipe: Recipe, block: MountingBlock, number: int) -> MountingBl
         )
         for index, level in enumerate(block.levels)
     )
-    return MountingBlock(block.position, levels, block.same_session)
+    return replace(block, levels=levels)
 
 
 def level_rates(recipe: Recipe, listed: tuple[float, ...], lot: np.random.Generator) -> tuple[float, ...]:

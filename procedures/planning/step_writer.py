@@ -75,7 +75,7 @@ class _StepWriter:
         self.mount(block)
         for level in block.levels:
             self.move_chamber(level.temperature_c)
-            self.soak(level.temperature_c)
+            self.soak(level.temperature_c, block.hold_s)
             self.check_home(level)
             self.acquire(level, verification=block.verification)
             self.check_home(level)
@@ -132,17 +132,18 @@ class _StepWriter:
             )
         )
 
-    def soak(self, temperature_c: float) -> None:
+    def soak(self, temperature_c: float, hold_s: float | None = None) -> None:
         rules = self.recipe.soak
+        held_s = rules.hold_s if hold_s is None else hold_s
         self.steps.append(
             Soak(
                 temperature_c=temperature_c,
-                hold_s=rules.hold_s,
+                hold_s=held_s,
                 band_c=rules.band_c,
                 max_drift_c=rules.max_drift_c,
                 drift_window_s=rules.drift_window_s,
                 timeout_s=rules.timeout_s,
-                expected_s=max(rules.hold_s, rules.drift_window_s),
+                expected_s=max(held_s, rules.drift_window_s),
             )
         )
 

@@ -18,6 +18,7 @@ from procedures.recipe.profiles import Profile
 from procedures.recipe.rules import (
     AcquireRules,
     GuardRules,
+    Indexing,
     Inverted,
     Mounting,
     Number,
@@ -40,7 +41,7 @@ LONGEST_KEY = 80
 #: What a recipe of turns by hand has no use for: no table and no chamber is driven.
 _OF_RATES = (
     "temperatures_c", "rates_dps", "order", "temperature_order", "rate_order", "repeats", "soak", "acquire",
-    "replicates", "inverted", "power_cycle", "profiles", "verification",
+    "replicates", "indexing", "inverted", "power_cycle", "profiles", "verification",
 )  # fmt: skip
 
 
@@ -68,6 +69,7 @@ class Recipe(Table):
     soak: SoakRules = SoakRules()
     acquire: AcquireRules = AcquireRules()
     replicates: Replicates = Replicates()
+    indexing: Indexing | None = None
     inverted: Inverted | None = None
     power_cycle: PowerCycle | None = None
     verification: Verification | None = None  #: absent: nothing is measured beside what is fitted

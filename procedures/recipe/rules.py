@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, Strict
+from pydantic import BaseModel, ConfigDict, Field, Strict, model_validator
 
 Number = Annotated[float, Strict()]  #: a number written as a number: "20" in quotes is refused
 Whole = Annotated[int, Strict()]
 Yes = Annotated[bool, Strict()]
+Turned = Annotated[int, Strict(), Field(ge=1, le=359)]  #: deg, counter-clockwise seen from above
 Position = Literal["x", "-x", "y", "-y", "z", "-z"]
 Action = Literal["warn", "suspend", "fail"]
 GuardKind = Literal[
@@ -66,6 +67,32 @@ class Inverted(Table):
 
     temperatures_c: tuple[Number, ...] = Field(min_length=1)
     rates_dps: tuple[Number, ...] = Field(min_length=1)
+
+
+class Indexing(Table):
+    """Each position once more turned about the table axis, in the same powered session, the same end of the axis up.
+
+    What is below the turned part does not turn with it: where the unit is turned on its fixture, the error of the
+    fixture's face and of the table top change their direction in the frame of the unit; where the fixture is turned on
+    the table, only that of the table top does.
+    """
+
+    unit_deg: tuple[Turned, ...] = ()  #: the unit on its fixture, against the first mounting
+    fixture_deg: tuple[Turned, ...] = ()  #: the fixture on the table, with the unit
+    temperatures_c: tuple[Number, ...] = Field(min_length=1)
+    rates_dps: tuple[Number, ...] = Field(min_length=1)
+    #: Time inside the band before anything is measured; absent: that of [soak]. What is looked for differs between the
+    #: two directions of turning, so that a bias which still moves with the temperature does not matter.
+    hold_s: Number | None = Field(default=None, ge=0, le=7 * 86_400)
+
+    @model_validator(mode="after")
+    def _turns_something(self) -> Indexing:
+        angles = (*self.unit_deg, *self.fixture_deg)
+        if not angles:
+            raise ValueError("nothing is turned; give unit_deg or fixture_deg, such as unit_deg = [180]")
+        if len(set(self.unit_deg)) + len(set(self.fixture_deg)) < len(angles):
+            raise ValueError("an angle is given twice; give each angle once")
+        return self
 
 
 class PowerCycle(Table):

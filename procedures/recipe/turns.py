@@ -7,6 +7,7 @@ from typing import Annotated
 
 from pydantic import AfterValidator, Field
 
+from instruments.positions import Position
 from procedures.recipe.rules import Number, Table, Whole
 
 #: What a text may name: the axis that points up, the angle without its sign, and its sense in words.
@@ -51,7 +52,7 @@ class Asked(Table):
         """Return one of the texts for a position and an angle, deg."""
         sense = "counter-clockwise" if turn_deg > 0 else "clockwise"
         return Template(text).substitute(
-            position=position, axis=position.lstrip("-"), degrees=f"{abs(turn_deg):g}", sense=sense
+            position=position, axis=Position.of(position).axis, degrees=f"{abs(turn_deg):g}", sense=sense
         )
 
 

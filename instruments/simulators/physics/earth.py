@@ -8,6 +8,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
+from instruments.positions import Position
+
 Array = NDArray[np.float64]
 #: One sidereal turn, deg/s.
 EARTH_DPS = 360.0 / 86164.0905
@@ -21,13 +23,14 @@ class BodyFrame:
     first: int
     second: int
     sign: float
+    turned_deg: float = 0.0  #: of the units against the table, counter-clockwise seen from above
 
     @classmethod
     @cache
-    def of(cls, position: str) -> BodyFrame:
-        """Return the frame of a mounting position: the body axis that points up, x, -x, y ..."""
-        up = "xyz".index(position.lstrip("-"))
-        return cls(up, (up + 1) % 3, (up + 2) % 3, -1.0 if position.startswith("-") else 1.0)
+    def of(cls, position: Position) -> BodyFrame:
+        """Return the frame of a mounting position."""
+        up = "xyz".index(position.axis)
+        return cls(up, (up + 1) % 3, (up + 2) % 3, position.sign, float(position.turned_deg))
 
     def gravity(self, n: int) -> Array:
         """Return the specific force in body axes, (n, 3) g: one g up."""
@@ -50,7 +53,7 @@ class EarthRotation:
         if self.latitude_deg is not None:
             latitude = np.radians(self.latitude_deg)
             rates[:, frame.up] += frame.sign * EARTH_DPS * np.sin(latitude)
-            heading = np.radians(angle_deg - self.north_deg)
+            heading = np.radians(angle_deg + frame.turned_deg - self.north_deg)
             level = EARTH_DPS * np.cos(latitude)
             rates[:, frame.first] += level * np.cos(heading)
             rates[:, frame.second] -= frame.sign * level * np.sin(heading)

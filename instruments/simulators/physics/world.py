@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from instruments.bench_config import BenchFile, GyroSettings, SimulationSettings
 from instruments.clock import VIRTUAL_START
+from instruments.positions import Position
 from instruments.simulators.hidden import HiddenEffect, State, hidden_effects
 from instruments.simulators.physics.ambient import humidity_pct, supply_wander_v
-from instruments.simulators.physics.bench_errors import BenchErrors
+from instruments.simulators.physics.bench_errors import UPRIGHT, BenchErrors, felt
 from instruments.simulators.physics.earth import BodyFrame, EarthRotation
 from instruments.simulators.physics.hand_motion import HandMotion
 from instruments.simulators.physics.instability import BiasInstability
@@ -74,7 +75,8 @@ class World:
         self._encoder_noise_deg = number(settings.table, "encoder_noise_deg", 0.0)
         self._encoder_late_s = number(settings.table, "encoder_late_s", 0.0)
         self._encoder_rng = np.random.default_rng([settings.seed, settings.noise_seed, zlib.crc32(b"encoder")])
-        self.position, self.mounting, self.run = "z", 0, 0
+        self.position, self.mounting, self.run = Position.of("z"), 0, 0
+        self._lean_rad = UPRIGHT  #: of the axis of rotation in the frame of the units
         self.powered_on_s: float | None = None
         truths = {gyro.name: self._make(gyro, settings) for gyro in bench.gyros}
         self.start_c = start_c = number(settings.chamber, "start_c", 25.0)
@@ -140,13 +142,14 @@ class World:
         return humidity_pct(t_s)
 
     def mount(self, t_s: float, position: str) -> None:  # noqa: ARG002  mounting takes no time
-        """Turn every unit so that body axis `position` points up along the table axis."""
-        self.position = position
+        """Mount every unit in a position. Raises ValueError for one that is none."""
+        self.position = Position.of(position)
         self.mounting += 1
+        self._lean_rad = self.errors.lean_rad(self.position, self.mounting)
 
     def turn_by_hand(self, t_s: float, position: str, turn_deg: float) -> None:
         """Have the hand turn every unit by an angle, deg, about body axis `position`, which points up."""
-        self.position = self.hand.turn(t_s, position, turn_deg)
+        self.position = Position.of(self.hand.turn(t_s, position, turn_deg))
 
     def power(self, t_s: float, on: bool) -> None:
         """Switch the power of every unit."""
@@ -161,7 +164,7 @@ class World:
         """Return the inertial rate in body axes, (n, 3) deg/s: table and Earth, at table angles (n,)."""
         frame = BodyFrame.of(self.position)
         rates = self._earth.body_rates(frame, table_dps / (1.0 + self.errors.rate), angle_deg)
-        return self.errors.felt(rates, frame.up)
+        return felt(rates, frame, self._lean_rad)
 
     def gravity(self, n: int) -> Array:
         """Return the specific force in body axes, (n, 3) g: one g up."""

@@ -30,8 +30,7 @@ def print_plan(answer: PlanResponse) -> None:
             f"{hours(answer.verification_s)} ({share:.0f} %)"
         )
     if (angles := answer.misalignment) is not None:
-        said = f"  misalignment: U {angles.expanded:.2g} rad at best, by fixture and table{_opposite(angles)}"
-        console.print(said, soft_wrap=True)
+        _print_mountings(angles)
     for left_out in answer.clipped:
         console.print(f"  left out: {left_out}", style="yellow")
     if answer.attendance is not None:
@@ -175,13 +174,14 @@ def print_start(answer: ScheduledResponse) -> None:
         console.print(f"  {answer.note}", style="yellow")
 
 
-def _opposite(angles: MisalignmentOutlook) -> str:
-    """Return in words what opposite mountings are worth; nothing where the plan has them."""
-    if angles.with_opposite is None or angles.more_s is None:
-        return ""
-    warm = ", ".join(f"{each:g}" for each in angles.inverted_temperatures_c)
-    rates = ", ".join(f"{each:g}" for each in angles.inverted_rates_dps)
-    return (
-        f"; {angles.with_opposite:.2g} with opposite mountings, {hours(angles.more_s)} more: add [inverted] with "
-        f"temperatures_c = [{warm}] and rates_dps = [{rates}]"
-    )
+def _print_mountings(angles: MisalignmentOutlook) -> None:
+    """Print how well a misalignment can be known, and what further mountings are worth."""
+    console.print(f"  misalignment: U {angles.expanded:.2g} rad at best, by fixture and table", soft_wrap=True)
+    for more in angles.further:
+        console.print(
+            f"    {more.expanded:.2g} with {more.turned}: mountings: {more.mountings} more, time: {hours(more.more_s)} "
+            f"more; add {' '.join(more.recipe_toml.splitlines())}",
+            soft_wrap=True, markup=False,
+        )  # fmt: skip
+    if angles.not_stated:
+        console.print(f"    not in U, since the bench does not state it: {', '.join(angles.not_stated)}")

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from labctl.fitting.characteristics.estimate import Estimate
 from labctl.fitting.numeric.arrays import Array
+from labctl.recording.positions import up_in
 
 AXES = ("x", "y", "z")
 
@@ -40,11 +41,9 @@ def g_sensitivity(position: NDArray[np.str_], error_dps: Array) -> tuple[Estimat
     At rest with a body axis up the specific force is 1 g along it. `error_dps`, (m,), is the output without the
     Earth's rate. None unless each axis has pointed up and down: only then gravity differs from bias.
     """
-    if not {sign + axis for axis in AXES for sign in ("", "-")} <= set(position.tolist()):
+    up = np.column_stack([up_in(position, axis) for axis in AXES])
+    if not all(np.any(up[:, i] == end) for i in range(len(AXES)) for end in (1.0, -1.0)):
         return None
-    up = np.zeros((len(position), 3))
-    for i, axis in enumerate(AXES):
-        up[position == axis, i], up[position == f"-{axis}", i] = 1.0, -1.0
     columns = np.column_stack([np.ones(len(position)), up])
     found, *_ = np.linalg.lstsq(columns, error_dps, rcond=None)
     left = error_dps - columns @ found

@@ -16,6 +16,7 @@ from labctl.fitting.effects import CATALOGUE, Column, Effect, Reference, Span, T
 from labctl.fitting.models.error_model import ErrorModel, expand
 from labctl.fitting.models.linearity import is_linear_in_rate
 from labctl.fitting.numeric.arrays import Array
+from labctl.recording.positions import Position
 
 #: Effects that contain several others: a model starts from them, and they are never what is missing.
 ONLY_BASE = frozenset({"rate_temperature_surface"})
@@ -128,7 +129,7 @@ def _turning(data: ReducedRecording, axis: str) -> list[Column]:
     return [
         Column(f"earth_{wave}_{there}", "deg/s", here.astype(np.float64), (wave, 1))
         for there, here in data.nodes.positions()
-        if there.lstrip("-") != axis
+        if Position.of(there).axis != axis
         for wave in ("cos", "sin")
     ]
 

@@ -20,11 +20,13 @@ from labctl.fitting.criticism.suspects import Suspect, suspects_of
 from labctl.fitting.criticism.verdict import Verdict
 from labctl.fitting.criticism.visibility import not_testable
 from labctl.fitting.data.fit_data import FitData, fit_data_of
+from labctl.fitting.data.mounting_angles import angle_columns, leaning_rates
 from labctl.fitting.data.noise_floor import NoiseFloor
 from labctl.fitting.data.static_record import LONG_S, static_record
 from labctl.fitting.data.temperature.channel import with_temperature
 from labctl.fitting.effects import CATALOGUE, Effect, Term, kind_of
 from labctl.fitting.effects.response import response_of_terms
+from labctl.fitting.estimation.axis_solutions import solve_axes
 from labctl.fitting.estimation.fit import fit_preset
 from labctl.fitting.estimation.result import FitResult
 from labctl.fitting.models.error_model import ErrorModel
@@ -139,6 +141,7 @@ def criticise(
     forward = _forward(fit_data, model, base)
     if (short := _too_little(data, forward)) is not None:
         return Criticism(Verdict("insufficient_data", reason=short), data, fit_data, base, None, None)
+    data = _leaning(data, fit_data, forward)
     seen = data.through(response_of_terms(forward.terms))
     comparison = compare_models(beside_held(seen, forward), forward, catalogue)
     verdict, initial, final = search_stepwise(comparison, catalogue)
@@ -169,8 +172,9 @@ def best_shapes(
     """
     recording = with_temperature(fitted_part(recording))
     data = replace(reduce_recording(recording), static=static_record(recording))
-    forward = _forward(fit_data_of(points), model, None)
-    seen = data.through(response_of_terms(forward.terms))
+    fit_data = fit_data_of(points)
+    forward = _forward(fit_data, model, None)
+    seen = _leaning(data, fit_data, forward).through(response_of_terms(forward.terms))
     comparison = compare_models(beside_held(seen, forward), forward, catalogue)
     return {c.id: refined_term(comparison, c) for c in comparison.candidates if not c.smooth and c.term is not None}
 
@@ -192,6 +196,17 @@ def _forward(data: FitData, model: ErrorModel, base: FitResult | None) -> ErrorM
         return forward
     fitted = base or fit_preset(data, changed(model))
     return forward.with_terms(fitted.fitted.model.terms)
+
+
+def _leaning(data: ReducedRecording, fit_data: FitData, forward: ErrorModel) -> ReducedRecording:
+    """Return the recording with the true rates of a unit that leans as its mountings do, where they separate that.
+
+    What is left of the angles stays free in the base; so small, only its first order matters.
+    """
+    if not any(len(angle_columns(fit_data.channels, axis)) for axis in fit_data.outputs):
+        return data
+    angles = {axis: found.angles_rad for axis, found in solve_axes(fit_data, forward).nuisance.items()}
+    return replace(data, nodes=data.nodes.with_rates(leaning_rates(data.nodes, angles)))
 
 
 def _direct_rms_dps(data: FitData, model: ErrorModel) -> float | None:

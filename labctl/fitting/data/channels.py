@@ -15,6 +15,7 @@ from labctl.fitting.data.temperature.history import TemperatureHistory, history_
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording
 from labctl.recording.columns import RECORDING, WITHIN_S
+from labctl.recording.positions import up_in
 
 BODY_AXES = ("x", "y", "z")
 #: What a law sees: the true rate (forward), or the output in its place (direct).
@@ -86,8 +87,7 @@ class Channels:
 
     def up(self, axis: str) -> Array:
         """Return how much of a body axis points up along the table axis, (n,): 1, -1 or 0."""
-        position = np.asarray(self.columns["position"]).astype(np.str_)
-        return (position == axis).astype(np.float64) - (position == f"-{axis}").astype(np.float64)
+        return up_in(np.asarray(self.columns["position"]), axis)
 
     def positions(self) -> list[tuple[str, NDArray[np.bool_]]]:
         """Return every position that occurs and which rows are in it, (n,)."""
@@ -139,9 +139,8 @@ class Channels:
 
 def body_rates(table_rate_dps: Array, position: NDArray[np.generic]) -> dict[str, Array]:
     """Return the table's rate along each body axis, axis -> (n,), for positions like "x" or "-z", (n,)."""
-    signs = np.where(np.char.startswith(position.astype(np.str_), "-"), -1.0, 1.0)
-    names = np.char.lstrip(position.astype(np.str_), "-")
-    return {axis: np.where(names == axis, signs * table_rate_dps, 0.0) for axis in BODY_AXES}
+    ups = {axis: up_in(position, axis) for axis in BODY_AXES}
+    return {axis: np.where(up != 0, up * table_rate_dps, 0.0) for axis, up in ups.items()}
 
 
 def channels_of(points: Recording, up_rate_dps: float = 0.0, profile: RateProfile | None = None) -> Channels:

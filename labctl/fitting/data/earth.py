@@ -11,6 +11,7 @@ from labctl.fitting.data.channels import Channels
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.drift_noise import Scatter
 from labctl.recording import RecordingInfo
+from labctl.recording.positions import Position
 
 EARTH_RATE_DPS = 15.041067 / 3600.0  #: sidereal
 
@@ -80,7 +81,7 @@ def turning_columns(info: RecordingInfo, channels: Channels, axis: str) -> Array
     cosine, sine = np.cos(middle) * shrink, np.sin(middle) * shrink
     found = []
     for there, here in channels.positions():
-        if there.lstrip("-") != axis:
+        if Position.of(there).axis != axis:
             for part in channels.by_recording(here):  # the table's zero may point elsewhere on another day
                 found += [np.where(part, cosine, 0.0), np.where(part, sine, 0.0)]
     return np.column_stack(found) if found else np.zeros((len(channels), 0))

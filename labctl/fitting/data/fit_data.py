@@ -33,6 +33,7 @@ class FitData:
     outputs: Mapping[str, Array]  #: axis -> (m,) gyro output, deg/s
     white_var: Mapping[str, Array] | None  #: axis -> (m,) variance of the mean from white noise, (deg/s)^2
     covered: Covered  #: by the readings behind the means, where they are known
+    angles_known: bool = False  #: whether the true rates are those of a unit that leans as its mountings do
 
     def __len__(self) -> int:
         return len(self.channels)

@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from scipy.linalg import helmert
 
 from labctl.fitting.data.channels import Channels
-from labctl.fitting.data.faces import WIDE_RAD, face_columns
 from labctl.fitting.data.joined import recordings_in
+from labctl.fitting.data.mounting_angles import WIDE_RAD, angle_columns
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording.columns import RECORDING
 
@@ -75,13 +75,13 @@ def shift_contrasts(channels: Channels, axis: str) -> tuple[NDArray[np.float64],
     """Return contrasts between the shifts of one axis, (n, k), and the largest standard deviation of each, (k,).
 
     What all recordings have in common is no shift: an error of the bias that they share can still be found. So it is
-    with opposite mountings.
+    with the angles of mountings.
     """
     kinds: dict[tuple[ShiftKind, str], list[Array]] = {}
     for shift in shifts_of(channels, axis):
         kinds.setdefault((shift.kind, shift.along), []).append(shift.values)
-    faces = face_columns(channels, axis)
-    columns, largest = [np.column_stack([*faces.values(), np.zeros((len(channels), 0))])], [WIDE_RAD] * len(faces)
+    angles = angle_columns(channels, axis)
+    columns, largest = [angles.values], [WIDE_RAD] * len(angles)
     for (kind, _), values in kinds.items():
         columns.append(np.column_stack(values) @ helmert(len(values)).T)
         largest += [KINDS[kind].largest] * (len(values) - 1)

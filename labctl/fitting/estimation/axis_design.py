@@ -12,8 +12,8 @@ from scipy.linalg import block_diag
 from labctl.errors import NotEnoughData
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.data.earth import turning_columns
-from labctl.fitting.data.faces import face_columns
 from labctl.fitting.data.fit_data import FitData
+from labctl.fitting.data.mounting_angles import AngleColumns, angle_columns
 from labctl.fitting.data.shifts import Shift, shifts_of
 from labctl.fitting.effects import Column
 from labctl.fitting.estimation.held.propagation import HeldColumns, HeldPart
@@ -38,7 +38,7 @@ class AxisDesign:
     held: HeldPart  #: coefficients that are not estimated; their part of the error is in `offset_dps`
     laws: tuple[str, ...] = ()  #: names of the coefficients that enter by a law
     shifts: tuple[Shift, ...] = ()  #: what differs between recordings, where there are several
-    faces: Mapping[str, Array] = field(default_factory=dict)  #: what opposite mountings differ by, (m,) by body axis
+    angles: AngleColumns = field(default_factory=AngleColumns)  #: of the mountings, as far as they are separated
 
 
 def axis_design(
@@ -87,7 +87,7 @@ def axis_design(
         held.part,
         tuple(laws),
         tuple(shifts_of(data.channels, axis)),
-        face_columns(data.channels, axis),
+        AngleColumns() if data.angles_known else angle_columns(data.channels, axis),
     )
 
 

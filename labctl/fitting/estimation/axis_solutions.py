@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from labctl.errors import NotEnoughData
 from labctl.fitting.data.earth import turning_columns, turning_size_dps, with_known_size, with_prior
-from labctl.fitting.data.faces import WIDE_RAD, face_column
 from labctl.fitting.data.fit_data import FitData
+from labctl.fitting.data.mounting_angles import WIDE_RAD, leaning_rates
 from labctl.fitting.data.rate_profile import TIME_CONSTANT
 from labctl.fitting.data.shifts import KINDS, shifts_of
 from labctl.fitting.estimation.axis_design import AxisDesign, axis_design
@@ -42,10 +42,18 @@ class Nuisance:
 
     turning: Array  #: the Earth's rate that goes round: cosine and sine per position, deg/s
     shifts: Mapping[str, float] = field(default_factory=dict)  #: of several recordings, by name of the shift
-    faces: Mapping[str, float] = field(default_factory=dict)  #: half of what opposite mountings differ by, rad
+    angles_rad: Mapping[str, float] = field(default_factory=dict)  #: of the mountings, as far as they are separated
+
+    def plus(self, further: Nuisance) -> Nuisance:
+        """Return what a further fit found, whose rates had these angles, with the sums of the angles."""
+        angles = {name: self.angles_rad.get(name, 0.0) + angle for name, angle in further.angles_rad.items()}
+        return replace(further, angles_rad=angles)
 
     def error_dps(self, data: FitData, axis: str) -> Array:
-        """Return what it adds to the output of data sets, (m,) deg/s; a shift that they do not show adds nothing."""
+        """Return what it adds to the output of data sets, (m,) deg/s; a shift that they do not show adds nothing.
+
+        Angles of the mountings are in the true rates (`leaning`).
+        """
         error = np.zeros(len(data))
         if len(self.turning):
             columns = turning_columns(data.info, data.channels, axis)
@@ -53,8 +61,6 @@ class Nuisance:
                 error += columns @ self.turning
         for shift in shifts_of(data.channels, axis) if self.shifts else ():
             error += self.shifts.get(shift.name, 0.0) * shift.values
-        for other, angle_rad in self.faces.items():  # also where only one of the two mountings is left
-            error += angle_rad * face_column(data.channels, other)
         return error
 
 
@@ -75,8 +81,20 @@ class AxisSolutions:
 def solve_axes(data: FitData, model: ErrorModel, fixed: Mapping[str, Solution] | None = None) -> AxisSolutions:
     """Fit every axis of a model; with `fixed` the drift of each axis is that solution's and not searched for.
 
+    Where angles of the mountings are separated, all axes are fitted once more with the rates of a unit that leans so:
+    each output shows the rates about the others by its own coefficients.
+
     Raises NotEnoughData where the data sets do not determine the coefficients.
     """
+    found = _solve_each(data, model, fixed)
+    if not any(each.angles_rad for each in found.nuisance.values()):
+        return found
+    rates = leaning(data, found.nuisance).channels.rates
+    again = _solve_each(replace(data, channels=data.channels.with_rates(rates)), model, fixed)
+    return replace(again, nuisance={axis: found.nuisance[axis].plus(each) for axis, each in again.nuisance.items()})
+
+
+def _solve_each(data: FitData, model: ErrorModel, fixed: Mapping[str, Solution] | None) -> AxisSolutions:
     fits, solutions, nuisance = {}, {}, {}
     for axis in data.outputs:
         design, solution = _converged(data, model, axis, fixed[axis] if fixed else None)
@@ -87,15 +105,25 @@ def solve_axes(data: FitData, model: ErrorModel, fixed: Mapping[str, Solution] |
 
 
 def _nuisance(design: AxisDesign, solution: Solution) -> Nuisance:
-    """Return what stands behind the model's own columns in a solution: the Earth's rate, the faces, then the shifts."""
+    """Return what stands behind the model's own columns in a solution: the Earth's rate, angles, then the shifts."""
     beside = solution.values[design.columns.shape[1] :]
     first_shift = len(beside) - len(design.shifts)
-    turning, faces, shifts = np.split(beside, [first_shift - len(design.faces), first_shift])
+    turning, angles, shifts = np.split(beside, [first_shift - len(design.angles), first_shift])
     return Nuisance(
         turning,
         {shift.name: float(v) for shift, v in zip(design.shifts, shifts, strict=True)},
-        {other: float(v) for other, v in zip(design.faces, faces, strict=True)},
+        design.angles.angles_rad(angles),
     )
+
+
+def leaning(data: FitData, nuisance: Mapping[str, Nuisance]) -> FitData:
+    """Return data sets with the true rates of a unit that leans by the angles of its mountings, as a fit found them.
+
+    The angles are the fixture's and the table's: known from all data, they are no error of the model in a part that
+    lacks the mountings which separate them.
+    """
+    rates = leaning_rates(data.channels, {axis: found.angles_rad for axis, found in nuisance.items()})
+    return replace(data, channels=data.channels.with_rates(rates), angles_known=True)
 
 
 def _converged(data: FitData, model: ErrorModel, axis: str, fixed: Solution | None) -> tuple[AxisDesign, Solution]:
@@ -136,11 +164,11 @@ def _solve_axis(data: FitData, model: ErrorModel, axis: str, design: AxisDesign,
         )
     y = data.outputs[axis] - data.true_rate_dps(axis) - design.offset_dps
     known, random = data.scatter(axis), None
-    if design.shifts or design.faces:
+    if design.shifts or len(design.angles):
         known = _with_white_noise(design, y, known)
     columns, y, scatter = with_known_size(design.columns, design.turning, y, known, turning_size_dps(data.info))
-    faces = np.column_stack([*design.faces.values(), np.zeros((len(data), 0))])
-    columns, y, scatter = with_prior(columns, faces, y, scatter, np.full(len(design.faces), WIDE_RAD**2))
+    wide_rad2 = np.full(len(design.angles), WIDE_RAD**2)
+    columns, y, scatter = with_prior(columns, design.angles.values, y, scatter, wide_rad2)
     if design.shifts:
         wide = np.array([KINDS[shift.kind].largest for shift in design.shifts])
         values = np.column_stack([shift.values for shift in design.shifts])
@@ -158,7 +186,7 @@ def _with_white_noise(design: AxisDesign, y: Array, scatter: Scatter) -> Scatter
     """Return a scatter whose white noise is known: where the readings do not say it, by what the design leaves."""
     if scatter.white_var is not None:
         return scatter
-    columns = np.column_stack([design.columns, *design.faces.values(), *(shift.values for shift in design.shifts)])
+    columns = np.column_stack([design.columns, design.angles.values, *(shift.values for shift in design.shifts)])
     rank = rank_of(columns)
     if len(y) <= rank:
         raise NotEnoughData(
@@ -190,6 +218,8 @@ def residuals(fitted: FittedModel, data: FitData, nuisance: Mapping[str, Nuisanc
     correct is no error of the model (`RateVectorUncertainty` states it). No correction undoes a delay or a bandwidth,
     so the true rate is what comes through them.
     """
+    if nuisance and not data.angles_known:
+        data = leaning(data, nuisance)
     outputs = {a: v - nuisance[a].error_dps(data, a) if nuisance else v for a, v in data.outputs.items()}
     seen = {axis: data.through(response_of(fitted.axes[axis])) for axis in outputs}
     across_dps = next(iter(seen.values())).across_dps

@@ -9,12 +9,12 @@ import numpy as np
 from labctl.fitting.data.covered import Covered
 from labctl.fitting.data.earth import turning_size_dps, up_rate_dps
 from labctl.fitting.data.fit_data import FitData, fit_data_of
-from labctl.fitting.data.mountings import fitted_shares, mountings_of
+from labctl.fitting.data.mounting_angles import mountings_of
 from labctl.fitting.data.noise_floor import AxisNoise
 from labctl.fitting.data.temperature.channel import is_chambers
 from labctl.fitting.data.temperature.history import TemperatureHistory
 from labctl.fitting.effects import Term, kind_of
-from labctl.fitting.estimation.axis_solutions import residuals, solve_axes
+from labctl.fitting.estimation.axis_solutions import leaning, residuals, solve_axes
 from labctl.fitting.estimation.error_metrics import ErrorFigures, rms
 from labctl.fitting.estimation.held.resolution import Fixed, refuse_fixed, with_held
 from labctl.fitting.estimation.held_out import held_out_errors
@@ -69,10 +69,10 @@ def fit_preset(data: FitData, preset: Preset) -> FitResult:
     fitted = FittedModel(_with_shapes(model, found.fits, data.channels.history), found.fits)
     residual = residuals(fitted, data, found.nuisance)
     raw = {axis: data.outputs[axis] - data.true_rate_dps(axis) for axis in data.outputs}
-    floor = data.noise_floor
+    floor, leaned = data.noise_floor, leaning(data, found.nuisance)
     error = ErrorFigures(
-        rms(raw), rms(residual), rms(held_out_errors(data, preset, found.solutions)), floor.rms_dps, floor.source,
-        tuple(errors_by_leg(data, preset, found.solutions)),
+        rms(raw), rms(residual), rms(held_out_errors(leaned, preset, found.solutions)), floor.rms_dps, floor.source,
+        tuple(errors_by_leg(leaned, preset, found.solutions)),
     )  # fmt: skip
     return FitResult(
         fitted,
@@ -84,7 +84,7 @@ def fit_preset(data: FitData, preset: Preset) -> FitResult:
         residual,
         left_out_dps=_left_out_dps(fitted, data),
         joint=joint_findings(data, model, preset, found),
-        mountings=fitted_shares(mountings_of(data.channels)),
+        mountings=mountings_of(data.channels),
     )
 
 

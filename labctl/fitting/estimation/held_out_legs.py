@@ -12,8 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.errors import LabctlError
+from labctl.fitting.data.channels import BODY_AXES
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.data.temperature.legs import legs_of
+from labctl.fitting.estimation.axis_design import TOLD_APART
 from labctl.fitting.estimation.axis_solutions import residuals, solve_axes
 from labctl.fitting.estimation.error_metrics import rms
 from labctl.fitting.estimation.requirements import require_enough_data
@@ -65,6 +67,9 @@ def _tested(
         rest = data.take(left_out & (data.temperature_c >= low) & (data.temperature_c <= high))
         if len(rest) == 0:
             return _answer(names, None, 0, f"no data set of the {names[1]} is at a temperature of the {names[0]}")
+        lost = [a for a in BODY_AXES if seen.distinct_rates(a) < TOLD_APART <= data.distinct_rates(a)]
+        if lost:
+            return _answer(names, None, 0, f"the {names[0]} do not turn the unit about {' and '.join(lost)}")
         try:
             model, rows = preset.build(seen)
             used = seen.take(rows)

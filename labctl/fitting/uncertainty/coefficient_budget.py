@@ -66,9 +66,8 @@ def _sensitivities(
         return Sensitivities.of_one(temperature=temperature, level=1.0)
     gain = 1.0 + values.get("scale_factor", 0.0)
     if name != "scale_factor":
-        mounted = bench.mountings_with(name.removeprefix("misalignment_")) if bench is not None else 1.0
-        angle = gain / math.sqrt(mounted)
-        return Sensitivities.of_one(relative_rate=values[name], temperature=temperature, angle=angle)
+        gains = bench.angle_gains(name.removeprefix("misalignment_")) if bench is not None else None
+        return Sensitivities.of_one(relative_rate=values[name], temperature=temperature, angle=gain, gains=gains)
     across = math.hypot(*(value for other, value in values.items() if other.startswith("misalignment")))
     fastest = bench.max_rate_dps if bench is not None else None
     return Sensitivities.of_one(

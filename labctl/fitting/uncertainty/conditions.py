@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from datetime import date
 from typing import Literal
 
+from labctl.fitting.data.mounting_angles import AngleGains, angle_gains
 from labctl.json_types.budget import BenchConditionsJson
 from labctl.json_types.models import FitEnvironment
 from labctl.recording import RecordingInfo, Standard
@@ -26,19 +27,15 @@ class BenchConditions:
     max_rate_dps: float | None = None
     standards: tuple[Standard, ...] = field(default_factory=tuple)
     mountings: Mapping[str, float] = field(default_factory=dict)  #: position -> its share in the slopes over the rate
+    separates: bool = True  #: whether angles of the mountings were fitted beside the slopes
 
     def of(self, quantity: str) -> tuple[Standard, ...]:
         """Return the standards of a quantity."""
         return tuple(each for each in self.standards if each.quantity == quantity)
 
-    def mountings_with(self, axis: str) -> float:
-        """Return how many mountings the slopes along a body axis are the mean of, in effect; 1 where not stored.
-
-        Each has a fixture angle of its own. Two of equal shares count as two, one beside which the other hardly was
-        measured as little more than one.
-        """
-        shares = [share for position, share in self.mountings.items() if position.lstrip("-") == axis]
-        return sum(shares) ** 2 / sum(share**2 for share in shares) if shares else 1.0
+    def angle_gains(self, axis: str) -> AngleGains:
+        """Return how the misalignment towards a body axis follows the angles of its mountings; 1 where not stored."""
+        return angle_gains(self.mountings, axis, separates=self.separates)
 
     def to_json(self) -> BenchConditionsJson:
         """Return this as JSON."""

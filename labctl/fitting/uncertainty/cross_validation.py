@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from labctl.errors import LabctlError
 from labctl.fitting.data.fit_data import FitData
-from labctl.fitting.estimation.axis_solutions import residuals, solve_axes
+from labctl.fitting.estimation.axis_solutions import leaning, residuals, solve_axes
 from labctl.fitting.estimation.requirements import require_enough_data
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.models.presets import Preset
@@ -33,6 +33,7 @@ def left_variance(data: FitData, preset: Preset) -> dict[str, Array]:
     model, rows = preset.build(data)
     found = solve_axes(data.take(rows), model)
     inside = residuals(FittedModel(model, found.fits), data, found.nuisance)
+    data = leaning(data, found.nuisance)
     by_temperature = data.folds
     if preset.inner_only:
         by_temperature = by_temperature[1:-1]

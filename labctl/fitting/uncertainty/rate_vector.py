@@ -7,7 +7,6 @@ mounting that is off by a small rotation f gives a column f x a of dE, across it
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -17,6 +16,7 @@ import numpy as np
 
 from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting.data.channels import BODY_AXES
+from labctl.fitting.data.mounting_angles import ANGLE_QUANTITIES, AngleGains
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.uncertainty.budget import Budget, BudgetLine, budget_of
@@ -95,7 +95,7 @@ def rate_vector_uncertainty(
     evaluated = place.evaluated(evidence)
     sensitivities = place.sensitivities(bench)
     stated = standard_lines(bench, sensitivities)
-    aligned = standard_lines(bench, replace(sensitivities, angle=place.mounting_angles(bench, aligned=True)))
+    aligned = standard_lines(bench, replace(sensitivities, angles=place.mounting_angles(bench, aligned=True)))
     return RateVectorUncertainty(
         place.rates_dps, temperature_c, place.outputs, (*evaluated, *stated), (*evaluated, *aligned)
     )
@@ -193,20 +193,23 @@ class _Place:
             relative_rate=rates,
             rate_dps=np.sign(rates),
             temperature=self.gain @ np.array(slopes)[:, None],
-            angle=self.mounting_angles(bench, aligned=False),
+            angles=self.mounting_angles(bench, aligned=False),
             angle_squared=rates[:, 0] / 2,  # along its own axis only the cosine is lost
             level=self.gain @ np.ones((len(rates), 1)),
         )
 
-    def mounting_angles(self, bench: BenchConditions | None, *, aligned: bool) -> Array:
-        """Return d corrected rate / d angle of each mounting towards each other axis, (n, 6) deg/s per radian.
+    def mounting_angles(self, bench: BenchConditions | None, *, aligned: bool) -> dict[str, Array]:
+        """Return quantity -> d corrected rate / d such an angle of mountings, (n, 6) deg/s per radian.
+
+        There is one for each body axis up and each other axis towards which it leans.
 
         With axis p up, a mounting that leans towards axis r turns the unit about r as well. Output r gets a part of the
         rate about p in its misalignment; where r has no output, the others get its part by their own misalignment.
         `aligned` is without what a rotation of the frame takes off: of two outputs the mean of both parts is left, and
-        of the part about an axis without output nothing. Several mountings with the same axis average.
+        of the part about an axis without output nothing. What the mountings with one axis up separate is not in it.
         """
-        found = []
+        found: dict[str, list[Array]] = {quantity: [] for quantity in ANGLE_QUANTITIES}
+        gains = {axis: AngleGains() if bench is None else bench.angle_gains(axis) for axis in BODY_AXES}
         for up, towards in permutations(BODY_AXES, 2):
             each = np.zeros(len(self.outputs))
             if towards not in self.outputs:
@@ -216,8 +219,9 @@ class _Place:
             elif up in self.outputs:
                 each[self.outputs.index(towards)] = self.rates_dps[up] / 2
                 each[self.outputs.index(up)] = self.rates_dps[towards] / 2
-            found.append(each / math.sqrt(bench.mountings_with(up) if bench is not None else 1.0))
-        return np.column_stack(found)
+            for quantity, columns in found.items():
+                columns.append(each * gains[up].of(quantity))
+        return {quantity: np.column_stack(columns) for quantity, columns in found.items()}
 
 
 def _budget(sources: Sequence[SourceLines], row: int) -> Budget:

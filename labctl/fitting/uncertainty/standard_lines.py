@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from labctl.fitting.data.earth import EARTH_RATE_DPS
+from labctl.fitting.data.mounting_angles import ANGLE_QUANTITIES, AngleGains
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.uncertainty.budget import BudgetLine
 from labctl.fitting.uncertainty.conditions import BenchConditions
 from labctl.recording import Standard
+from labctl.recording.positions import Position
 
 RAD_PER_DEG = math.pi / 180.0
 #: Quantities whose error is the same at all rates of a campaign, and in proportion to the rate.
@@ -40,7 +42,7 @@ class Sensitivities:
     relative_rate: Array  #: (n, 1) along a relative error of the reference rate
     rate_dps: Array  #: (n, 1) along an error of the reference rate, deg/s, that is the same at all rates but rest
     temperature: Array  #: (n, 1) per K
-    angle: Array  #: (n, m) per radian of a mounting against the axis of rotation
+    angles: Mapping[str, Array]  #: quantity -> (n, m) per radian of such angles of the mountings
     level: Array  #: (n, 1) per deg/s of the Earth's rate along the table axis
     angle_squared: Array  #: (n,) per square radian: what is left where the first order vanishes
 
@@ -51,12 +53,14 @@ class Sensitivities:
         rate_dps: float = 0.0,
         temperature: float = 0.0,
         angle: float = 0.0,
+        gains: AngleGains | None = None,
         angle_squared: float = 0.0,
         level: float = 0.0,
     ) -> Sensitivities:
-        """Return those of a single result, 0 where not named."""
-        own = [np.full((1, 1), each) for each in (relative_rate, rate_dps, temperature, angle, level)]
-        return Sensitivities(own[0], own[1], own[2], own[3], own[4], np.array([angle_squared]))
+        """Return those of a single result, 0 where not named; `gains` is how `angle` follows each kind of angle."""
+        own = [np.full((1, 1), each) for each in (relative_rate, rate_dps, temperature, level)]
+        angles = {name: np.full((1, 1), angle * (gains.of(name) if gains else 1.0)) for name in ANGLE_QUANTITIES}
+        return Sensitivities(own[0], own[1], own[2], angles, own[3], np.array([angle_squared]))
 
 
 @dataclass(frozen=True)
@@ -75,8 +79,9 @@ _SENSITIVITY: dict[tuple[str, str], Callable[[Sensitivities, BenchConditions], A
     ("turn_angle", "deg"): lambda s, _: s.relative_rate / 360.0,
     ("thermometer", "deg C"): lambda s, _: s.temperature,
     ("chamber_gradient", "deg C"): lambda s, _: s.temperature,
-    ("fixture_angle", "deg"): lambda s, _: RAD_PER_DEG * s.angle,
-    ("tilt", "deg"): lambda s, _: RAD_PER_DEG * s.angle,
+    ("fixture_angle", "deg"): lambda s, _: RAD_PER_DEG * s.angles["fixture_angle"],
+    ("tilt", "deg"): lambda s, _: RAD_PER_DEG * s.angles["tilt"],
+    ("mounting_repeatability", "deg"): lambda s, _: RAD_PER_DEG * s.angles["mounting_repeatability"],
     ("level", "deg"): lambda s, c: None if c.latitude_deg is None else s.level * _level_dps_per_deg(c.latitude_deg),
     ("supply", "V"): lambda _, __: None,
 }
@@ -110,7 +115,7 @@ def _of_all(line: BudgetLine, n: int) -> SourceLines:
 
 def _matters(quantity: str, bench: BenchConditions) -> bool:
     """Return whether a quantity of the bench enters a calibration that was made by such a motion."""
-    if quantity in {"clock", "table_rate", "fixture_angle", "tilt"}:
+    if quantity in {"clock", "table_rate", *ANGLE_QUANTITIES}:
         return bench.motion in {"rates", "profile"}
     return bench.motion == "turns" if quantity == "turn_angle" else True
 
@@ -122,7 +127,7 @@ def _of_standard(standard: Standard, bench: BenchConditions, s: Sensitivities) -
         line = _line(standard, bench, None, None, why)
         return SourceLines((line,) * n, np.zeros((n, n)))
     second = np.zeros(n)
-    if standard.quantity in {"fixture_angle", "tilt"}:
+    if standard.quantity in ANGLE_QUANTITIES:
         second = _second_order(np.abs(s.angle_squared), RAD_PER_DEG * u)
     covariance = u**2 * sensitivity @ sensitivity.T + np.diag(second**2)
     lines = tuple(
@@ -193,6 +198,8 @@ def _missing(bench: BenchConditions) -> list[BudgetLine]:
     if bench.thermometer != "unit":
         quantities += ["thermometer", "chamber_gradient"]
     quantities += ["level"] if bench.motion != "poses" else []
+    if any(Position.of(each).turned_deg for each in bench.mountings):  # then little else is left of these angles
+        quantities.append("mounting_repeatability")
     missing = [name for name in quantities if not bench.of(name)]
     lines = [
         _unknown(name, NO_TIME_BASE if name == "clock" and bench.of("table_rate") else NOT_STATED) for name in missing

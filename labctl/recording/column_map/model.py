@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Literal, get_args
 
 from pydantic import (
+    AfterValidator,
     AliasChoices,
     AwareDatetime,
     BaseModel,
@@ -18,6 +19,7 @@ from pydantic import (
 from labctl.recording.column_map.units import LSB, QUANTITIES, find_unit, is_lsb, names_of, unit_of_target
 from labctl.recording.columns import BY_NAME
 from labctl.recording.info import Axis, Motion
+from labctl.recording.positions import Position
 
 FORMAT: Literal["labctl-map/1"] = "labctl-map/1"
 SERIAL = r"^[A-Za-z0-9][A-Za-z0-9._+# -]{0,63}$"
@@ -90,13 +92,18 @@ class UnitKeys(_Strict):
     wrap_bits: Bits | None = None
 
 
+def _position(text: str) -> str:
+    """Return the text of a position. Raises ValueError for one that is none."""
+    return str(Position.of(text))
+
+
 class Part(_Strict):
     """What holds for all readings of one data set, or of all of one name."""
 
     turn_deg: float | None = None
     turn_u_deg: float | None = Field(default=None, ge=0)
     table_rate_dps: float | None = None
-    position: Literal["x", "-x", "y", "-y", "z", "-z"] | None = None
+    position: Annotated[str, AfterValidator(_position)] | None = None
     temperature_c: float | None = None
     rows: tuple[int, int] | None = None  #: first and last row, from 1 (by = "rows")
     skip: bool = False  #: its rows are left out

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from labctl.recording.info import OutputUnit
+from labctl.recording.positions import Position
 from labctl.recording.sanity.finding import Finding
 from labctl.recording.sanity.response import Response
 from labctl.recording.sanity.summary import Summary
@@ -50,7 +51,7 @@ def check_responses(summary: Summary, found: Mapping[str, Mapping[str, Response]
     own: dict[str, list[tuple[str, Response]]] = {}
     crossed: dict[str, str] = {}  # position -> the output that follows the table instead
     for position, outputs in found.items():
-        axis = position.lstrip("-")
+        axis = Position.of(position).axis
         if axis not in outputs:
             continue
         if (other := _follower(axis, outputs)) is not None:
@@ -75,9 +76,9 @@ def _follower(axis: str, outputs: Mapping[str, Response]) -> str | None:
 def _crossed(crossed: Mapping[str, str], found: Mapping[str, Mapping[str, Response]]) -> Iterator[Finding]:
     reported: set[frozenset[str]] = set()
     for position, other in crossed.items():
-        axis = position.lstrip("-")
-        mutual = [p for p, o in crossed.items() if {p.lstrip("-"), o} == {axis, other}]
-        exchanged = {p.lstrip("-") for p in mutual} == {axis, other}
+        axis = Position.of(position).axis
+        mutual = [p for p, o in crossed.items() if {Position.of(p).axis, o} == {axis, other}]
+        exchanged = {Position.of(p).axis for p in mutual} == {axis, other}
         if exchanged and (pair := frozenset((axis, other))) not in reported:
             reported.add(pair)
             where, do = (
@@ -102,7 +103,7 @@ def _crossed(crossed: Mapping[str, str], found: Mapping[str, Mapping[str, Respon
 
 
 def _of_axis(summary: Summary, axis: str, known: list[tuple[str, Response]]) -> Iterator[Finding]:
-    signed = [(position, -one.gain if position.startswith("-") else one.gain, one) for position, one in known]
+    signed = [(position, -one.gain if Position.of(position).sign < 0 else one.gain, one) for position, one in known]
     for position, one in known:
         if (finding := _unsigned(summary, position, one)) is not None:
             yield finding
@@ -132,7 +133,7 @@ def _output_unit(summary: Summary, axis: str) -> OutputUnit:
 
 
 def _turned(position: str) -> str:
-    return position[1:] if position.startswith("-") else f"-{position}"
+    return str(Position.of(position).upside_down)
 
 
 def _size(summary: Summary, axis: str, signed: list[tuple[str, float, Response]]) -> Iterator[Finding]:

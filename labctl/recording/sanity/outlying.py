@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.recording.positions import Position
 from labctl.recording.sanity.finding import Finding
 from labctl.recording.sanity.gain import POSSIBLE
 from labctl.recording.sanity.response import ROBUST, Response
@@ -30,7 +31,7 @@ MOST_TOLD = 5
 def check_outlying(summary: Summary, found: Mapping[str, Mapping[str, Response]]) -> Iterator[Finding]:
     """Yield each data set whose output belongs to another rate than it has."""
     for position, outputs in found.items():
-        axis = position.lstrip("-")
+        axis = Position.of(position).axis
         one = outputs.get(axis)
         if one is None or not POSSIBLE[0] <= abs(one.gain) <= POSSIBLE[1] or int(one.rows.sum()) < LEAST_SETS:
             continue

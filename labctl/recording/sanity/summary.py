@@ -16,6 +16,7 @@ from labctl.recording.info import RecordingInfo
 from labctl.recording.motions.turn_means import rates_as_turned
 from labctl.recording.motions.turns import USUAL_U_DEG
 from labctl.recording.points import dataset_starts, temperature_of
+from labctl.recording.positions import Position
 from labctl.recording.quantisation import codes_of
 from labctl.recording.recording import Columns, Recording
 from labctl.recording.sanity.blocks import NO_CHANGE, level_change, noise_of_reading, wander
@@ -123,7 +124,7 @@ def _stretches(
     rate = np.asarray(rows["table_rate_dps"], dtype=np.float64)[whole]
     here = {name: values[whole] for name, values in rows.items()}
     place = _place(info, here, 0)
-    axis = place["position"].lstrip("-")
+    axis = Position.of(place["position"]).axis
     steps = np.diff(np.asarray(here["t_s"], dtype=np.float64))
     lag = lag_of(
         rate, outputs.get(axis, next(iter(outputs.values())))[whole], float(np.median(steps)) if len(steps) else 1.0

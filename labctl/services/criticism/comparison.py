@@ -20,6 +20,7 @@ from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.data.levels import level_centres, rate_levels, temperature_rows
 from labctl.fitting.numeric.arrays import Array
 from labctl.json_types.answers import ComparisonJson
+from labctl.recording.positions import axis_in
 from labctl.services.criticism.measurements import Measurements
 from labctl.services.criticism.model_lines import lines_over
 from labctl.services.criticism.residuals import own_numbers
@@ -103,7 +104,7 @@ def _axis(
     channels = data.channels
     rate, own, warm = channels.table_rate_dps(), channels.rate_dps(axis), channels.temperature_c(axis)
     measured = data.outputs[axis] - own
-    own_turn = np.char.lstrip(position, "-") == axis
+    own_turn = axis_in(position) == axis
     before, after = (
         turn_errors(error - bias_at_rest(error, rate, warm, position), np.where(own_turn, rate, 0.0))
         for error in (measured, residual)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,11 +22,12 @@ from labctl.fitting.characteristics.scale_factor import (
     straight_line,
 )
 from labctl.fitting.data.fit_data import FitData
-from labctl.fitting.data.mountings import mountings_of
+from labctl.fitting.data.mounting_angles import mountings_of
 from labctl.fitting.data.temperature.levels import level_means
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.uncertainty import BenchConditions, conditions_of
 from labctl.fitting.uncertainty.standard_lines import Sensitivities, standards_u
+from labctl.recording.positions import axis_in
 
 #: Figures at one temperature are at the level nearest to this, deg C.
 USUAL_C = 25.0
@@ -65,7 +66,7 @@ class _Columns:
 
     def own(self, axis: str) -> NDArray[np.bool_]:
         """Return which data sets turn about an axis, (m,)."""
-        return np.asarray(np.char.lstrip(self.position, "-") == axis)
+        return np.asarray(axis_in(self.position) == axis)
 
     def line(self, axis: str, rows: NDArray[np.bool_]) -> StraightLine | None:
         """Return the best straight line of an output over its own true rate."""
@@ -93,9 +94,10 @@ def _columns(data: FitData) -> _Columns:
     level = data.levels if data.levels is not None else np.zeros(m, dtype=np.int64)
     run = data.channels["run"] if "run" in data.channels else np.ones(m)
     position = np.asarray(data.channels["position"]).astype(np.str_)
+    bench = conditions_of(data.info, {}, mountings=mountings_of(data.channels))
     return _Columns(
         data, level, np.asarray(level_means(data.temperature_c, level)), position, np.asarray(run, dtype=np.int64),
-        data.channels.table_rate_dps(), conditions_of(data.info, {}, mountings=mountings_of(data.channels)),
+        data.channels.table_rate_dps(), replace(bench, separates=False),
     )  # fmt: skip
 
 
@@ -192,8 +194,7 @@ def _alignment(seen: _Columns) -> Iterator[Figure]:
     for j, about in enumerate(AXES):
         rows = seen.own(about) & (seen.level == seen.usual)
         used |= rows
-        angle = 1.0 / math.sqrt(seen.bench.mountings_with(about))
-        leaning = standards_u(seen.bench, Sensitivities.of_one(angle=angle))
+        leaning = standards_u(seen.bench, Sensitivities.of_one(angle=1.0, gains=seen.bench.angle_gains(about)))
         for i, axis in enumerate(AXES):
             line = seen.line_about(axis, about, rows)
             if line is None:

@@ -17,6 +17,7 @@ from instruments.drivers.resolution import resolve
 from instruments.interfaces.chamber import ChamberLimits
 from instruments.interfaces.gyro import GyroLimits
 from instruments.interfaces.table import TableLimits
+from instruments.positions import Position
 from instruments.toml_documents import read_toml_text, shown
 from labctl.errors import BadBench
 from labctl.services.planning.attendance import attendance, visits_s
@@ -125,7 +126,7 @@ def bench_for(recipe: Recipe) -> str:
     """
     if f"{recipe.name}-sim" in shipped_benches():
         return f"{recipe.name}-sim"
-    axes = {position.lstrip("-") for position in recipe.positions}
+    axes = {Position.of(position).axis for position in recipe.positions}
     fitting: list[tuple[bool, int, float, bool, str]] = []
     for name, path in shipped_benches().items():
         if name.endswith(OF_A_PAPER):

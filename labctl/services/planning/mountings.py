@@ -1,52 +1,60 @@
-"""What the mountings of a plan are worth: how well misalignment can be known at best, and with opposite mountings."""
+"""What the mountings of a plan are worth: how well misalignment can be known at best, and with further mountings."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from datetime import date
 
 from instruments.bench_config import BenchFile
+from instruments.positions import Position
 from labctl.fitting.data.channels import BODY_AXES
-from labctl.fitting.data.mountings import fitted_shares, shares_of
+from labctl.fitting.data.mounting_angles import ANGLE_QUANTITIES, shares_of
 from labctl.fitting.uncertainty.conditions import BenchConditions
 from labctl.fitting.uncertainty.standard_lines import Sensitivities, standards_u
-from labctl.services.schemas.plans import MisalignmentOutlook
+from labctl.services.schemas.plans import FurtherMountings, MisalignmentOutlook
 from procedures.contracts.errors import PlanRefused
 from procedures.contracts.steps import Acquire
 from procedures.planning.limits import BenchLimits
 from procedures.planning.plan import Plan, make_plan
-from procedures.planning.point_order import upside_down
 from procedures.recipe.recipe import Recipe
-from procedures.recipe.rules import Inverted
+from procedures.recipe.rules import Indexing, Inverted
 
-#: Standards whose errors act as misalignment.
-QUANTITIES = ("fixture_angle", "tilt")
 #: Coverage factor of the figures.
 K = 2.0
 #: Whether a standard is overdue does not matter here.
 ANY_DAY = date(1970, 1, 1)
+#: Mountings that leave more than this share of U are not offered.
+WORTH_SHARE = 0.98
+HALF_TURN, QUARTER_TURN = 180, 90
 
 
 def misalignment_outlook(plan: Plan, bench: BenchFile, limits: BenchLimits) -> MisalignmentOutlook | None:
-    """Return U of a misalignment by fixture and table, of the plan and with its opposite mountings added.
+    """Return U of a misalignment by fixture and table, of the plan and with further mountings added.
 
-    None where no unit turns about an axis across one of its outputs, or where the bench states neither standard.
+    None where no unit turns about an axis across one of its outputs, or where the bench states no such standard.
     """
     shares = _shares(plan, bench)
-    if not shares or not any(each.quantity in QUANTITIES for each in bench.standards):
+    stated = sorted({each.quantity for each in bench.standards} & set(ANGLE_QUANTITIES))
+    if not shares or not stated:
         return None
     now = _expanded(bench, shares)
-    wider = _with_opposite(plan.recipe)
-    if wider is None:
-        return MisalignmentOutlook(expanded=now)
-    try:
-        other = make_plan(wider, limits)
-    except PlanRefused:
-        return MisalignmentOutlook(expanded=now)
-    rules = wider.inverted
-    assert rules is not None
+    found = []
+    for what, table, wider in _wider(plan.recipe):
+        try:
+            other = make_plan(wider, limits)
+        except PlanRefused:
+            continue
+        then = _shares(other, bench)
+        if (expanded := _expanded(bench, then)) > WORTH_SHARE * now:
+            continue
+        more = FurtherMountings(
+            turned=what, expanded=expanded, mountings=len(then) - len(shares),
+            more_s=other.expected_s - plan.expected_s, recipe_toml=table,
+        )  # fmt: skip
+        found.append(more)
     return MisalignmentOutlook(
-        expanded=now, with_opposite=_expanded(bench, _shares(other, bench)), more_s=other.expected_s - plan.expected_s,
-        inverted_temperatures_c=list(rules.temperatures_c), inverted_rates_dps=list(rules.rates_dps),
+        expanded=now, further=sorted(found, key=lambda each: (each.expanded, each.more_s)),
+        not_stated=[each for each in ANGLE_QUANTITIES if each not in stated],
     )  # fmt: skip
 
 
@@ -55,30 +63,45 @@ def _shares(plan: Plan, bench: BenchFile) -> dict[str, float]:
     across = {axis for axis in BODY_AXES for gyro in bench.gyros if set(gyro.axes) - {axis}}
     weights: dict[str, float] = {}
     for step in plan.steps:
-        if isinstance(step, Acquire) and not step.verification and step.position.lstrip("-") in across:
+        if isinstance(step, Acquire) and not step.verification and Position.of(step.position).axis in across:
             weights[step.position] = weights.get(step.position, 0.0) + step.rate_dps**2
-    return fitted_shares(shares_of(weights)) if any(weights.values()) else {}
+    return shares_of(weights) if any(weights.values()) else {}
 
 
 def _expanded(bench: BenchFile, shares: dict[str, float]) -> float:
-    """Return U of the misalignment towards the axis that was mounted in the fewest ways."""
-    stated = tuple(each for each in bench.standards if each.quantity in QUANTITIES)
+    """Return U of the misalignment towards the axis whose mountings separate least."""
+    stated = tuple(each for each in bench.standards if each.quantity in ANGLE_QUANTITIES)
     conditions = BenchConditions(ANY_DAY, standards=stated, mountings=shares)
-    axes = {position.lstrip("-") for position in shares}
     return max(
-        K * standards_u(conditions, Sensitivities.of_one(angle=conditions.mountings_with(axis) ** -0.5))
-        for axis in axes
+        K * standards_u(conditions, Sensitivities.of_one(angle=1.0, gains=conditions.angle_gains(axis)))
+        for axis in {Position.of(position).axis for position in shares}
     )
 
 
-def _with_opposite(recipe: Recipe) -> Recipe | None:
-    """Return the recipe with each position upside down at one temperature; None where that is so already."""
-    listed = set(recipe.positions)
-    if recipe.inverted is not None or all(upside_down(position) in listed for position in listed):
-        return None
+def _wider(recipe: Recipe) -> Iterator[tuple[str, str, Recipe]]:
+    """Yield what is turned, the table to add, and the recipe with each position once more turned so."""
     fastest = max(recipe.rates_dps, key=abs)
     if fastest == 0:
-        return None
-    middle = sorted(recipe.temperatures_c)[len(recipe.temperatures_c) // 2]
-    rules = Inverted(temperatures_c=(middle,), rates_dps=(fastest, -fastest, 0.0))
-    return recipe.model_copy(update={"inverted": rules})
+        return
+    rates, at = (fastest, -fastest), (_temperature_c(recipe),)
+    listed = set(recipe.positions)
+    points = f"temperatures_c = [{at[0]:g}]\nrates_dps = [{rates[0]:g}, {rates[1]:g}]"
+    if recipe.indexing is None:
+        for what, key, angle in (
+            ("each unit turned by 180 deg on its face", "unit_deg", HALF_TURN),
+            ("the fixture turned by 180 deg on the table", "fixture_deg", HALF_TURN),
+            ("the fixture turned by 90 deg on the table", "fixture_deg", QUARTER_TURN),
+        ):
+            turned = Indexing.model_validate({key: (angle,), "temperatures_c": at, "rates_dps": rates, "hold_s": 0.0})
+            table = f"[indexing]\n{key} = [{angle}]\n{points}\nhold_s = 0"
+            yield what, table, recipe.model_copy(update={"indexing": turned})
+    if recipe.inverted is None and not all(str(Position.of(each).upside_down) in listed for each in listed):
+        inverted = Inverted(temperatures_c=at, rates_dps=rates)
+        yield "each unit upside down", f"[inverted]\n{points}", recipe.model_copy(update={"inverted": inverted})
+
+
+def _temperature_c(recipe: Recipe) -> float:
+    """Return where the chamber is when a unit is turned, or the end of the recipe's range that is next to it."""
+    low, high = min(recipe.temperatures_c), max(recipe.temperatures_c)
+    handling_c = recipe.mounting.handling_c
+    return low if handling_c is None else min(max(handling_c, low), high)

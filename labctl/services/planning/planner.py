@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from instruments.bench_config import BenchFile
+from instruments.positions import Position
 from labctl.errors import BadInput
 from labctl.services.planning.loading import (
     LocalStart,
@@ -54,7 +55,7 @@ def _recipe(name: str, text: str, bench: BenchFile | None) -> RecipeResponse:
 def _lacking(positions: Sequence[str], bench: BenchFile) -> str:
     """Say which axes a recipe turns that no unit of the bench records, if any; it would run, and show little."""
     recorded = {axis for gyro in bench.gyros for axis in gyro.axes}
-    if lacking := sorted({position.lstrip("-") for position in positions} - recorded):
+    if lacking := sorted({Position.of(position).axis for position in positions} - recorded):
         return (
             f"the recipe turns the units about {', '.join(lacking)}, but no unit of bench {bench.name} "
             "measures that axis"

@@ -82,18 +82,27 @@ class Visibility(ResponseModel):
     experiment: str = ""
 
 
+class FurtherMountings(ResponseModel):
+    """What further mountings of each position leave of the errors of fixture and table, and what they cost."""
+
+    turned: str = Field(description="What is turned, in words.")
+    expanded: float = Field(description="U of a misalignment with them, k = 2, rad.")
+    mountings: int = Field(description="Number of mountings that this adds.")
+    more_s: float = Field(description="Expected time that this adds, s.")
+    recipe_toml: str = Field(description="The table of a recipe that adds them.")
+
+
 class MisalignmentOutlook(ResponseModel):
     """How well a misalignment can be known at best: what fixture and table leave, whatever the noise; k = 2, rad."""
 
     expanded: float = Field(description="U of a misalignment with the mountings of the plan.")
-    with_opposite: float | None = Field(
-        default=None, description="U with each position upside down too; null: the plan has these mountings already."
+    further: list[FurtherMountings] = Field(
+        default_factory=list, description="Further mountings that make U smaller, the smallest U first."
     )
-    more_s: float | None = Field(default=None, description="Expected time that this adds, s.")
-    inverted_temperatures_c: list[float] = Field(
-        default_factory=list, description="Temperatures of a table [inverted] of the recipe that adds them."
+    not_stated: list[str] = Field(
+        default_factory=list,
+        description="Quantities of the mountings that the bench does not state; their errors are in no U.",
     )
-    inverted_rates_dps: list[float] = Field(default_factory=list, description="Its rates, deg/s.")
 
 
 class PlanResponse(ResponseModel):
@@ -111,7 +120,7 @@ class PlanResponse(ResponseModel):
     misalignment: MisalignmentOutlook | None = Field(
         default=None,
         description="How well a misalignment can be known at best; null: no unit turns across one of its outputs, or "
-        "the bench states neither fixture_angle nor tilt.",
+        "the bench states none of fixture_angle, tilt and mounting_repeatability.",
     )
     visibility: list[Visibility] | None = Field(
         default=None, description="Which effects the plan could and could not detect; null: not requested."

@@ -11,6 +11,7 @@ from dataclasses import replace
 from typing import Literal
 
 from instruments.interfaces.gyro import Readings
+from instruments.positions import Position
 from procedures.contracts.journal import DataSetHeader, DataSetState
 from procedures.contracts.steps import Turn
 from procedures.execution.context import ExecutionContext
@@ -80,7 +81,8 @@ class TurnReadings:
     def came_deg(self) -> dict[str, float]:
         """What has come out about the axis that points up, unit -> deg, by the bias of the rest before."""
         position = self._step.position
-        axis, sign = position.lstrip("-"), -1.0 if position.startswith("-") else 1.0
+        up = Position.of(position)
+        axis, sign = up.axis, up.sign
         return {
             name: sign * course.angle_deg(axis, self._stillness[name].bias_dps[axis])
             for name, course in self._courses.get(0, {}).items()

@@ -45,7 +45,7 @@ def measured(positions: tuple[str, ...] = THREE, outputs: tuple[str, ...] = AXES
     """Return a recording of one unit by an ideal bench that states its fixture."""
     rng = np.random.default_rng(4)
     plan = Plan("", positions, (-100.0, -50.0, 0.0, 50.0, 100.0), (0.0, 15.0, 30.0, 45.0))
-    ideal = Statement(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    ideal = Statement(*[0.0] * 7)
     columns = campaign(unit, Bench.of(rng, ideal, positions), plan, Noise(), 0.0, rng)
     columns["temperature_c"] = columns.pop("chamber_c")
     info = RecordingInfo(

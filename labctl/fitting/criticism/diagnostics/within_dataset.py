@@ -15,6 +15,7 @@ from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording
 from labctl.recording.decimation import decimate
 from labctl.recording.points import dataset_starts
+from labctl.recording.positions import Position, up_in
 
 #: At most this many readings of a data set are used, from its beginning.
 MOST_READINGS = 1200
@@ -46,7 +47,7 @@ class Within:
 
     def up(self, axis: str) -> Array:
         """Return how the table's rate is felt along an axis, (m,): 1, -1 or 0."""
-        return (self.position == axis).astype(np.float64) - (self.position == f"-{axis}").astype(np.float64)
+        return up_in(self.position, axis)
 
     def axis(self, axis: str) -> Residual:
         """Return what one axis has besides mean, slope and the stepper's lines."""
@@ -69,7 +70,7 @@ class Within:
             return found
         for there in np.unique(self.position):
             rows = np.flatnonzero(self.position == there)
-            if there.lstrip("-") == axis:
+            if Position.of(there).axis == axis:
                 continue
             waves = np.stack([np.cos(2 * np.pi * self.angle[rows]), np.sin(2 * np.pi * self.angle[rows])])
             waves = waves * self.there[rows]

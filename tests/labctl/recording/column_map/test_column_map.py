@@ -282,7 +282,7 @@ def test_a_knock_is_no_movement_and_a_slow_drift_neither(tmp_path: Path) -> None
         ('[datasets]\nby = "column"', 'by = "column" and column = NAME go together; give both'),
         ('[datasets]\nby = "rows"', r'by = "rows" needs a \[parts.NAME\] for each data set'),
         ('[datasets]\nby = "whole"\n[parts.a]\nturn_deg = 1', r"\[parts.NAME\] needs \[datasets\]"),
-        ('[parts.a]\nposition = "up"', "parts.a.position: Input should be 'x', '-x'"),
+        ('[parts.a]\nposition = "up"', "parts.a.position: 'up' is not a position .expected x, -x"),
         ('[units]\ngyro = {unit = "K"}', "'K' is not a known unit of measurement; use"),
         ("[[[", "not TOML"),
     ],

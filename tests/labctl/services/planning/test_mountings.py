@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
+import tomllib
 from typing import Any
 
 import pytest
 
 from labctl.calibration import read_calibration
+from labctl.fitting.data.mounting_angles import ANGLE_QUANTITIES
 from labctl.recording import to_points
 from labctl.services.calibrations.fitting import fit_unit
 from labctl.services.calibrations.uncertainty import coefficients_at
@@ -15,13 +18,17 @@ from labctl.services.planning.mountings import misalignment_outlook
 from labctl.services.schemas.calibrations import FitRequest
 from labctl.services.simulation.plan_simulation import hidden_recording
 from labctl.store import open_store
+from procedures.contracts.steps import Mount
 from procedures.planning.plan import make_plan
 from procedures.recipe.recipe import Recipe
-from procedures.recipe.rules import Inverted
+from procedures.recipe.rules import Indexing, Inverted
 from tests.helpers.certificates import AT
 
 BENCH = load_bench("triaxial-sim")
-INVERTED = Inverted(temperatures_c=(30.0,), rates_dps=(400.0, -400.0, 0.0))
+RULES = {"temperatures_c": (30.0,), "rates_dps": (400.0, -400.0)}
+INVERTED = Inverted.model_validate(RULES)
+TURNED = Indexing.model_validate({**RULES, "unit_deg": (180,)})
+CUBE = Indexing.model_validate({**RULES, "fixture_deg": (90, 180)})
 SIX = ("x", "-x", "y", "-y", "z", "-z")
 
 
@@ -30,7 +37,9 @@ def outlook(recipe: Recipe) -> Any:
 
 
 @pytest.mark.parametrize(
-    "changes", [{}, {"inverted": INVERTED}, {"positions": SIX}], ids=["three mountings", "inverted", "six faces"]
+    "changes",
+    [{}, {"inverted": INVERTED}, {"positions": SIX}, {"indexing": TURNED}, {"indexing": CUBE, "inverted": INVERTED}],
+    ids=["three mountings", "inverted", "six faces", "turned on the face", "fixture turned, inverted"],
 )
 def test_the_budget_of_the_fit_is_what_the_plan_said(changes: dict[str, Any], tmp_path: Any) -> None:
     recipe = load_recipe("quick-triaxial").model_copy(update=changes)
@@ -42,19 +51,44 @@ def test_the_budget_of_the_fit_is_what_the_plan_said(changes: dict[str, Any], tm
         fit_unit(store, "STIM-0001", FitRequest(effects=["bias", "scale_factor", "misalignment"]), AT)
         calibration = read_calibration(store.calibrations.document("STIM-0001", 1)[0])
     budget = coefficients_at(calibration, 25.0)["x"]["misalignment_y"]
-    of_bench = sum((line.contribution or 0.0) ** 2 for line in budget.lines if line.source in {"fixture_angle", "tilt"})
+    of_bench = sum((line.contribution or 0.0) ** 2 for line in budget.lines if line.source in ANGLE_QUANTITIES)
     assert 2.0 * of_bench**0.5 == pytest.approx(said.expanded, rel=2e-3)
-    assert (said.with_opposite is None) is bool(changes)
+    assert said.not_stated == []
 
 
-def test_opposite_mountings_halve_the_variance_and_cost_one_soak_each() -> None:
+@pytest.mark.parametrize("number", range(4))
+def test_further_mountings_are_worth_and_cost_what_is_said(number: int) -> None:
+    recipe = load_recipe("quick-triaxial")
+    more = outlook(recipe).further[number]
+    added = tomllib.loads(more.recipe_toml)
+    kinds = {"indexing": Indexing, "inverted": Inverted}
+    longer = recipe.model_copy(update={name: kinds[name].model_validate(table) for name, table in added.items()})
+    plans = [make_plan(each, limits_of(BENCH)) for each in (recipe, longer)]
+    assert plans[1].expected_s - plans[0].expected_s == pytest.approx(more.more_s)
+    assert outlook(longer).expanded == pytest.approx(more.expanded)
+    mounted = [sum(isinstance(step, Mount) for step in plan.steps) for plan in plans]
+    assert mounted[1] - mounted[0] == more.mountings == 3
+    for offered in outlook(longer).further:
+        assert not set(tomllib.loads(offered.recipe_toml)) & set(added)
+
+
+def test_a_unit_turned_on_its_face_leaves_how_well_it_is_placed_again() -> None:
     said = outlook(load_recipe("quick-triaxial"))
-    assert said.with_opposite == pytest.approx(said.expanded / 2**0.5, rel=1e-9)
-    rules = Inverted(temperatures_c=tuple(said.inverted_temperatures_c), rates_dps=tuple(said.inverted_rates_dps))
-    longer = load_recipe("quick-triaxial").model_copy(update={"inverted": rules})
-    plans = [make_plan(recipe, limits_of(BENCH)) for recipe in (load_recipe("quick-triaxial"), longer)]
-    assert plans[1].expected_s - plans[0].expected_s == pytest.approx(said.more_s)
-    assert outlook(longer).expanded == pytest.approx(said.with_opposite)
+    best = said.further[0]
+    assert best.turned == "each unit turned by 180 deg on its face"
+    (placed,) = (each for each in BENCH.standards if each.quantity == "mounting_repeatability")
+    assert best.expanded == pytest.approx(2.0 * math.radians(placed.standard_u) / 2**0.5)
+    assert [each.expanded for each in said.further] == sorted(each.expanded for each in said.further)
+
+
+def test_what_the_bench_does_not_state_is_said() -> None:
+    bare = BENCH.model_copy(
+        update={"standards": tuple(each for each in BENCH.standards if each.quantity == "fixture_angle")}
+    )
+    said = misalignment_outlook(make_plan(load_recipe("quick-triaxial"), limits_of(bare)), bare, limits_of(bare))
+    assert said is not None
+    assert said.not_stated == ["tilt", "mounting_repeatability"]
+    assert said.further[0].expanded == pytest.approx(0.0, abs=1e-12)  # by fixture and table, as far as they are stated
 
 
 def test_where_no_output_lies_across_nothing_is_said() -> None:

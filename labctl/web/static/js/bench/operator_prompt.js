@@ -2,11 +2,12 @@
 
 import { h, svg } from "../core/elements.js";
 import { duration } from "../core/format.js";
+import { axisOf, endOf, signOf, turnedDeg } from "../core/positions.js";
 import { answerButtons } from "./actions.js";
 
 /** @import { Prompt } from "../../../types/api.js" */
 
-/** @typedef {"x" | "y" | "z"} Axis */
+/** @import { Axis } from "../core/positions.js" */
 /** @typedef {[number, number, number]} Point */
 
 /** @type {Axis[]} */
@@ -27,18 +28,18 @@ const VIEW = [
  */
 function bodyAxes(position) {
   const up = AXES.indexOf(axisOf(position));
-  const down = position.startsWith("-");
+  const down = signOf(position) < 0;
+  const turned = (turnedDeg(position).reduce((sum, angle) => sum + angle) * Math.PI) / 180;
+  const [cos, sin] = [Math.cos(turned), Math.sin(turned)];
   const [next, last] = [AXES[(up + 1) % 3], AXES[(up + 2) % 3]];
   /** @type {Record<Axis, Point>} */
   const at = { x: [0, 0, 0], y: [0, 0, 0], z: [0, 0, 0] };
   at[AXES[up]] = down ? [0, 0, -1] : [0, 0, 1];
-  at[next] = down ? [0, 1, 0] : [1, 0, 0];
-  at[last] = down ? [1, 0, 0] : [0, 1, 0];
+  at[next] = down ? [-sin, cos, 0] : [cos, sin, 0];
+  at[last] = down ? [cos, sin, 0] : [-sin, cos, 0];
   return at;
 }
 
-/** @param {string} position */
-const axisOf = (position) => /** @type {Axis} */ (position.replace("-", ""));
 /**
  * @param {Point} point
  * @param {number} factor
@@ -67,7 +68,7 @@ const polygonPoints = (corners) =>
     .join(" ");
 
 /**
- * A cube on the table with its axes; the one that points up is emphasised. Ids of positions: x, y, z, -x, -y, -z.
+ * A cube on the table with its axes; the one that points up is emphasised.
  * @param {string} position
  */
 export function mountingDrawing(position) {
@@ -102,14 +103,14 @@ export function mountingDrawing(position) {
   };
   const [low, high] = [-1, 1];
   const up = project([0, 0, 2.05]);
-  const down = position.startsWith("-");
+  const down = signOf(position) < 0;
   return svg(
     "svg",
     {
       viewBox: "0 0 300 265",
       class: "mounting",
       role: "img",
-      "aria-label": `The unit with its ${position} axis pointing up along the table axis`,
+      "aria-label": `The unit with its ${endOf(position)} axis pointing up along the table axis${turnedText(position)}`,
     },
     svg("ellipse", { cx: 150, cy: 188, rx: 132, ry: 56, class: "table" }),
     svg("ellipse", { cx: 150, cy: 182, rx: 132, ry: 56, class: "table top" }),
@@ -147,15 +148,28 @@ export function mountingDrawing(position) {
           "g",
           { class: "axis up inverted" },
           svg("line", { x1: 150, y1: project([0, 0, 1])[1], x2: 150, y2: project([0, 0, 1.75])[1] }),
-          svg("text", { x: up[0], y: up[1] + 5, "text-anchor": "middle" }, `${position} up`),
+          svg("text", { x: up[0], y: up[1] + 5, "text-anchor": "middle" }, `${endOf(position)} up`),
         )
       : svg("g", { class: "up" }, arrow(axisOf(position), 20)),
   );
 }
 
+/**
+ * What is turned against the first mounting, in words; nothing where nothing is.
+ * @param {string} position
+ */
+function turnedText(position) {
+  const [unit, fixture] = turnedDeg(position);
+  const words = [
+    unit ? `the unit turned by ${unit} deg on its fixture` : "",
+    fixture ? `the fixture turned by ${fixture} deg on the table` : "",
+  ].filter(Boolean);
+  return words.length ? `, ${words.join(", ")} (counter-clockwise seen from above)` : "";
+}
+
 /** @param {Prompt} prompt */
 function heading({ kind, position, turn_deg: angle }) {
-  if (kind === "mount") return `Mount the unit with axis ${position} pointing up`;
+  if (kind === "mount") return `Mount the unit with axis ${position && endOf(position)} pointing up${position ? turnedText(position) : ""}`;
   if (kind === "turn") return `Keep axis ${position} pointing up, and turn the unit by ${angle} deg about this axis`;
   return "The campaign has a question";
 }

@@ -2,6 +2,7 @@
 
 import { colour, figure } from "../core/figure.js";
 import { duration, plainNumber } from "../core/format.js";
+import { axisOf } from "../core/positions.js";
 import { planSteps, positionBands, setPointCourse } from "./plan_steps.js";
 
 /** @import { Timeline } from "../../../types/api.js" */
@@ -94,7 +95,7 @@ export function planChart(name, give, { height = "24rem", pick } = {}) {
       y0: 0,
       y1: 1,
       line: { width: 0 },
-      fillcolor: colour(`axis-${band.position.replace("-", "")}`),
+      fillcolor: colour(`axis-${axisOf(band.position)}`),
       opacity: 0.1,
       layer: "below",
     }));
@@ -109,7 +110,7 @@ export function planChart(name, give, { height = "24rem", pick } = {}) {
         x: (band.from + band.until) / 2,
         y: 1,
         yanchor: "bottom",
-        font: { size: 11.5, color: colour(`axis-${band.position.replace("-", "")}`) },
+        font: { size: 11.5, color: colour(`axis-${axisOf(band.position)}`) },
       }));
     if (now_s !== null) {
       shapes.push({

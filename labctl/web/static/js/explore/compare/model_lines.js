@@ -3,8 +3,9 @@
 import { rateColours, temperatureColours } from "../../core/colour_scales.js";
 import { colour, figure } from "../../core/figure.js";
 import { plainNumber } from "../../core/format.js";
+import { signOf } from "../../core/positions.js";
 import { recordingMarks } from "../../core/recording_marks.js";
-import { alongRate, linesOf, ownRows, positionsOf, rowsWhere, signOf } from "./rows.js";
+import { alongRate, linesOf, ownRows, positionsOf, rowsWhere } from "./rows.js";
 
 /** @import { Comparison, ModelLines } from "../../../../types/api.js" */
 /** @import { PlotLayout, PlotTrace } from "../../../../types/pages.js" */

@@ -1,5 +1,7 @@
 // Rows and lines of the comparison, for one output axis or one panel.
 
+import { axisOf, signOf } from "../../core/positions.js";
+
 /** @import { Comparison, ComparisonColumns, ModelLines } from "../../../../types/api.js" */
 /** @typedef {ComparisonColumns & { rate: number[] }} Rows the columns of a comparison, and the rate about the turning axis, deg/s */
 
@@ -8,9 +10,7 @@
  * @param {string} position
  * @param {string} axis
  */
-export const turns = (position, axis) => position.replace("-", "") === axis;
-/** @param {string} position */
-const sign = (position) => (position.startsWith("-") ? -1 : 1);
+export const turns = (position, axis) => axisOf(position) === axis;
 
 /**
  * Some rows of columns of equal length.
@@ -34,7 +34,7 @@ export const pickRows = (columns, rows) =>
 export function rowsWhere({ columns }, wanted) {
   const rows = columns.axis.map((_, k) => k).filter((k) => wanted(k, columns));
   const found = pickRows(columns, rows);
-  return { ...found, rate: found.table_rate_dps.map((rate, k) => sign(found.position[k]) * rate) };
+  return { ...found, rate: found.table_rate_dps.map((rate, k) => signOf(found.position[k]) * rate) };
 }
 
 /**
@@ -63,10 +63,9 @@ export const linesOf = (lines, axis, positions) =>
  * @param {Y} y
  * @returns {[x: number[], y: Y]}
  */
-export const alongRate = ({ at, position }, y) => [at.map((rate) => sign(position) * rate), y];
+export const alongRate = ({ at, position }, y) => [at.map((rate) => signOf(position) * rate), y];
 /** @param {{ position: readonly string[] }} rows */
 export const positionsOf = (rows) => [...new Set(rows.position)];
-export const signOf = sign;
 /** @param {readonly number[]} values */
 export const rms = (values) =>
   Math.sqrt(values.reduce((sum, value) => sum + value * value, 0) / Math.max(values.length, 1));
