@@ -10,6 +10,7 @@ STUDIES = (
     "use_coverage",
     "budget_coverage",
     "rate_vector_coverage",
+    "indexing",
     "single_outputs",
     "conformity",
     "figures_agree",
