@@ -64,6 +64,7 @@ class _Scheme:
         design = root[:, None] * np.column_stack([self.sign, self.angles @ self.separated])
         taken = np.linalg.pinv(design, rcond=UNSEEN)[0] * root
         of = taken @ self.angles
+        of[np.abs(of) < UNSEEN] = 0.0
         size = {part: float(np.linalg.norm(of[[part in name for name in self.names]])) for part in PARTS}
         return AngleGains(size["fixture"], size["table"], float(np.linalg.norm(taken)))
 

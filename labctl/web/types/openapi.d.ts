@@ -5267,6 +5267,37 @@ export interface components {
             /** Limit */
             limit: (number | null)[];
         };
+        /**
+         * FurtherMountings
+         * @description What further mountings of each position leave of the errors of fixture and table, and what they cost.
+         */
+        FurtherMountings: {
+            /**
+             * Turned
+             * @description What is turned, in words.
+             */
+            turned: string;
+            /**
+             * Expanded
+             * @description U of a misalignment with them, k = 2, rad.
+             */
+            expanded: number;
+            /**
+             * Mountings
+             * @description Number of mountings that this adds.
+             */
+            mountings: number;
+            /**
+             * More S
+             * @description Expected time that this adds, s.
+             */
+            more_s: number;
+            /**
+             * Recipe Toml
+             * @description The table of a recipe that adds them.
+             */
+            recipe_toml: string;
+        };
         /** HTTPValidationError */
         HTTPValidationError: {
             /** Detail */
@@ -6157,25 +6188,15 @@ export interface components {
              */
             expanded: number;
             /**
-             * With Opposite
-             * @description U with each position upside down too; null: the plan has these mountings already.
+             * Further
+             * @description Further mountings that make U smaller, the smallest U first.
              */
-            with_opposite: number | null;
+            further: components["schemas"]["FurtherMountings"][];
             /**
-             * More S
-             * @description Expected time that this adds, s.
+             * Not Stated
+             * @description Quantities of the mountings that the bench does not state; their errors are in no U.
              */
-            more_s: number | null;
-            /**
-             * Inverted Temperatures C
-             * @description Temperatures of a table [inverted] of the recipe that adds them.
-             */
-            inverted_temperatures_c: number[];
-            /**
-             * Inverted Rates Dps
-             * @description Its rates, deg/s.
-             */
-            inverted_rates_dps: number[];
+            not_stated: string[];
         };
         /**
          * ModelLines
@@ -6710,7 +6731,7 @@ export interface components {
             clipped: string[];
             /** Schedule Hash */
             schedule_hash: string;
-            /** @description How well a misalignment can be known at best; null: no unit turns across one of its outputs, or the bench states neither fixture_angle nor tilt. */
+            /** @description How well a misalignment can be known at best; null: no unit turns across one of its outputs, or the bench states none of fixture_angle, tilt and mounting_repeatability. */
             misalignment: components["schemas"]["MisalignmentOutlook"] | null;
             /**
              * Visibility

@@ -4,14 +4,12 @@ import { h, svg } from "../core/elements.js";
 import { duration } from "../core/format.js";
 import { axisOf, endOf, signOf, turnedDeg } from "../core/positions.js";
 import { answerButtons } from "./actions.js";
+import { AXES, bodyAxes } from "./mounting_axes.js";
 
 /** @import { Prompt } from "../../../types/api.js" */
-
 /** @import { Axis } from "../core/positions.js" */
-/** @typedef {[number, number, number]} Point */
+/** @import { Point } from "./mounting_axes.js" */
 
-/** @type {Axis[]} */
-const AXES = ["x", "y", "z"];
 /**
  * Projection of the directions front left, front right and up to 2D, per unit of length; right-handed.
  * @type {[number, number][]}
@@ -21,24 +19,6 @@ const VIEW = [
   [0.8, 0.42],
   [0, -1],
 ];
-
-/**
- * The body axes as directions (front left, front right, up) when `position` points up; right-handed also upside down.
- * @param {string} position
- */
-function bodyAxes(position) {
-  const up = AXES.indexOf(axisOf(position));
-  const down = signOf(position) < 0;
-  const turned = (turnedDeg(position).reduce((sum, angle) => sum + angle) * Math.PI) / 180;
-  const [cos, sin] = [Math.cos(turned), Math.sin(turned)];
-  const [next, last] = [AXES[(up + 1) % 3], AXES[(up + 2) % 3]];
-  /** @type {Record<Axis, Point>} */
-  const at = { x: [0, 0, 0], y: [0, 0, 0], z: [0, 0, 0] };
-  at[AXES[up]] = down ? [0, 0, -1] : [0, 0, 1];
-  at[next] = down ? [-sin, cos, 0] : [cos, sin, 0];
-  at[last] = down ? [cos, sin, 0] : [-sin, cos, 0];
-  return at;
-}
 
 /**
  * @param {Point} point
@@ -169,7 +149,8 @@ function turnedText(position) {
 
 /** @param {Prompt} prompt */
 function heading({ kind, position, turn_deg: angle }) {
-  if (kind === "mount") return `Mount the unit with axis ${position && endOf(position)} pointing up${position ? turnedText(position) : ""}`;
+  if (kind === "mount")
+    return `Mount the unit with axis ${position && endOf(position)} pointing up${position ? turnedText(position) : ""}`;
   if (kind === "turn") return `Keep axis ${position} pointing up, and turn the unit by ${angle} deg about this axis`;
   return "The campaign has a question";
 }
