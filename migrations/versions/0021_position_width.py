@@ -22,5 +22,5 @@ def downgrade() -> None:
 
 
 def _set_width(before: int, after: int) -> None:
-    known = {"existing_type": sa.String(before), "existing_nullable": False}
-    op.alter_column("data_sets", "position", type_=sa.String(after), **known)
+    existing = sa.String(before)
+    op.alter_column("data_sets", "position", type_=sa.String(after), existing_type=existing, existing_nullable=False)

@@ -7,21 +7,14 @@ import pytest
 from procedures.execution.step_handlers import mounting_text
 
 
-@pytest.mark.parametrize(
-    ("position", "asked"),
-    [
-        ("-x", "turn the units so that body axis -x points up along the table axis"),
-        (
-            "x@180",
-            "turn the units so that body axis x points up along the table axis, and each unit on the same face of its "
-            "fixture by 180 deg from where it was first (counter-clockwise seen from above)",
-        ),
-        (
-            "z@0/90",
-            "turn the units so that body axis z points up along the table axis, and the fixture with the units on the "
-            "table by 90 deg from where it was first (counter-clockwise seen from above)",
-        ),
-    ],
+STRAIGHT = "turn the units so that body axis {} points up along the table axis"
+SEEN = "(counter-clockwise seen from above)"
+ON_FACE = (
+    f"{STRAIGHT.format('x')}, and each unit on the same face of its fixture by 180 deg from where it was first {SEEN}"
 )
+CUBE = f"{STRAIGHT.format('z')}, and the fixture with the units on the table by 90 deg from where it was first {SEEN}"
+
+
+@pytest.mark.parametrize(("position", "asked"), [("-x", STRAIGHT.format("-x")), ("x@180", ON_FACE), ("z@0/90", CUBE)])
 def test_a_mounting_is_asked_for_in_words(position: str, asked: str) -> None:
     assert mounting_text(position) == asked
