@@ -6,7 +6,6 @@ import pytest
 
 from procedures.execution.step_handlers import mounting_text
 
-
 STRAIGHT = "turn the units so that body axis {} points up along the table axis"
 SEEN = "(counter-clockwise seen from above)"
 ON_FACE = (
