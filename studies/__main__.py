@@ -12,6 +12,7 @@ STUDIES = (
     "rate_vector_coverage",
     "single_outputs",
     "conformity",
+    "drift_coverage",
     "figures_agree",
     "hand_turns",
     "poses",
