@@ -43,6 +43,8 @@ HALF_WIDTHS: dict[Distribution, float] = {
     "triangular": math.sqrt(6.0),
     "u-shaped": math.sqrt(2.0),
 }
+#: Traceability of the standards of a simulated bench, also where its recording was exported and imported.
+SIMULATED = "none: simulated"
 
 
 class Standard(BaseModel):

@@ -13,6 +13,7 @@ STUDIES = (
     "indexing",
     "single_outputs",
     "conformity",
+    "drift_coverage",
     "figures_agree",
     "hand_turns",
     "poses",

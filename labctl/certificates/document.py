@@ -191,16 +191,28 @@ class Conformity(Part):
     statement: str
 
 
+class TypeOfItem(Part):
+    """Other units of the model of the item, from which a drift was taken that is not known of the item itself."""
+
+    model: str
+    units: int
+    over_years: tuple[float, float]  #: shortest and longest history of a unit
+    mean_per_year_dps: float  #: size of their mean drift at the worst place; its sign is not the same at all places
+    freedom: float  #: degrees of freedom of the standard uncertainty
+    spread_dps: float  #: half width about the mean until the date, with the coverage of U
+
+
 class StabilityResult(Part):
     """What the item is expected to drift by until the next calibration; None: not known, and why."""
 
     until: date
     years: float
-    per_year_dps: float | None  #: root mean square over the intervals, at the worst place
+    per_year_dps: float | None  #: standard uncertainty at the worst place; of this item alone, root mean square
     intervals: int  #: between calibrations of this item
     drift_dps: float | None  #: half width, with the coverage of U
     about: Use = "own axis"  #: rotations at which the errors were compared
     why: str = ""
+    type: TypeOfItem | None = None  #: None: the drift is that of this item by its own calibrations
 
 
 class Authorisation(Part):

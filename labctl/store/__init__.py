@@ -41,6 +41,7 @@ from labctl.store.repositories.calibrations import Calibrations, NewCalibration
 from labctl.store.repositories.campaign_journal import StoreJournal
 from labctl.store.repositories.campaign_summaries import CampaignSummary
 from labctl.store.repositories.campaigns import Campaigns, NewCampaign
+from labctl.store.repositories.certified_versions import CertifiedVersion, CertifiedVersions
 from labctl.store.repositories.check_gyros import CheckGyroRow, CheckGyros
 from labctl.store.repositories.documents.certificates import CertificateForms, CertificateRow, Certificates
 from labctl.store.repositories.drafts.records import DraftEvent, DraftRow, DraftState
@@ -85,6 +86,8 @@ __all__ = [
     "Certificates",
     "CertificationRow",
     "CertifiedPoint",
+    "CertifiedVersion",
+    "CertifiedVersions",
     "ChainHead",
     "CheckGyroRow",
     "CheckGyros",
@@ -179,6 +182,7 @@ class Store:
         self.benches = Benches(database)
         self.calibrations = Calibrations(database)
         self.certifications = Certifications(database)
+        self.certified_versions = CertifiedVersions(database)
         self.certificates = Certificates(database)
         self.release_requests = ReleaseRequests(database)
         self.fetches = Fetches(database)

@@ -94,7 +94,7 @@ def half_width(expanded: float, offset: float, level: float = LEVEL) -> float:
     if offset == 0 or u == 0:
         return expanded + abs(offset)
     off = abs(offset) / u
-    most = off + student_factor(None, level)
+    most = off + student_factor(None, level) + TOLERANCE  # beyond the root also where rounding hides a tiny offset
     from scipy.optimize import brentq
 
     return u * float(brentq(lambda k: ndtr(k - off) - ndtr(-k - off) - level, off, most, xtol=TOLERANCE))

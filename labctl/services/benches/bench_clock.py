@@ -1,8 +1,8 @@
-"""Which clock a campaign's times are of: the system's, or that of a simulated bench."""
+"""Which clock a campaign's times are of, and whether an instrument was simulated, by the bench as its file says it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 from instruments.bench_config import is_simulated_address
 from labctl.json_types import JsonObject
@@ -10,14 +10,22 @@ from labctl.json_types import JsonObject
 
 def has_simulated_time(bench: JsonObject) -> bool:
     """Return whether a bench, as its file says it, keeps a simulated clock, which may run faster than real time."""
-    simulation, gyros = bench.get("simulation"), bench.get("gyros")
+    simulation = bench.get("simulation")
     if isinstance(simulation, Mapping) and simulation.get("control"):  # simulators in another process set the pace
         return True
-    devices = [bench.get("table"), bench.get("chamber"), *(gyros if isinstance(gyros, list | tuple) else ())]
-    links = [
-        link
-        for device in devices
-        for key in ("port", "host")
-        if isinstance(device, Mapping) and (link := device.get(key)) is not None
-    ]
-    return bool(links) and all(is_simulated_address(str(link)) for link in links)
+    links = list(_links(bench, ("table", "chamber", "gyros")))
+    return bool(links) and all(map(is_simulated_address, links))
+
+
+def has_simulated_instrument(bench: JsonObject) -> bool:
+    """Return whether any instrument of a bench is simulated."""
+    return any(map(is_simulated_address, _links(bench, tuple(bench))))
+
+
+def _links(bench: JsonObject, sections: tuple[str, ...]) -> Iterator[str]:
+    """Yield the ports and hosts of the devices in sections of a bench."""
+    for name in sections:
+        given = bench.get(name)
+        for device in given if isinstance(given, list | tuple) else (given,):
+            if isinstance(device, Mapping):
+                yield from (str(device[key]) for key in ("port", "host") if device.get(key) is not None)

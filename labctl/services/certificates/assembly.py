@@ -17,13 +17,11 @@ from labctl.certificates.document import (
     ManifestNamed,
     Method,
     Replaced,
-    StabilityResult,
     StandardUsed,
     StateOfItem,
     identity_of,
 )
 from labctl.errors import BadInput, NotEnoughData
-from labctl.services.calibrations.stability import stability_of, years_until
 from labctl.services.calibrations.uncertainty import widening_of
 from labctl.services.certificates import measured
 from labctl.services.certificates.address import address_of, page_of
@@ -32,7 +30,8 @@ from labctl.services.certificates.evidence import errors_of
 from labctl.services.certificates.facts import Facts
 from labctl.services.certificates.found import Found
 from labctl.services.certificates.missing import MissingFacts
-from labctl.services.certificates.statements import statements, until
+from labctl.services.certificates.stability import stability_until, until
+from labctl.services.certificates.statements import statements
 from labctl.services.criticism.measurements import Measurements
 from labctl.services.schemas.documents.certificates import CertificateRequest
 from labctl.store import CertificateRow, CertificationRow, Store
@@ -50,7 +49,7 @@ def assembled(
         raise MissingFacts.of(facts.what, [])  # refused before
     before, left, adjustment = _states(store, facts, measurements)
     order, number = facts.order, _number(store, facts, at)
-    stability = _stability(store, facts, act.due_at) if order.state_due and act.due_at else None
+    stability = stability_until(store, facts, act.due_at) if order.state_due and act.due_at else None
     return Certificate(
         number=number,
         state_address=page_of(facts.laboratory.url, number, facts.row.hash),
@@ -87,21 +86,6 @@ def assembled(
         ),
         manifests=tuple(_manifests(store, facts)),
         statements=(*statements(facts), *until(stability, found.results.points), *found.results.left_out),
-    )  # fmt: skip
-
-
-def _stability(store: Store, facts: Facts, until: datetime) -> StabilityResult:
-    """Return what the item is expected to drift by until a date."""
-    about = "own axis" if facts.order.conformity is None else facts.order.conformity.about
-    known, years = stability_of(store, facts.row.serial, facts.row.version, about), years_until(store, facts.row, until)
-    if isinstance(known, str):
-        return StabilityResult(
-            until=until.date(), years=years, per_year_dps=None, intervals=0, drift_dps=None, about=about, why=known
-        )
-    per_year, intervals = known.worst
-    return StabilityResult(
-        until=until.date(), years=years, per_year_dps=per_year, intervals=intervals,
-        drift_dps=known.expanded_dps(years), about=about,
     )  # fmt: skip
 
 

@@ -8,6 +8,7 @@ from labctl.certificates.document import AnyAxisResult, Conformity, ConformityRe
 from labctl.certificates.readable import percent
 from labctl.errors import BadInput
 from labctl.services.certificates.evidence import Errors, VerifiedError
+from labctl.services.certificates.stability import until_date
 from labctl.services.schemas.documents.certificates import OrderedConformity
 
 #: Largest probability of a false acceptance at the limit (ILAC-G8, table 1), normal distribution.
@@ -51,9 +52,8 @@ def conformity(
     expanded, where = _about_any(ordered, any_axis) if ordered.about == "any axis" else _about_own(results)
     if left_out:
         raise NoDecision(f"conformity to {ordered.specification}: {' '.join(left_out)} {_MEASURE}")
-    drift = 0.0 if stability is None else stability.drift_dps or 0.0
-    decided = tuple(_decided(ordered, each, drift) for each in errors.verified)
-    expanded = max(math.hypot(expanded, drift), *(each.expanded_dps for each in decided), 0.0)
+    decided = tuple(_decided(ordered, each, stability) for each in errors.verified)
+    expanded = max(until_date(expanded, stability), *(each.expanded_dps for each in decided), 0.0)
     band = widening * expanded if ordered.rule == "guard-band" else 0.0
     acceptance = _acceptance(ordered, expanded, band)
     passed = errors.largest_dps <= acceptance
@@ -109,7 +109,9 @@ def specific_risk(error_dps: float, u_dps: float, limit_dps: float) -> float:
     return 0.5 * (math.erfc(above / math.sqrt(2.0)) + math.erfc(-below / math.sqrt(2.0)))
 
 
-def _decided(ordered: OrderedConformity, verified: VerifiedError, drift_dps: float) -> ConformityResult:
+def _decided(
+    ordered: OrderedConformity, verified: VerifiedError, stability: StabilityResult | None
+) -> ConformityResult:
     """Decide at one place that was verified; the drift widens U. Raises NoDecision where U is unknown there."""
     budget = verified.budget
     if budget.expanded is None or budget.k is None:
@@ -119,7 +121,7 @@ def _decided(ordered: OrderedConformity, verified: VerifiedError, drift_dps: flo
             f"conformity to {ordered.specification}: the uncertainty of output {verified.output} is not known at "
             f"{rates} deg/s about x, y, z, where it was verified ({unknown}). {_MEASURE}"
         )
-    expanded = math.hypot(budget.expanded, drift_dps)
+    expanded = until_date(budget.expanded, stability)
     acceptance = ordered.limit_dps - (expanded if ordered.rule == "guard-band" else 0.0)
     return ConformityResult(
         output=verified.output, rates_dps=verified.rates_dps, temperature_c=verified.temperature_c,
@@ -169,7 +171,9 @@ def _until(stability: StabilityResult | None) -> str:
         return ""
     if stability.drift_dps is None:
         return f"; it holds at the time of the calibration: the drift until {stability.until} is not known"
-    return f"; U contains a drift of {stability.drift_dps:.3g} °/s until {stability.until}"
+    known = stability.type
+    source = "" if known is None else f", by {known.units} other units of model {known.model}"
+    return f"; U contains a drift of {stability.drift_dps:.3g} °/s until {stability.until}{source}"
 
 
 def _otherwise(ordered: OrderedConformity) -> str:

@@ -8,7 +8,7 @@ from datetime import date
 
 from instruments.bench_config import BenchFile
 from instruments.laboratory import Laboratory
-from instruments.standards import Standard
+from instruments.standards import SIMULATED, Standard
 from labctl.calibration import Calibration, read_calibration
 from labctl.recording import RecordingInfo
 from labctl.services.certificates.missing import of_contact
@@ -18,8 +18,6 @@ from labctl.store import CalibrationRecord, CampaignRow, CertificationRow, Recor
 
 BENCH = "[laboratory] of the bench file of the campaign, or [laboratory] of the order"
 STANDARDS = "[[standards]] of the bench file before the campaign, or of recording.toml"
-#: Traceability of the standards of a simulated bench, also where its recording was exported and imported.
-SIMULATED = "none: simulated"
 #: Quantities that a rate, or an angle over a time, is known from.
 RATE = frozenset({"clock", "table_rate", "turn_angle"})
 

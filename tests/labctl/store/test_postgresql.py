@@ -17,6 +17,7 @@ import sqlalchemy as sa
 from labctl.errors import DatabaseUnreachable, StoreError
 from labctl.services.calibrations.certification import revoke
 from labctl.services.calibrations.served import calibration_file
+from labctl.services.calibrations.stability import Stability, stability_of
 from labctl.services.campaigns.execution import run_here
 from labctl.services.certificates.issue import issue
 from labctl.services.certificates.states import list_certificates
@@ -37,6 +38,7 @@ from labctl.store.connection.database import Database
 from labctl.store.schema import tables
 from tests.helpers import certificates, register
 from tests.helpers.certificates import simulated
+from tests.helpers.drifting_units import add_drifting_unit
 from tests.helpers.postgresql import Cluster, running_cluster
 
 pytestmark = pytest.mark.timeout(300)
@@ -294,3 +296,18 @@ def test_the_register_of_standards_is_the_same_as_in_a_file(url: str, tmp_path: 
         assert len(in_file[name]) == 1
     for name in (*in_file.keys() - {"block_digests"},):
         assert on_server[name] == in_file[name], name
+
+
+def test_the_drift_of_a_type_is_the_same_on_a_server(url: str, tmp_path: Path) -> None:
+    found = []
+    for place in (url, str(tmp_path / "lab.sqlite")):
+        with open_store(place, write=True) as store:
+            for years, drift in enumerate((0.01, 0.03, 0.014), start=1):
+                add_drifting_unit(store, f"A-{years}", {0.0: 0.0, float(years): drift * years})
+            add_drifting_unit(store, "N-1", {1.0: 0.0})
+            known = stability_of(store, "N-1", 1)
+            assert isinstance(known, Stability)
+            assert known.of_type is not None
+            found.append((known.worst, known.mean_dps(1.0), known.of_type.units, known.of_type.over_years))
+            assert store.certified_versions.benches([]) == {}
+    assert found[0] == found[1]

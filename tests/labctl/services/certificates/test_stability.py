@@ -53,7 +53,7 @@ def certificate(store: Store, version: int, **order: object) -> Certificate:
 
 
 def test_the_drift_is_that_of_the_unit_per_year(store: Store) -> None:
-    assert stability_of(store, SERIAL, add(store, later(0.0, 0.0))) == NO_HISTORY
+    assert str(stability_of(store, SERIAL, add(store, later(0.0, 0.0)))).startswith(NO_HISTORY)
     add(store, later(0.5, 0.010))
     version = add(store, later(2.5, 0.030))
     found = stability_of(store, SERIAL, version)
@@ -76,7 +76,7 @@ def test_it_is_that_of_the_worst_place(store: Store) -> None:
 
 def test_two_versions_of_one_day_are_no_interval(store: Store) -> None:
     add(store, later(0.0, 0.0))
-    assert stability_of(store, SERIAL, add(store, later(0.01, 0.05))) == NO_HISTORY
+    assert str(stability_of(store, SERIAL, add(store, later(0.01, 0.05)))).startswith(NO_HISTORY)
 
 
 def test_a_due_date_that_nothing_states_is_an_error(store: Store) -> None:
@@ -117,14 +117,14 @@ def test_versions_that_share_a_recording_are_no_interval(store: Store) -> None:
     joint = FitRequest(effects=["bias", "scale_factor"], recordings=[1, 2])
     version = fit_unit(store, SERIAL, joint, AT).version
     store.calibrations.certify(SERIAL, version, "certify", by="A", reason="meets the criteria", at=AT)
-    assert stability_of(store, SERIAL, version) == NO_HISTORY
+    assert str(stability_of(store, SERIAL, version)).startswith(NO_HISTORY)
 
 
 def test_a_place_that_an_earlier_version_does_not_cover_is_not_known(store: Store) -> None:
     narrow = later(0.0, 0.0)
     cool = np.asarray(narrow.columns["temperature_c"]) < 35.0
     add(store, Recording(narrow.info, {name: values[cool] for name, values in narrow.columns.items()}, None))
-    assert stability_of(store, SERIAL, add(store, later(1.0, 0.02))) == NOT_COMPARABLE
+    assert str(stability_of(store, SERIAL, add(store, later(1.0, 0.02)))).startswith(NOT_COMPARABLE)
 
 
 def test_about_any_axis_the_drift_of_a_misalignment_counts(tmp_path: Path) -> None:

@@ -1,0 +1,67 @@
+"""Intervals between the certified calibrations of a unit, and the rates at which its errors changed over them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from datetime import timedelta
+from itertools import pairwise
+
+import numpy as np
+
+from labctl.calibration import Calibration, read_calibration
+from labctl.errors import BadCalibrationFile
+from labctl.fitting.numeric.arrays import Array
+from labctl.services.calibrations.error_grid import ErrorGrid
+from labctl.store import CertifiedVersion, Store
+
+YEAR_S = timedelta(days=365.25).total_seconds()
+
+
+def versions_apart(
+    versions: Sequence[CertifiedVersion], last: CertifiedVersion, least: timedelta
+) -> list[CertifiedVersion]:
+    """Return the versions up to one by the times of their measurements, rising; that one is the last.
+
+    Of versions that lie closer together than `least`, or share a recording with the one before, the first counts.
+    """
+    earlier = [each for each in versions if each.version != last.version]
+    kept: list[CertifiedVersion] = []
+    for each in sorted(earlier, key=lambda one: (one.measured_at, one.version)):
+        if (not kept or _is_apart(kept[-1], each, least)) and _is_apart(each, last, least):
+            kept.append(each)
+    return [*kept, last]
+
+
+def _is_apart(before: CertifiedVersion, after: CertifiedVersion, least: timedelta) -> bool:
+    return after.measured_at - before.measured_at >= least and not before.recordings & after.recordings
+
+
+def calibrations_of(store: Store, versions: Sequence[CertifiedVersion]) -> dict[int, Calibration]:
+    """Return number of a calibration -> its content. Raises BadCalibrationFile, which names unit and version."""
+    documents = store.certified_versions.documents([each.id for each in versions])
+    found = {}
+    for each in versions:
+        try:
+            found[each.id] = read_calibration(documents[each.id])
+        except BadCalibrationFile as error:
+            raise BadCalibrationFile(
+                f"{each.serial} version {each.version}, which the drift until the due date is computed from: {error}; "
+                "run `labctl check`"
+            ) from error
+    return found
+
+
+def rates_of(
+    versions: Sequence[CertifiedVersion], calibrations: Mapping[int, Calibration], grid: ErrorGrid
+) -> tuple[Array, Array]:
+    """Return the changes of the errors by their years, (intervals, places) deg/s per year, and the years, (intervals,).
+
+    NaN where one of the versions is not valid; an interval between versions that cannot be compared is left out.
+    """
+    errors = [grid.errors_dps(calibrations[each.id]) for each in versions]
+    rates, years = [], []
+    for (before, old), (after, new) in pairwise(zip(versions, errors, strict=True)):
+        if old is not None and new is not None:
+            years.append((after.measured_at - before.measured_at).total_seconds() / YEAR_S)
+            rates.append((new - old) / years[-1])
+    return np.stack(rates) if rates else np.zeros((0, 0)), np.asarray(years, dtype=np.float64)
