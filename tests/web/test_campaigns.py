@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 
+from labctl.services.planning.loading import describe_plan
 from tests.helpers.browser import NARROW, Faults, Service
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Page
+    from playwright.sync_api import Browser, Page
 
 pytestmark = pytest.mark.timeout(300)
 
@@ -34,6 +36,29 @@ def test_a_campaign_is_planned_started_and_looked_back_at(service: Service, visi
     page.get_by_role("button", name="errors", exact=True).click()
     assert "level=error" in page.url
     expect(page.get_by_role("region", name="Events")).to_contain_text("No event of this kind")
+
+
+def test_a_plan_says_what_further_mountings_are_worth(tmp_path: Path, chromium: Browser) -> None:
+    from playwright.sync_api import expect
+
+    serving = Service(tmp_path, bench=None)
+    serving.start()
+    try:
+        page = chromium.new_page()
+        page.goto(f"{serving.url}/campaigns/new?recipe=quick-triaxial")
+        page.get_by_text("Misalignment: U").click()
+        rows = page.get_by_role("region", name="What further mountings of each position are worth").get_by_role("row")
+        plan = describe_plan("quick-triaxial", "triaxial-sim", clip=False)
+        assert plan.misalignment is not None
+        expect(rows).to_have_count(1 + len(plan.misalignment.further))
+        for row, more in enumerate(plan.misalignment.further, start=1):
+            expect(rows.nth(row)).to_contain_text(more.turned)
+            expect(rows.nth(row)).to_contain_text(more.recipe_toml)
+            said = float(rows.nth(row).get_by_role("cell").nth(1).inner_text().replace("−", "-"))
+            assert said == pytest.approx(more.expanded, rel=0.05)
+        page.close()
+    finally:
+        serving.stop()
 
 
 def test_what_the_bench_cannot_do_is_refused_or_left_out(visit: Callable[..., Page], faults: Faults) -> None:

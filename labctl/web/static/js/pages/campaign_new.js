@@ -3,13 +3,14 @@
 import { get, post } from "../core/http/api.js";
 import { isAbort, messageOf } from "../core/http/errors.js";
 import { setChildren, h } from "../core/elements.js";
-import { count, duration } from "../core/format.js";
+import { count, duration, percent } from "../core/format.js";
 import { busyIndicator, card, chip, factList, pageHeader, notice } from "../core/components.js";
 import { updateQuery } from "../core/router.js";
 import { attendanceNotice } from "../campaigns/attendance.js";
 import { SIMULATED } from "../campaigns/campaign_time.js";
 import { startForm } from "../campaigns/start_form.js";
 import { hiddenEffectForm } from "../campaigns/hidden_effects.js";
+import { mountingWorth } from "../campaigns/mounting_worth.js";
 import { planChart } from "../campaigns/plan_chart.js";
 import { recipeChoice } from "../campaigns/recipe_choice.js";
 import { visibilityReport } from "../campaigns/visibility.js";
@@ -176,6 +177,14 @@ function planCard(answer, bench) {
     "Steps",
     factList([
       ["Data sets", count(answer.datasets), "", `in ${count(answer.steps)} steps`],
+      answer.verification_datasets
+        ? [
+            "Of them to verify",
+            count(answer.verification_datasets),
+            "",
+            `never fitted, ${percent(answer.verification_s / answer.expected_s)} of the time`,
+          ]
+        : null,
       ["Expected time", duration(answer.expected_s), "", clock],
       [
         "Begun now it ends",
@@ -186,6 +195,7 @@ function planCard(answer, bench) {
       answer.bench === bench?.name ? null : ["Bench", answer.bench],
     ]),
     attendanceNotice(answer.attendance),
+    mountingWorth(answer.misalignment),
     planChart(`Plan of ${answer.recipe}`, () => ({ timeline: answer.timeline })),
     answer.clipped.length
       ? notice(
