@@ -20,6 +20,7 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from labctl.fitting.data.channels import BODY_AXES, Channels
 from labctl.fitting.numeric.arrays import Array
@@ -97,11 +98,7 @@ def angle_columns(channels: Channels, axis: str) -> AngleColumns:
         names += scheme.names
         values.append(shown @ scheme.separated)
         blocks.append(scheme.separated)
-    combined = np.zeros((len(names), sum(block.shape[1] for block in blocks)))
-    row = column = 0
-    for block in blocks:
-        combined[row : row + block.shape[0], column : column + block.shape[1]] = block
-        row, column = row + block.shape[0], column + block.shape[1]
+    combined = np.asarray(block_diag(*blocks)) if blocks else np.zeros((0, 0))
     return AngleColumns(tuple(names), combined, np.concatenate(values, axis=1))
 
 
