@@ -74,15 +74,19 @@ class Measurements:
 
     @cached_property
     def warnings(self) -> list[DataWarning]:
-        """What is wrong with the data; of several recordings each says which."""
+        """What is wrong with the data that are fitted; of several recordings each says which.
+
+        What is wrong with data sets that were measured to verify is an objection to certifying a version.
+        """
+        found_in = {n: [w for w in found.warnings if w.part == "fitted"] for n, found in self.inspections.items()}
         if len(self.rows) == 1:
-            return self.inspections[self.row.id].warnings
+            return found_in[self.row.id]
         return [
             warning.model_copy(
                 update={"where": f"recording {n}, {warning.where}", "text": f"recording {n}: {warning.text}"}
             )
-            for n, found in self.inspections.items()
-            for warning in found.warnings
+            for n, found in found_in.items()
+            for warning in found
         ]
 
     @property
