@@ -68,7 +68,7 @@ class AppliedVersion(ResponseModel):
     max_dps: float
     bias_dps: float
     part: Literal["verification", "all"] = Field(
-        description="verification: the error of the data sets that were measured to verify; all: the recording has none."
+        description="verification: error of the data sets that were measured to verify; all: the recording has none."
     )
 
 

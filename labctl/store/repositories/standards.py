@@ -158,8 +158,12 @@ class Standards:
 
     def has_findings(self) -> bool:
         """Return whether any standard was ever found bad: a point query before anything is compared."""
+        return self.last_finding() > 0
+
+    def last_finding(self) -> int:
+        """Return the number of the last act on the state of any standard; 0: there was none."""
         with self._database.reading() as connection:
-            return connection.execute(sa.select(tables.standard_findings.c.id).limit(1)).first() is not None
+            return last_finding(connection)
 
     def _registered(self, connection: sa.Connection, which: sa.ColumnElement[bool]) -> list[RegisteredStandard]:
         rows = connection.execute(sa.select(tables.standards).where(which).order_by(tables.standards.c.label)).all()
@@ -256,6 +260,11 @@ class Standards:
             )
             seal(connection, (kind, str(number)), at, act)
         return number
+
+
+def last_finding(connection: sa.Connection) -> int:
+    """Return the number of the last act on the state of any standard, as a transaction sees it; 0: there was none."""
+    return int(connection.scalar(sa.select(sa.func.max(tables.standard_findings.c.id))) or 0)
 
 
 def _taken(there: StandardRow, new: StandardRow) -> str:

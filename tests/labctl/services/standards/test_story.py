@@ -9,12 +9,14 @@ from contextlib import closing
 from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from labctl.errors import CertificationRefused
+from labctl.errors import CertificationRefused, Conflict
 from labctl.services.calibrations.certification import certify
 from labctl.services.calibrations.fitting import list_calibrations, one_version
+from labctl.services.certificates import issue as issuing
 from labctl.services.certificates.issue import CertificateRefused, issue
 from labctl.services.certificates.served import certificate_file, list_certificates
 from labctl.services.schemas.certification import CertifyRequest
@@ -175,3 +177,27 @@ def test_a_finding_that_was_wrong_is_withdrawn_and_stays_readable(tmp_path: Path
         assert answer.findings[0].withdrawn == "Q. Manager, 2025-09-15: the reference of the check was wrong"
         assert not list_calibrations(store, "FOG-B")[0].notices
         assert issue(store, "FOG-B", 1, request(), noon(FOUND)).number
+
+
+def test_a_standard_that_is_found_bad_while_a_certificate_is_written_refuses_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    on = date(2025, 3, 3)
+    with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
+        register.add(store)
+        register.certificate(store, "T-1", date(2024, 12, 1), 0.010, due="2025-12-31")
+        register.measured(store, "FOG-A", on, COUNTER, thermometer("T-1"))
+        write = issuing.forms_of
+
+        def found_bad_meanwhile(*given: Any) -> Any:
+            register.bad(store, on, on, on)
+            return write(*given)
+
+        with monkeypatch.context() as patched:
+            patched.setattr(issuing, "forms_of", found_bad_meanwhile)
+            with pytest.raises(Conflict, match=r"no certificate of FOG-A version 1 was stored.*send the request again"):
+                issue(store, "FOG-A", 1, request(), noon(on))
+        assert store.certificates.of_unit("FOG-A") == []
+        assert not [row for row in store.audit.rows() if row.action == "certificate"]
+        with pytest.raises(CertificateRefused, match="Pt100-7 was found bad"):
+            issue(store, "FOG-A", 1, request(), noon(on))
