@@ -36,8 +36,8 @@ class CertificateFile:
         }  # fmt: skip
         if (withdrawn := notice_of(now)) is not None:
             found[HEADER] = withdrawn.header()
-        if (instead := now.replaced_by or now.superseded_by) is not None:
-            found["X-Labctl-Replaced-By"] = instead
+        if now.valid_instead is not None:
+            found["X-Labctl-Replaced-By"] = now.valid_instead
         return found
 
 

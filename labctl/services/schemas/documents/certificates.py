@@ -163,7 +163,8 @@ class CertificateResponse(ResponseModel):
     )
     superseded_by: str | None = Field(
         default=None,
-        description="Number of the certificate of the version that was certified last; null: it is of this version.",
+        description="Number of the certificate of the version that was certified last; null: it is of this version, "
+        "or was withdrawn.",
     )
     state: CertificateState = Field(
         default="valid",
