@@ -141,17 +141,31 @@ class Notices:
 
     def of_recordings(self, recordings: Sequence[int]) -> list[str]:
         """Return a sentence for each finding on a standard that the recordings were measured with, on those days."""
+        return [finding_text(standard, finding) for standard, finding in self._touching(recordings)]
+
+    def for_customers(self, recordings: Sequence[int]) -> list[str]:
+        """Return the same for who holds a certificate: without the person and the reason, which are the laboratory's.
+
+        What the standard is, the certificate says.
+        """
+        return [
+            f"Reference standard {standard.row.label}, which was used on these days, was found bad from "
+            f"{_days_text(finding)}. Ask the laboratory before you rely on the certificate."
+            for standard, finding in self._touching(recordings)
+        ]
+
+    def _touching(self, recordings: Sequence[int]) -> list[tuple[RegisteredStandard, StandardFinding]]:
         if not self.bad:
             return []
         rows = [self.store.recordings.get(number) for number in recordings]
-        return list(
-            dict.fromkeys(
-                finding_text(standard, finding)
-                for standard, finding in self.bad
+        return [
+            (standard, finding)
+            for standard, finding in self.bad
+            if any(
+                uses(row, standard) and overlaps(*self._performed(row), finding.bad_from, finding.bad_until)
                 for row in rows
-                if uses(row, standard) and overlaps(*self._performed(row), finding.bad_from, finding.bad_until)
             )
-        )
+        ]
 
     def _performed(self, row: RecordingRow) -> tuple[date, date | None]:
         if row.id not in self._days:
@@ -161,8 +175,11 @@ class Notices:
 
 def finding_text(standard: RegisteredStandard, finding: StandardFinding) -> str:
     """Return a finding in one sentence."""
-    until = f"until {finding.bad_until}" if finding.bad_until else "until now"
     return (
-        f"standard {standard.row.label} was found bad from {finding.bad_from} {until} ({finding.reason}; {finding.by}, "
+        f"standard {standard.row.label} was found bad from {_days_text(finding)} ({finding.reason}; {finding.by}, "
         f"{finding.at:%Y-%m-%d})"
     )
+
+
+def _days_text(finding: StandardFinding) -> str:
+    return f"{finding.bad_from} until {finding.bad_until or 'now'}"

@@ -201,3 +201,6 @@ class PublicCertificate(ResponseModel):
     replaced_by: str | None
     superseded_by: str | None
     valid_instead: str | None
+    notices: list[str] = Field(
+        description="Findings on the reference standards behind it since it was issued; without persons and reasons."
+    )

@@ -18,7 +18,7 @@ from labctl.services.calibrations.certification import certify
 from labctl.services.calibrations.fitting import list_calibrations, one_version
 from labctl.services.certificates import issue as issuing
 from labctl.services.certificates.issue import CertificateRefused, issue
-from labctl.services.certificates.served import certificate_file, list_certificates
+from labctl.services.certificates.served import certificate_file, list_certificates, public_certificate
 from labctl.services.schemas.certification import CertifyRequest
 from labctl.services.schemas.standards import StandardResponse, WithdrawFindingRequest
 from labctl.services.standards.register import one_standard, withdraw_finding
@@ -90,7 +90,12 @@ def test_they_have_a_notice_wherever_they_are_shown(laboratory: Laboratory) -> N
     assert not one_version(store, "FOG-C", 1).notices
     assert unit(store, "FOG-B", noon(FOUND)).notices  # its version in force
     assert not unit(store, "FOG-A", noon(FOUND)).notices
-    assert list_certificates(store, "FOG-A")[-1].notices == [notice]
+    touched = list_certificates(store, "FOG-A")[-1]
+    assert touched.notices == [notice]
+    _, hash_ = store.calibrations.document("FOG-A", 2)
+    (said,) = public_certificate(store, touched.number, hash_).notices  # behind the QR code
+    assert "Pt100-7, which was used on these days, was found bad from 2025-04-01 until 2025-09-15. Ask" in said
+    assert "sheath" not in said  # what the laboratory wrote for itself
 
 
 def test_new_certificates_of_them_are_refused_and_the_others_are_issued(laboratory: Laboratory) -> None:
