@@ -10,7 +10,14 @@ from instruments.standards import Standard
 from labctl.errors import BadInput
 from labctl.recording import RecordingInfo
 from labctl.services.schemas.standards import AffectedCalibration, AffectedResponse
-from labctl.store import CalibrationRecord, RecordingRow, RegisteredStandard, StandardFinding, Store
+from labctl.store import (
+    CalibrationRecord,
+    RecordingRow,
+    RegisteredStandard,
+    StandardCertificate,
+    StandardFinding,
+    Store,
+)
 
 
 def performed(store: Store, row: RecordingRow) -> tuple[date, date | None]:
@@ -25,10 +32,26 @@ def performed(store: Store, row: RecordingRow) -> tuple[date, date | None]:
 
 
 def is_entry_of(standard: RegisteredStandard, entry: Standard) -> bool:
-    """Return whether an entry of a bench file is this standard: by its label or serial number, or a certificate."""
-    numbers = {each.number for each in standard.certificates}
-    by_certificate = entry.certificate in numbers and entry.quantity == standard.row.quantity
-    return by_certificate or is_named(standard, entry)
+    """Return whether an entry of a bench file is this standard: by its label or serial number, or a certificate.
+
+    Laboratories number their certificates by themselves: number and issuer together name one.
+    """
+    return is_named(standard, entry) or any(
+        same_issuer(each.laboratory, entry.issued_by) for each in numbered(standard, entry)
+    )
+
+
+def numbered(standard: RegisteredStandard, entry: Standard) -> list[StandardCertificate]:
+    """Return the certificates of a standard that have the number, and are of the quantity, of an entry."""
+    if not entry.certificate or entry.quantity != standard.row.quantity:
+        return []
+    return [each for each in standard.certificates if each.number == entry.certificate]
+
+
+def same_issuer(first: str, second: str) -> bool:
+    """Return whether two statements of who issued a certificate agree: by their letters, or one does not say."""
+    names = ["".join(filter(str.isalnum, name)).casefold() for name in (first, second)]
+    return not all(names) or names[0] == names[1]
 
 
 def is_named(standard: RegisteredStandard, entry: Standard) -> bool:

@@ -97,9 +97,17 @@ class RegisteredStandard:
 
     @property
     def in_force(self) -> tuple[StandardCertificate, ...]:
-        """The certificates by day, of each number the newest row."""
-        newest = {each.number: each for each in self.certificates}
-        return tuple(sorted(newest.values(), key=lambda each: each.calibrated))
+        """The certificates by day. A row with a reason replaces one of its number, best one of its laboratory.
+
+        A row without a reason is another certificate, also where another laboratory used the same number.
+        """
+        found: list[StandardCertificate] = []
+        for each in self.certificates:
+            alike = [one for one in found if one.number == each.number]
+            if each.reason and alike:
+                found.remove(next((one for one in alike if one.laboratory == each.laboratory), alike[-1]))
+            found.append(each)
+        return tuple(sorted(found, key=lambda each: each.calibrated))
 
     @property
     def bad(self) -> tuple[StandardFinding, ...]:
