@@ -65,7 +65,8 @@ class Request(BaseModel):
         for text in _texts(value):
             if found := control_character(text, lines=lines):
                 what = "a line break, tab or other control character" if not lines else "a control character"
-                raise PydanticCustomError("control_character", f"it has {what} ({found}); write it without")
+                words = "it has {what} ({found}); write it without"
+                raise PydanticCustomError("control_character", words, {"what": what, "found": found})
         return value
 
 
