@@ -39,7 +39,7 @@ class WriterTurn:
         self._is_over = False
 
     def end(self, within_s: float) -> bool:
-        """Let nobody write from now on; waits `within_s` for who writes now. Returns whether the connection is free."""
+        """Refuse writers from now on; waits `within_s` for who writes now. Returns whether the connection is free."""
         if not self._lock.acquire(timeout=within_s):
             return False
         self._is_over = True

@@ -22,7 +22,7 @@ WAIT_S = 20.0
 
 
 class SlowStore:
-    """A store whose transaction lasts until it is let go, and that notes a use after it was closed."""
+    """A store whose transaction lasts until `go_on` is set, and that notes a use after it was closed."""
 
     def __init__(self) -> None:
         self.begun, self.go_on = threading.Event(), threading.Event()

@@ -56,7 +56,7 @@ def test_a_database_is_closed_after_the_transaction_that_is_under_way(tmp_path: 
                 begun.set()
                 go_on.wait(20.0)
                 append(connection, AT, "journal", "campaign 1", {})
-        except BaseException as error:  # noqa: BLE001  looked at below
+        except BaseException as error:  # noqa: BLE001  compared below
             failed.append(error)
 
     writer, closer = threading.Thread(target=record), threading.Thread(target=store.close)

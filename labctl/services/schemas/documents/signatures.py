@@ -56,7 +56,7 @@ class VerifiedFileResponse(ResponseModel):
     )
     signed_by: SignatoryResponse | None = Field(
         description="Who signed the file: by the valid signature of the PDF or the DCC itself, of a JSON file by the "
-        "register; null: nobody."
+        "register; null: no signature."
     )
     expected_signers: list[str] = Field(
         description="Signers that were named as expected: subjects or fingerprints; empty: any signer is accepted."
