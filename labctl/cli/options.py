@@ -40,7 +40,7 @@ RecordingIds = Annotated[
         "--recording",
         metavar="ID[,ID...]",
         help="Number of the recording, or several numbers to use recordings together, such as 1,2,3; default: "
-        "the unit's newest recording.",
+        "the unit's newest recording that can be fitted.",
     ),
 ]
 RecordingId = Annotated[

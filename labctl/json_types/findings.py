@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, NotRequired
 
 from typing_extensions import TypedDict
 
 #: "certain": a fit of such data is wrong and is refused; "likely": it may be meant so, and is said.
 Severity = Literal["certain", "likely"]
 
+#: The part of a recording: what a fit takes in, or what was measured to verify a calibration.
+Part = Literal["fitted", "verification"]
+
 
 class FindingJson(TypedDict):
-    """One thing that is wrong: what, where, its value, what was expected, what to do; `text`: all of it."""
+    """One thing that is wrong: what, where, its value, what was expected, what to do; `text`: all of it.
+
+    A finding that was kept before `part` was added concerns the whole recording.
+    """
 
     what: str
     severity: Severity
@@ -22,3 +28,4 @@ class FindingJson(TypedDict):
     expected: str
     do: str
     text: str
+    part: NotRequired[Part]

@@ -10,18 +10,24 @@ from typing import Any
 
 from instruments.clock import Clock
 from labctl.acting_user import acting
+from labctl.errors import BenchSilent
+from labctl.log import get_logger
 from labctl.log.context import for_request
-from labctl.processes.calls import Answer, Call, answer_with
+from labctl.processes.calls import Answer, Call, UnderWay, answer_with
 from labctl.processes.held_address import HeldAddress
 from labctl.processes.supervision import Supervision
 from labctl.services.commands.context import CommandContext
 from labctl.services.local_bench import LocalBench
 from labctl.store import Store
 
+log = get_logger()
+
 #: A watcher gets a sign of life this often, s,
 BEAT_S = 1.0
 #: and of changes at most this often, s.
 LEAST_BEAT_S = 0.1
+#: Calls that are under way when the process ends have so long to be answered, s.
+UNDER_WAY_S = 2.0
 #: Acts of a person on a campaign; each is a method of CampaignControl.
 CONTROL = frozenset({"start", "schedule", "resume", "pause", "abort", "confirm", "check"})
 
@@ -44,6 +50,7 @@ class BenchCalls:
     ) -> None:
         """`clock` has the date of the service."""
         self._store, self._local, self._supervision, self._address = store, local, supervision, address
+        self._under_way = UnderWay()
         self._context = CommandContext(lambda: store, clock, local.control)
 
     def answer(self, call: Call, connection: Connection) -> Answer | None:
@@ -54,10 +61,23 @@ class BenchCalls:
         if call.name == "watch":
             self._watch(connection)
             return None
-        if call.name == "supervise":
-            return self._supervise(call, connection)
-        with acting(call.actor), for_request(getattr(call, "request_id", "")):  # an older service sends none
-            return answer_with(lambda: self._value(call))
+        if not self._under_way.begin():
+            return Answer(raised=BenchSilent("the bench process is ending; wait for its restart, then try again"))
+        try:
+            if call.name == "supervise":
+                return self._supervise(call, connection)
+            with acting(call.actor), for_request(getattr(call, "request_id", "")):  # an older service sends none
+                return answer_with(lambda: self._value(call))
+        finally:
+            self._under_way.end()
+
+    def close(self) -> None:
+        """Refuse every call from now on, and wait for those that use bench and database, `UNDER_WAY_S` at most.
+
+        No stop waits for it: a stop has a socket and a thread of its own.
+        """
+        if left := self._under_way.close(UNDER_WAY_S):
+            log.warning("calls.under_way", count=left, waited_s=UNDER_WAY_S)
 
     def _supervise(self, call: Call, connection: Connection) -> Answer | None:
         answer = answer_with(lambda: self._supervision.take_charge(call.args[0], connection))

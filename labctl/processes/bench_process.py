@@ -99,9 +99,9 @@ class BenchProcess:
         )
         if local.scheduler is not None:
             local.scheduler.attended = lambda: self._supervision.alone_s == 0.0
-        calls = BenchCalls(store, local, self._supervision, self._address, WallClock(settings.ahead))
+        self._calls = BenchCalls(store, local, self._supervision, self._address, WallClock(settings.ahead))
         self._stop_server = StopServer(settings.folder / STOP, local.request_stop)
-        self._call_server = CallServer(settings.folder / CALLS, calls.answer)
+        self._call_server = CallServer(settings.folder / CALLS, self._calls.answer)
 
     def run(self, line: Connection) -> None:
         """Serve until asked to end, or left alone; the bench is safe and the database closed when this returns."""
@@ -153,6 +153,7 @@ class BenchProcess:
             left = self._local.close()
         finally:
             self._call_server.close()
+            self._calls.close()  # the callers that are connected; nothing uses the database after them
             with contextlib.suppress(LabctlError):
                 self._store.close()
             self._note.write_left(left)

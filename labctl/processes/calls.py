@@ -48,6 +48,33 @@ class Answer:
 Respond = Callable[[Call, Connection], Answer | None]
 
 
+class UnderWay:
+    """Counts the calls that are being answered, until no more may begin. Any thread may use it."""
+
+    def __init__(self) -> None:
+        self._count, self._is_over = 0, False
+        self._changed = threading.Condition()
+
+    def begin(self) -> bool:
+        """Begin a call; returns whether it may."""
+        with self._changed:
+            self._count += not self._is_over
+            return not self._is_over
+
+    def end(self) -> None:
+        """End a call that was begun."""
+        with self._changed:
+            self._count -= 1
+            self._changed.notify_all()
+
+    def close(self, within_s: float) -> int:
+        """Let none begin from now on; returns how many are still under way after `within_s` at most."""
+        with self._changed:
+            self._is_over = True
+            self._changed.wait_for(lambda: self._count == 0, within_s)
+            return self._count
+
+
 class CallServer:
     """Answers calls at a Unix socket: each caller in a thread of its own, or all in turn in one thread."""
 

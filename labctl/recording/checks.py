@@ -17,6 +17,7 @@ from labctl.recording.motions.constant_rate import rate_change
 from labctl.recording.motions.turns import check_turns, mean_rate_dps
 from labctl.recording.positions import EXPECTED, Position
 from labctl.recording.recording import Column
+from labctl.texts import control_character
 
 #: Values outside of these ranges are in another unit, or mistakes.
 POSSIBLE = {"table_rate_dps": (-1e5, 1e5), "temperature_c": (-273.15, 1000.0), "chamber_c": (-273.15, 1000.0)}
@@ -35,6 +36,7 @@ NO_REFERENCE = (
 
 def checked(path: Path, info: RecordingInfo, columns: dict[str, Column]) -> dict[str, Column]:
     """Return the columns with the format's defaults filled in; raises BadRecording on the first thing that is wrong."""
+    _texts(path, info)
     _datasheet(path, info)
     for name in needed(info):
         if name not in columns:
@@ -170,6 +172,15 @@ def _one_rate(path: Path, columns: dict[str, Column]) -> None:
             f"{change.dataset}, which began at {change.before_dps:g} deg/s; a data set has one rate: give the "
             "readings at another rate a separate data set number, or mark them with valid = 0"
         )
+
+
+def _texts(path: Path, info: RecordingInfo) -> None:
+    for name, text in (
+        ("model", info.model), ("active_calibration", info.active_calibration), ("notes", info.notes),
+        ("thermometer", info.thermometer),
+    ):  # fmt: skip
+        if found := control_character(text, lines=name == "notes"):
+            raise BadRecording(f"{path}: {name} has a control character ({found}); write it without")
 
 
 def _datasheet(path: Path, info: RecordingInfo) -> None:

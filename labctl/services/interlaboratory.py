@@ -15,7 +15,7 @@ from labctl.metrology.interlaboratory import Result, en_number, en_performance, 
 from labctl.services.cache import UNNAMED, compute
 from labctl.services.calibrations.uncertainty import coefficients_at
 from labctl.services.schemas.validity import ComparedCalibration, ComparedResult, LaboratoryComparison
-from labctl.services.standards.usage import performed
+from labctl.services.standards.usage import performed, same_issuer
 from labctl.store import CalibrationRecord, Store
 
 ROOM_C = 25.0
@@ -102,7 +102,11 @@ def _is_shared(standard: Standard, sides: tuple[_Side, _Side]) -> bool:
 
     What settings of a bench file state has no certificate: it is one thing only on one bench.
     """
-    same = [each for each in sides[1].standards if each.label == standard.label]
+    same = [
+        each
+        for each in sides[1].standards
+        if each.label == standard.label and same_issuer(each.issued_by, standard.issued_by)
+    ]
     if not same:
         return False
     first, second = (side.described.bench for side in sides)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 
 from instruments.bench_config import BenchFile
 from instruments.clock import Clock
@@ -78,6 +79,9 @@ class LocalBench:
             if self.runner is not None:
                 self.runner.stops.watch()
                 self.runner.safe_state.start()
+                if self.scheduler is not None:
+                    with suppress(StoreError):  # read again with the schedule
+                        self.scheduler.read_the_past()
                 self.runner.resume_unfinished()
             if self.scheduler is not None:
                 self.scheduler.start()

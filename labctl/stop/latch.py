@@ -46,7 +46,7 @@ class StopRequest:
     ) -> StopRequest:
         """Return a request of this moment."""
         at = WallClock().utc().isoformat(timespec="milliseconds")
-        return cls(stop_id or uuid4().hex[:16], at, by[:200], via, reason[:500], campaign, holds)
+        return cls(stop_id or uuid4().hex[:16], at, _plain(by[:200]), via, _plain(reason[:500]), campaign, holds)
 
 
 @dataclass(frozen=True)
@@ -181,6 +181,11 @@ class StopLatch:
 
 def _now() -> str:
     return WallClock().utc().isoformat(timespec="milliseconds")
+
+
+def _plain(text: str) -> str:
+    """Return a text with a space in place of each control character: no stop is refused for its words."""
+    return "".join(each if each.isprintable() else " " for each in text)
 
 
 def _unnamed(stop_id: str, reason: str) -> StopRequest:

@@ -89,7 +89,7 @@ def certificate(
     """The certificate as a file, always the same bytes; the ETag is the hash of its JSON and the format.
 
     `X-Labctl-State` is valid, amended, superseded or withdrawn; `X-Labctl-Withdrawn` says when, by whom and why, and
-    `X-Labctl-Replaced-By` is the number of the certificate that replaces it.
+    `X-Labctl-Replaced-By` is the number of the certificate that is valid instead; absent: none is.
     """
     file = certificate_file(service.store, serial, version, format, number)
     headers = file.headers()

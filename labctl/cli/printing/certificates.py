@@ -18,8 +18,5 @@ def state_text(answer: CertificateResponse) -> str:
     if answer.state == "valid" or answer.state_since is None:
         return answer.state
     why = f" ({answer.state_reason})" if answer.state_reason else ""
-    instead = answer.replaced_by or answer.superseded_by
-    return (
-        f"{answer.state} since {answer.state_since:%Y-%m-%d %H:%M} UTC by {answer.state_by}{why}"
-        f"{f'; replaced by {instead}' if instead else ''}"
-    )
+    instead = f"valid instead: {answer.valid_instead}" if answer.valid_instead else "none is valid instead"
+    return f"{answer.state} since {answer.state_since:%Y-%m-%d %H:%M} UTC by {answer.state_by}{why}; {instead}"

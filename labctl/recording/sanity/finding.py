@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from labctl.json_types.findings import FindingJson, Severity
+from labctl.json_types.findings import FindingJson, Part, Severity
 
 
 @dataclass(frozen=True)
@@ -20,6 +20,7 @@ class Finding:
     unit: str
     expected: str
     do: str
+    part: Part = "fitted"  #: of the recording: what a fit takes in, or what was measured to verify a calibration
 
     @property
     def text(self) -> str:
@@ -30,7 +31,7 @@ class Finding:
         """Return the finding as JSON, with its sentence."""
         return {
             "what": self.what, "severity": self.severity, "where": self.where, "said": self.said, "value": self.value,
-            "unit": self.unit, "expected": self.expected, "do": self.do, "text": self.text,
+            "unit": self.unit, "expected": self.expected, "do": self.do, "text": self.text, "part": self.part,
         }  # fmt: skip
 
 

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from labctl.recording.columns import VERIFICATION
 from labctl.recording.recording import Columns, Recording
 from labctl.recording.sanity.finding import Finding
 from labctl.recording.sanity.gain import check_responses
@@ -22,20 +25,32 @@ def inspect_recording(recording: Recording) -> list[Finding]:
 
 
 def findings_of(summary: Summary, environment: Columns | None = None) -> list[Finding]:
-    """Return the findings of a summary, the certain ones first."""
+    """Return the findings of a summary, the certain ones first.
+
+    What is fitted and what was measured to verify a calibration are examined apart: neither hides a fault of the other,
+    and each finding names its part.
+    """
     if len(summary) == 0:
         return []
+    aside = np.asarray(summary[VERIFICATION], dtype=np.bool_)
+    found = _findings(summary.take(~aside), environment) if not aside.all() else []
+    if aside.any():
+        of_part = _findings(summary.take(aside), None)
+        found += [replace(each, part="verification", where=f"verification part, {each.where}") for each in of_part]
+    return sorted(found, key=lambda finding: finding.severity != "certain")
+
+
+def _findings(summary: Summary, environment: Columns | None) -> list[Finding]:
     if summary.info.motion == "poses":  # no rate is known that an output could follow
-        return sorted(check_time(summary, environment), key=lambda finding: finding.severity != "certain")
+        return list(check_time(summary, environment))
     if summary.info.motion == "profile":  # a rate may change, and so may the output
-        found = [*check_responses(summary, responses(summary)), *check_time(summary, environment)]
-        return sorted(found, key=lambda finding: finding.severity != "certain")
+        return [*check_responses(summary, responses(summary)), *check_time(summary, environment)]
     off = off_turns(summary)
     sound = np.ones(len(summary), dtype=bool)
     sound[[turn.row for turn in off]] = False
     trusted = summary.take(sound) if off else summary
     whole = summary.take(~np.any([with_two_rates(summary, axis) for axis in summary.info.axes], axis=0))
-    found = [
+    return [
         *check_turned(summary, off),
         *check_responses(trusted, responses(trusted)),
         *(check_outlying(whole, responses(whole)) if summary.info.motion != "turns" else ()),
@@ -46,4 +61,3 @@ def findings_of(summary: Summary, environment: Columns | None = None) -> list[Fi
         *check_time(summary, environment),
         *check_reference(summary),
     ]
-    return sorted(found, key=lambda finding: finding.severity != "certain")

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.recording.columns import VERIFICATION
 from labctl.recording.info import RecordingInfo
 from labctl.recording.motions.turn_means import rates_as_turned
 from labctl.recording.motions.turns import USUAL_U_DEG
@@ -21,6 +22,7 @@ from labctl.recording.quantisation import codes_of
 from labctl.recording.recording import Columns, Recording
 from labctl.recording.sanity.blocks import NO_CHANGE, level_change, noise_of_reading, wander
 from labctl.recording.sanity.profile import lag_of, stretches
+from labctl.recording.verification import is_marked
 
 #: Time steps longer than this many usual ones, and than so many seconds, are a gap.
 GAP_STEPS, GAP_S = 5.0, 0.5
@@ -142,6 +144,7 @@ def _place(info: RecordingInfo, rows: Columns, row: int) -> dict[str, Any]:
         "dataset": int(rows["dataset"][row]),
         "position": str(rows["position"][row]) if "position" in rows else info.axes[0],
         "run": int(rows["run"][row]) if "run" in rows else 1,
+        VERIFICATION: bool(rows[VERIFICATION][row]) if VERIFICATION in rows else False,
     }
 
 
@@ -210,6 +213,7 @@ def _of_means(recording: Recording) -> Summary:
         "position": np.asarray(rows["position"]).astype(np.str_) if "position" in rows else np.full(m, info.axes[0]),
         "run": np.asarray(rows["run"]) if "run" in rows else np.ones(m, dtype=np.int64),
         "n": np.asarray(rows["n"]) if "n" in rows else np.ones(m, dtype=np.int64),
+        VERIFICATION: is_marked(recording),
         "table_rate_dps": rate, "rate_low_dps": rate, "rate_high_dps": rate,
         "temperature_c": warm, "temperature_low_c": warm, "temperature_high_c": warm,
         "t_begin_s": t_s, "t_end_s": t_s, **_encoder(rows, m),

@@ -140,7 +140,7 @@ def _errors(row: CalibrationRecord) -> CertifiedErrors:
 
 
 def _of_data(store: Store, row: CalibrationRecord) -> Iterator[Objection]:
-    """Yield what is certainly wrong with the data that a version was fitted to."""
+    """Yield what is certainly wrong with the recordings of a version: what was fitted, and what was to verify it."""
     if row.recording is None:
         return
     for number, warning in (
@@ -148,4 +148,5 @@ def _of_data(store: Store, row: CalibrationRecord) -> Iterator[Objection]:
     ):
         if warning.severity == "certain":
             said = f"recording {number}: {warning.where}: {warning.said} (expected {warning.expected})"
-            yield Objection(what="data", text=said, do=f"{warning.do}, and fit again")
+            again = "fit again" if warning.part == "fitted" else "measure the verification part again"
+            yield Objection(what="data", text=said, do=f"{warning.do}, and {again}")

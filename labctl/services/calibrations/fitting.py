@@ -15,10 +15,9 @@ from labctl.services.calibrations.certification import certification_response, v
 from labctl.services.calibrations.comparison import worse_than_raw
 from labctl.services.calibrations.next_version import keep_next_version
 from labctl.services.calibrations.remembered import remembered_by
-from labctl.services.criticism.measurements import Measurements
+from labctl.services.criticism.measurements import measurements_of
 from labctl.services.fixed_coefficients import fixed_of
 from labctl.services.recordings.inspection import as_json, refuse_wrong, warning_of
-from labctl.services.recordings.loading import chosen_rows
 from labctl.services.schemas.calibrations import (
     CalibrationRow,
     FitRequest,
@@ -37,7 +36,7 @@ def fit_unit(store: Store, serial: str, request: FitRequest, at: datetime, *, is
     DataRefused for data that are certainly wrong and for a fit that is worse than none. A draft (`is_draft`) is kept
     once: raises Conflict for another one.
     """
-    measured = Measurements(store, chosen_rows(store, serial, request.recording, request.recordings))
+    measured = measurements_of(store, serial, request.recording, request.recordings)
     recording, campaign, recordings = measured.row.id, measured.row.campaign, measured.recordings
     what = f"fit of {measured.named} of {serial}"
     refuse_wrong(measured.warnings, what, accepted=request.accept_warnings)

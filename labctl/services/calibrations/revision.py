@@ -26,11 +26,10 @@ from labctl.services.calibrations.comparison import worse_than_before
 from labctl.services.calibrations.fitting import days_of, reference_of, several
 from labctl.services.calibrations.next_version import keep_next_version
 from labctl.services.criticism.evaluation import model_of
-from labctl.services.criticism.measurements import Measurements
+from labctl.services.criticism.measurements import Measurements, measurements_of
 from labctl.services.criticism.residuals import residual_columns
 from labctl.services.criticism.versions import version_of
 from labctl.services.recordings.inspection import as_json, refuse_wrong, warning_of
-from labctl.services.recordings.loading import chosen_rows
 from labctl.services.schemas.calibrations import (
     ImproveRequest,
     ImproveResponse,
@@ -113,7 +112,7 @@ def _asked(store: Store, serial: str, request: ImproveRequest, row: CalibrationR
     wanted: Sequence[int] = request.recordings
     if request.recording is None and not wanted and len(row.recordings) > 1:
         wanted = row.recordings
-    return Measurements(store, chosen_rows(store, serial, request.recording, wanted))
+    return measurements_of(store, serial, request.recording, wanted)
 
 
 def _question(row: CalibrationRecord, measured: Measurements, request: ImproveRequest) -> dict[str, object]:

@@ -35,8 +35,8 @@ class CertificateRefused(Conflict):
 def issue(store: Store, serial: str, version: int, request: CertificateRequest, at: datetime) -> CertificateResponse:
     """Issue the certificate of a version at an aware time; one that was issued is answered as it is.
 
-    Raises NotFound, MissingFacts, CertificateRefused, Conflict where other facts are given for one that was issued,
-    BadInput for a signing key that cannot be used.
+    Raises NotFound, MissingFacts, CertificateRefused, Conflict where other facts are given for one that was issued and
+    where a standard was found bad while it was being written, BadInput for a signing key that cannot be used.
     """
     kept = store.certificates.newest(store.units.get(serial).serial, version)
     if kept is not None and request.amend is None:
@@ -44,6 +44,7 @@ def issue(store: Store, serial: str, version: int, request: CertificateRequest, 
     if kept is None and request.amend is not None:
         raise CertificateRefused(f"{serial} version {version} has no certificate to amend; issue one without --amend")
     order = CertificateOrder.model_validate(kept.order) if kept and not _given(request) else request.order
+    last = store.standards.last_finding()  # before the evidence is read: a later one is found when it is stored
     facts = facts_of(store, serial, version, order)
     found = Found.of(store, facts)
     refuse(facts, found)
@@ -61,7 +62,7 @@ def issue(store: Store, serial: str, version: int, request: CertificateRequest, 
         hash_of_certificate(forms.document), order.model_dump(mode="json", exclude_defaults=True), acting_key(),
         signed_by=None if certificate.signed_by is None else certificate.signed_by.model_dump(mode="json"),
     )  # fmt: skip
-    return certificate_by_number(store, store.certificates.add(row, forms).number)
+    return certificate_by_number(store, store.certificates.add(row, forms, last).number)
 
 
 def withdraw(store: Store, request: WithdrawRequest, at: datetime) -> CertificateResponse:

@@ -10,6 +10,7 @@ from labctl.errors import BadInput, NotFound
 from labctl.services.certificates.address import HASH_DIGITS
 from labctl.services.certificates.states import certificate_by_number, list_certificates
 from labctl.services.schemas.documents.certificates import CertificateResponse, PublicCertificate
+from labctl.services.standards.usage import Notices
 from labctl.store import Store
 from labctl.withdrawal import HEADER, Withdrawn
 
@@ -36,8 +37,8 @@ class CertificateFile:
         }  # fmt: skip
         if (withdrawn := notice_of(now)) is not None:
             found[HEADER] = withdrawn.header()
-        if (instead := now.replaced_by or now.superseded_by) is not None:
-            found["X-Labctl-Replaced-By"] = instead
+        if now.valid_instead is not None:
+            found["X-Labctl-Replaced-By"] = now.valid_instead
         return found
 
 
@@ -93,5 +94,6 @@ def public_certificate(store: Store, number: str, calibration: str) -> PublicCer
     if len(calibration) < HASH_DIGITS or not hash_.startswith(calibration.lower()):
         raise none
     issued = json.loads(store.certificates.forms(number).document)
-    said = now.model_dump(include=set(PublicCertificate.model_fields))
-    return PublicCertificate(**said, calibration_hash=hash_, laboratory=issued["laboratory"]["name"])
+    said = now.model_dump(include=set(PublicCertificate.model_fields) - {"notices"})
+    notices = Notices.of(store).for_customers(store.calibrations.get(now.serial, now.version).recordings)
+    return PublicCertificate(**said, calibration_hash=hash_, laboratory=issued["laboratory"]["name"], notices=notices)

@@ -2,7 +2,8 @@
 
 withdrawn: by its number, or with its version when that was revoked. amended: another certificate of the same version
 replaces it. superseded: another version of the unit was certified later, and has a certificate. valid: none of these.
-A state goes before those after it in this list.
+A state goes before those after it in this list. None comes back by itself: a certificate stays amended or superseded
+when the one that took its place is withdrawn. It then says so, and names only a valid one as the one to use instead.
 """
 
 from __future__ import annotations
@@ -71,12 +72,20 @@ def _change(
     if (act := revoked.get(row.version)) is not None:  # revoked while the certificate was being written
         return _Change("withdrawn", act.at, act.reason, act.by, act.by_key)
     if (amendment := amended_by.get(row.number)) is not None:
-        return _Change("amended", amendment.at, amendment.reason, amendment.by, amendment.by_key)
+        why = amendment.reason
+        if _is_gone(amendment, revoked):
+            why += f"; certificate {amendment.number}, which replaces it, was withdrawn"
+        return _Change("amended", amendment.at, why, amendment.by, amendment.by_key)
     if last is not None and last.version != row.version:
         act = certified[last.version]
-        why = f"version {last.version} of the unit was certified, and has certificate {last.number}"
+        too = ", which was withdrawn" if _is_gone(last, revoked) else ""
+        why = f"version {last.version} of the unit was certified, and has certificate {last.number}{too}"
         return _Change("superseded", max(act.at, last.at), why, act.by, act.by_key)
     return _Change("valid", row.at, "", row.by, row.by_key)
+
+
+def _is_gone(row: CertificateRow, revoked: Mapping[int, CertificationRow]) -> bool:
+    return row.withdrawal is not None or row.version in revoked
 
 
 def _response(
@@ -86,7 +95,7 @@ def _response(
     last: CertificateRow | None,
     valid: str | None,
 ) -> CertificateResponse:
-    superseded = last is not None and last.version != row.version
+    superseded = last is not None and last.version != row.version and last.number == valid
     return CertificateResponse(
         serial=row.serial, version=row.version, number=row.number, issued_at=row.at, by=row.by, by_key=row.by_key,
         hash=row.hash, replaces=row.replaces, reason=row.reason,

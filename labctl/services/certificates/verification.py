@@ -6,21 +6,25 @@ import hashlib
 import html
 import json
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from labctl.certificates.document import TITLE
+from labctl.certificates.document import TITLE, Signatory
 from labctl.certificates.signing import libraries
+from labctl.config import SIGNER_VARIABLE, variable
 from labctl.errors import BadInput
 from labctl.services.certificates.served import CertificateFormat
 from labctl.services.certificates.states import certificate_by_number
-from labctl.services.schemas.documents.certificates import SignatoryResponse
+from labctl.services.schemas.documents.certificates import CertificateState, SignatoryResponse
 from labctl.services.schemas.documents.signatures import SignatureResponse, VerifiedFileResponse
 from labctl.store import Store
 
 if TYPE_CHECKING:
     from labctl.certificates.signing.verification import SignatureFound
 
+#: The form of the signature over a file itself.
+OWN = {"pdf": "PAdES", "xml": "XAdES"}
 #: A number that a laboratory can have has at most so many characters.
 MOST_DIGITS = 100
 #: Where a file states its number: in the metadata of a PDF, which are readable in PDF/A, and in a DCC. The last counts.
@@ -30,8 +34,17 @@ _NUMBER = {
 }
 
 
-def verify_file(store: Store, path: Path, ca: Path | None) -> VerifiedFileResponse:
-    """Verify a PDF, DCC or JSON file; `ca`: the authorities that are trusted, in PEM form. Raises BadInput."""
+def verify_file(store: Store, path: Path, ca: Path | None, signers: Sequence[str] = ()) -> VerifiedFileResponse:
+    """Verify a PDF, DCC or JSON file; `ca`: the authorities that are trusted, in PEM form.
+
+    `signers` are expected to have signed it, one of them: subjects as RFC 4514 writes them, or fingerprints. Without
+    any, those that the environment names. Raises BadInput.
+    """
+    wanted = [*signers] or expected_signers()
+    if wanted:
+        with libraries("the verification of signatures"):
+            from labctl.certificates.signing.expected import refuse_unreadable  # noqa: PLC0415  only where one is named
+        refuse_unreadable(wanted)
     try:
         content = path.read_bytes()
     except OSError as error:
@@ -45,20 +58,43 @@ def verify_file(store: Store, path: Path, ca: Path | None) -> VerifiedFileRespon
         kept = {"pdf": forms.pdf, "xml": forms.xml, "json": forms.document}[form]
         in_register = "same" if kept == content else "differs"
     found = _signatures(content, form, path, ca)
-    against = in_register == "differs" or not all(each.valid for each in found)
-    against = against or any(each.trust == "not trusted" for each in found)
+    answers = [_answer(each, wanted) for each in found]
+    certificate = None if row is None else certificate_by_number(store, row.number)
     # a DCC that is attached to a PDF is signed by itself, which says nothing of the pages
-    own = {"pdf": "PAdES", "xml": "XAdES"}.get(form)
-    vouched = in_register == "same" or any(each.trust == "trusted" and each.form == own for each in found)
+    own = [each for each in answers if each.valid and each.form == OWN.get(form)]
+    by = [each.signed_by for each in own]
+    if form == "json" and certificate is not None and in_register == "same":
+        by = [certificate.signed_by]
+    against = in_register == "differs" or not all(each.valid for each in answers)
+    against = against or any(each.trust == "not trusted" or each.expected is False for each in answers)
+    against = against or (bool(wanted) and not any(_is_one_of(each, wanted) for each in by))
+    vouched = in_register == "same" or any(each.trust == "trusted" for each in own)
+    state: CertificateState | Literal["unknown"] = "unknown" if certificate is None else certificate.state
     return VerifiedFileResponse(
         format=form,
         sha256=hashlib.sha256(content).hexdigest(),
         number=number,
         in_register=in_register,
-        certificate=None if row is None else certificate_by_number(store, row.number),
-        signatures=[_answer(each) for each in found],
-        ok=vouched and not against,
+        certificate=certificate,
+        state=state,
+        signed_by=next(iter(by), None),
+        expected_signers=wanted,
+        signatures=answers,
+        ok=vouched and not against and state != "withdrawn",
     )
+
+
+def expected_signers() -> list[str]:
+    """Return the signers that the environment names as expected, separated by semicolons; empty: any is accepted."""
+    return [each.strip() for each in re.split(r"(?<!\\);", variable(SIGNER_VARIABLE)) if each.strip()]
+
+
+def _is_one_of(signer: SignatoryResponse | None, wanted: Sequence[str]) -> bool:
+    if signer is None:
+        return False
+    with libraries("the verification of signatures"):
+        from labctl.certificates.signing.expected import is_expected  # noqa: PLC0415  only where one is expected
+    return is_expected(Signatory(**signer.model_dump()), wanted)
 
 
 def _format_of(content: bytes, path: Path) -> CertificateFormat:
@@ -103,13 +139,15 @@ def _signatures(content: bytes, form: CertificateFormat, path: Path, ca: Path | 
         ) from error
 
 
-def _answer(found: SignatureFound) -> SignatureResponse:
+def _answer(found: SignatureFound, wanted: Sequence[str]) -> SignatureResponse:
+    signer = None if found.signatory is None else SignatoryResponse.model_validate(found.signatory.model_dump())
     return SignatureResponse(
         form=found.form,
         valid=found.valid,
         problem=found.problem,
-        signed_by=None if found.signatory is None else SignatoryResponse.model_validate(found.signatory.model_dump()),
+        signed_by=signer,
         signed_at=found.signed_at,
         trust=found.trust,
         reason=found.reason,
+        expected=_is_one_of(signer, wanted) if wanted else None,
     )

@@ -10,7 +10,7 @@ from labctl.errors import BadInput
 from labctl.services.cache import cached_group
 from labctl.services.criticism.decimated_readings import reading_beside
 from labctl.services.criticism.versions import content_digest, version_of
-from labctl.services.recordings.loading import chosen_rows, readings_question
+from labctl.services.recordings.loading import chosen_rows, passed_over, readings_question
 from labctl.services.schemas.base import ResponseModel
 from labctl.services.schemas.criticism import CriticismResponse, ResidualsResponse
 from labctl.store import CalibrationRecord, RecordingRow, Store
@@ -37,7 +37,12 @@ def criticise_unit(
     """
     row = version_of(store, serial, version)
     measured = chosen_rows(store, serial, recording, recordings, other_unit=other_unit)
-    return _cached_criticism(CriticismResponse, store, row, measured, competing)
+    answer = _cached_criticism(CriticismResponse, store, row, measured, competing)
+    if not (newer := passed_over(store, measured, recording, recordings)):
+        return answer
+    from labctl.services.criticism.report_text import with_warnings  # noqa: PLC0415  slow to import
+
+    return with_warnings(answer, newer)
 
 
 def residuals_unit(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -18,7 +18,14 @@ from labctl.recording.output_steps import per_reading, quantisation_of
 from labctl.services.criticism.decimated_readings import Decimated, decimated_columns_of, is_decimated
 from labctl.services.recordings.coverage import covered_of
 from labctl.services.recordings.inspection import inspect_stored
-from labctl.services.recordings.loading import motion_of, points_of, readings_question, source_of
+from labctl.services.recordings.loading import (
+    chosen_rows,
+    motion_of,
+    passed_over,
+    points_of,
+    readings_question,
+    source_of,
+)
 from labctl.services.schemas.warnings import DataWarning, RecordingInspection
 from labctl.store import RecordingRow, Store
 
@@ -30,6 +37,7 @@ class Measurements:
     store: Store
     rows: tuple[RecordingRow, ...]  #: by number, rising
     decimated: Decimated | None = None  #: gives readings that are being read beside this process
+    newer: tuple[DataWarning, ...] = ()  #: of recordings that were passed over
 
     @property
     def row(self) -> RecordingRow:
@@ -74,15 +82,19 @@ class Measurements:
 
     @cached_property
     def warnings(self) -> list[DataWarning]:
-        """What is wrong with the data; of several recordings each says which."""
+        """What is wrong with the data that are fitted; of several recordings each says which.
+
+        What is wrong with data sets that were measured to verify is an objection to certifying a version.
+        """
+        found_in = {n: [w for w in found.warnings if w.part == "fitted"] for n, found in self.inspections.items()}
         if len(self.rows) == 1:
-            return self.inspections[self.row.id].warnings
+            return [*found_in[self.row.id], *self.newer]
         return [
             warning.model_copy(
                 update={"where": f"recording {n}, {warning.where}", "text": f"recording {n}: {warning.text}"}
             )
-            for n, found in self.inspections.items()
-            for warning in found.warnings
+            for n, found in found_in.items()
+            for warning in found
         ]
 
     @property
@@ -105,7 +117,16 @@ class Measurements:
 
     def question(self) -> dict[str, object]:
         """Return what an answer about these measurements depends on."""
-        return readings_question(self.store, self.rows)
+        passed = {"passed_over": [each.where for each in self.newer]} if self.newer else {}
+        return {**readings_question(self.store, self.rows), **passed}
+
+
+def measurements_of(
+    store: Store, serial: str, recording: int | None, recordings: Sequence[int] = (), *, other_unit: bool = False
+) -> Measurements:
+    """Return the measurements that were asked for, as `chosen_rows` does; says which newer ones were passed over."""
+    rows = chosen_rows(store, serial, recording, recordings, other_unit=other_unit)
+    return Measurements(store, rows, newer=tuple(passed_over(store, rows, recording, recordings)))
 
 
 def recordings_text(recordings: tuple[int, ...]) -> str:

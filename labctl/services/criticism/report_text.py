@@ -29,7 +29,7 @@ DATA_FIRST = {"certain": "The data are wrong", "likely": "Check the data"}
 def with_warnings(answer: CriticismResponse, warnings: list[DataWarning]) -> CriticismResponse:
     """Return an answer that says first what is wrong with the data: a verdict on wrong data means nothing."""
     said = [f"{DATA_FIRST[warning.severity]}: {warning.text}." for warning in warnings]
-    return answer.model_copy(update={"warnings": warnings, "text": [*said, *answer.text]})
+    return answer.model_copy(update={"warnings": [*warnings, *answer.warnings], "text": [*said, *answer.text]})
 
 
 #: Up to this many noise floors an error counts as noise: a model does not follow drift, and points that are measured

@@ -105,8 +105,9 @@ def _applied(store: Store, version: Sequence[CalibrationRecord], data: Measureme
     except LabctlError:
         return None
     return AppliedVersion(
-        version=version[0].version, rms_dps=found.rms_dps, max_dps=found.max_dps, bias_dps=found.bias_dps
-    )
+        version=version[0].version, rms_dps=found.rms_dps, max_dps=found.max_dps, bias_dps=found.bias_dps,
+        part=found.part,
+    )  # fmt: skip
 
 
 def line_left(error_dps: Array, rate_dps: Array) -> AxisPoint:

@@ -111,7 +111,8 @@ def _over(value: float | None, units: float) -> float | None:
 
 def _longest_rest(store: Store, row: RecordingRow) -> int:
     sets = store.recordings.data_sets(row.id)
-    return max((each.n for each in sets if each.state == "complete" and each.table_rate_dps == 0), default=0)
+    still = [each for each in sets if each.state == "complete" and each.table_rate_dps == 0 and not each.verification]
+    return max((each.n for each in still), default=0)
 
 
 def _bandwidth(store: Store, serial: str) -> Iterator[Characteristic]:

@@ -21,6 +21,9 @@ NEEDED = ("dataset", "t_s", "run", "mounting", "position", "table_rate_dps", "te
 def allan_unit(store: Store, recording: int, dataset: int | None) -> AllanResponse:
     """Return the Allan deviation of a data set, or of the longest section at rest and at one temperature.
 
+    Its figures enter data sheets and the uncertainty in use, so the section has no data set that was measured to verify
+    a calibration; one of these can be asked for by its number.
+
     Raises NotFound, BadInput for a recording without readings, NotEnoughData.
     """
     head = store.recordings.get(recording)
@@ -75,7 +78,8 @@ def _of_set(recording: Recording, dataset: int) -> StaticRecord:
 def _at_rest(store: Store, recording: int, info: RecordingInfo) -> StaticRecord:
     """Return the static record, looked for only in what was measured at rest: the rest of the readings stay unread."""
     rows = store.recordings.data_sets(recording)
-    still = [row.number for row in rows if row.state == "complete" and row.n and row.table_rate_dps == 0]
+    at_rest = [row for row in rows if row.state == "complete" and row.n and row.table_rate_dps == 0]
+    still = [row.number for row in at_rest if not row.verification]
     names = (*NEEDED, *(f"gyro_{axis}" for axis in info.axes))
     parts: list[dict[str, NDArray[np.generic]]] = []
     for number in still:
@@ -85,7 +89,9 @@ def _at_rest(store: Store, recording: int, info: RecordingInfo) -> StaticRecord:
         together = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
         if (found := static_record(Recording(info, together))) is not None:
             return found
+    aside = len(at_rest) - len(still)
+    beside = f" beside the {aside} data sets at rest that were measured to verify a calibration" if aside else ""
     raise NotEnoughData(
-        f"recording {recording} has no section of {LEAST_READINGS} readings at rest and at one temperature; "
+        f"recording {recording} has no section of {LEAST_READINGS} readings at rest and at one temperature{beside}; "
         "name a data set, or record the unit at rest"
     )

@@ -13,6 +13,7 @@ from labctl.fitting.numeric.allan import LEAST_READINGS, Allan, allan
 from labctl.recording import Recording, RecordingInfo, read_recording
 from labctl.recording.data_files import read_table
 from labctl.recording.recording import Columns
+from labctl.recording.verification import fitted_part
 from labctl.services.recordings.allan import allan_unit
 from labctl.services.recordings.importers import as_interchange
 from labctl.services.recordings.loading import newest_row
@@ -28,7 +29,7 @@ def allan_of_unit(store: Store, serial: str, recording: int | None, column: str 
 
     Raises NotFound, BadInput, NotEnoughData.
     """
-    row = newest_row(store, serial, recording)
+    row = newest_row(store, serial, recording, to_fit=True)
     if column is None:
         return allan_unit(store, row.id, None)
     info = RecordingInfo.model_validate(row.info)
@@ -55,6 +56,7 @@ def _of_recording(recording: Recording, column: str | None, number: int | None) 
             f"{recording.info.serial}: the folder contains {recording.info.kind}, but an Allan deviation needs "
             "single readings; import the readings"
         )
+    recording = fitted_part(recording)
     if column is None:
         found = static_record(recording)
         if found is None:

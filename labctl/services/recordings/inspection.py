@@ -67,7 +67,7 @@ def as_json(warning: DataWarning) -> FindingJson:
     return {
         "what": warning.what, "severity": warning.severity, "where": warning.where, "said": warning.said,
         "value": warning.value, "unit": warning.unit, "expected": warning.expected, "do": warning.do,
-        "text": warning.text,
+        "text": warning.text, "part": warning.part,
     }  # fmt: skip
 
 

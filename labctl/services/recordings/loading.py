@@ -13,9 +13,11 @@ from labctl.recording import Recording, to_points
 from labctl.recording.output_steps import per_reading
 from labctl.recording.points import with_pieces
 from labctl.recording.quantisation import QUANTISATION
+from labctl.recording.sanity import Finding
+from labctl.recording.verification import is_marked
 from labctl.services.cache import UNNAMED, compute
-from labctl.services.recordings.inspection import inspect_stored
-from labctl.services.schemas.warnings import RecordingInspection
+from labctl.services.recordings.inspection import inspect_stored, warning_of
+from labctl.services.schemas.warnings import DataWarning, RecordingInspection
 from labctl.store import RecordingRow, Store
 
 #: Recordings that are fitted together, at most.
@@ -74,17 +76,21 @@ def _with_steps(points: Recording, found: RecordingInspection) -> Recording:
     return replace(points, columns=columns)
 
 
-def newest_row(store: Store, serial: str, recording: int | None, *, other_unit: bool = False) -> RecordingRow:
+def newest_row(
+    store: Store, serial: str, recording: int | None, *, other_unit: bool = False, to_fit: bool = False
+) -> RecordingRow:
     """Return the recording asked for, or the unit's newest in which something was measured.
 
-    It must be a recording of the unit, unless `other_unit`. Raises NotFound, NotEnoughData where no data set is
-    complete yet.
+    With `to_fit` the newest in which something was measured that is fitted, if the unit has one. It must be a recording
+    of the unit, unless `other_unit`. Raises NotFound, NotEnoughData where no data set is complete yet.
     """
     store.units.get(serial)
     rows = store.recordings.of_unit(serial) if recording is None else [store.recordings.get(recording)]
     if not rows:
         raise NotFound(f"unit {serial!r} has no recording; `labctl import DIR` or a campaign creates a recording")
-    row = next((row for row in rows if _measured(row)), rows[0])
+    measured = [row for row in rows if _measured(row)]
+    fitted = (row for row in measured if to_fit and recording is None and not is_to_verify(store, row))
+    row = next(fitted, next(iter(measured), rows[0]))
     if row.serial != serial and not other_unit:
         raise NotFound(
             f"recording {recording} is of unit {row.serial!r}, not of {serial!r}; name another recording, or "
@@ -101,7 +107,7 @@ def newest_row(store: Store, serial: str, recording: int | None, *, other_unit: 
 def chosen_rows(
     store: Store, serial: str, recording: int | None, recordings: Sequence[int] = (), *, other_unit: bool = False
 ) -> tuple[RecordingRow, ...]:
-    """Return the recordings asked for, several or one, rising; else the unit's newest in which something was measured.
+    """Return the recordings asked for, several or one, rising; else the unit's newest that can be fitted.
 
     Raises BadInput where both are given and differ, and what `newest_row` raises.
     """
@@ -116,8 +122,43 @@ def chosen_rows(
             f"{len(wanted)} recordings were given, but at most {MOST_TOGETHER} can be fitted together; name fewer"
         )
     if len(wanted) < 2:
-        return (newest_row(store, serial, wanted[0] if wanted else recording, other_unit=other_unit),)
+        asked = wanted[0] if wanted else recording
+        return (newest_row(store, serial, asked, other_unit=other_unit, to_fit=True),)
     return tuple(newest_row(store, serial, number, other_unit=other_unit) for number in wanted)
+
+
+def is_to_verify(store: Store, row: RecordingRow) -> bool:
+    """Return whether all that was measured in a recording was measured to verify a calibration, so that none is fitted.
+
+    False where nothing was measured yet.
+    """
+    if row.kind == "samples":
+        sets = [each for each in store.recordings.data_sets(row.id) if each.state == "complete" and each.n]
+        return bool(sets) and all(each.verification for each in sets)
+    marked = is_marked(store.recordings.points(row.id, head=row)) if row.kind == "points" else np.zeros(0)
+    return bool(len(marked) and marked.all())
+
+
+def passed_over(
+    store: Store, rows: Sequence[RecordingRow], recording: int | None, recordings: Sequence[int] = ()
+) -> list[DataWarning]:
+    """Return a warning for the recordings that `chosen_rows` passed over: newer than its choice, and only to verify.
+
+    `recording` and `recordings` are what was asked for; none is passed over where they name any.
+    """
+    if recording is not None or recordings:
+        return []
+    chosen = rows[-1]
+    newer = [row for row in store.recordings.of_unit(chosen.serial) if row.id > chosen.id and _measured(row)]
+    found = [row.id for row in reversed(newer) if is_to_verify(store, row)]
+    if not found:
+        return []
+    named = f"recording {found[0]}" if len(found) == 1 else f"recordings {', '.join(map(str, found))}"
+    finding = Finding(
+        "passed_over", "likely", named, f"measured only to verify a calibration, so recording {chosen.id} was used",
+        None, "", "data sets that a fit takes in", "name another recording with --recording ID",
+    )  # fmt: skip
+    return [warning_of(finding)]
 
 
 def readings_question(store: Store, rows: Sequence[RecordingRow]) -> dict[str, object]:

@@ -69,7 +69,7 @@ def measured_from(readings: Recording, name: str, sentence: str) -> Measured:
 def of_unit(store: Store, serial: str, recording: int | None) -> Measured:
     """Return a unit's recording, default the newest. Raises NotFound, NotEnoughData."""
     report_stage(f"read the recording of {serial}")
-    row = newest_row(store, serial, recording)
+    row = newest_row(store, serial, recording, to_fit=True)
     taken = source_of(store, row)
     points = to_points(taken) if taken.info.motion != "poses" else taken
     rest = None
@@ -81,9 +81,8 @@ def of_unit(store: Store, serial: str, recording: int | None) -> Measured:
 
 def _longest_rest(store: Store, recording: int) -> int | None:
     """Return the number of the data set at rest with the most readings; None where there is none."""
-    still = [
-        each for each in store.recordings.data_sets(recording) if abs(each.table_rate_dps) <= AT_REST_DPS and each.n
-    ]
+    sets = [each for each in store.recordings.data_sets(recording) if each.n and not each.verification]
+    still = [each for each in sets if abs(each.table_rate_dps) <= AT_REST_DPS]
     return max(still, key=lambda each: each.n).number if still else None
 
 

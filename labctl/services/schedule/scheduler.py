@@ -7,7 +7,8 @@ due again.
 A start that this service could not begin in time may be missed: the entry's own limit counts from its due time. Without
 one, a real bench has a default limit, because a person has confirmed that the bench is clear at that time, not hours
 later. The time in which a campaign was seen on the bench does not count against the default: a start that queues behind
-a campaign was not missed.
+a campaign was not missed. What an earlier service saw is read from the records of the campaign, so a restart neither
+excuses a start nor makes it late.
 """
 
 from __future__ import annotations
@@ -67,6 +68,7 @@ class Scheduler:
         self._late_limit_s = late_limit_s
         self._was_occupied = False  #: when the schedule was read last
         self._occupied_until: datetime | None = None  #: the last moment at which the bench was seen occupied
+        self._knows_the_past = False  #: whether that is known of the time before this service
         self._guard = threading.Lock()
         self._over = threading.Event()
         self._thread: threading.Thread | None = None
@@ -129,6 +131,7 @@ class Scheduler:
             if self._owes:
                 self.settle()
                 self._owes = False
+            self.read_the_past()
             self._runner.resume_interrupted()
             now = self._clock.utc()
             if self._was_occupied and self._runner.occupied:  # also through a pause of this process
@@ -143,6 +146,17 @@ class Scheduler:
             self._was_occupied = self._runner.occupied
             if self._was_occupied:
                 self._occupied_until = self._clock.utc()
+
+    def read_the_past(self) -> None:
+        """Learn once until when a campaign was on the bench before this service began. Raises StoreError.
+
+        To be called before that campaign is resumed, which writes as well.
+        """
+        if self._knows_the_past:
+            return
+        last = self._store.campaigns.last_on_bench(self._bench)
+        self._occupied_until = None if last is None else min(last, self._clock.utc())
+        self._knows_the_past = True
 
     def _why_missed(self, row: StartRow, due: datetime, now: datetime) -> str:
         """Say why a start that is due is too late to begin, and what to do; empty while it may begin."""

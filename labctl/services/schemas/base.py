@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
-from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler
+from collections.abc import Iterator
+from typing import Annotated, ClassVar, TypeVar, cast
+
+from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler, ValidationInfo, field_validator
 from pydantic.json_schema import JsonSchemaValue
-from pydantic_core import CoreSchema
+from pydantic_core import CoreSchema, PydanticCustomError
+
+from labctl.texts import cleaned, control_character
+
+FieldT = TypeVar("FieldT")
 
 #: Description of `by_key` and its like in responses.
 BY_KEY = "Name of the API key that acted; null: none did, the person's name is as typed."
@@ -30,7 +37,46 @@ class ResponseModel(BaseModel):
         return schema
 
 
+class SeveralLines:
+    """Marks a text of a request that may have several lines."""
+
+
+#: A text of a request that may have several lines.
+LongText = Annotated[str, SeveralLines()]
+
+
 class Request(BaseModel):
-    """A request to the services; an unknown key is an error that names it."""
+    """A request to the services; an unknown key is an error that names it, and so is a control character in a text.
+
+    Every text of a request is one line, unless it is a `LongText`.
+    """
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+    #: Whether control characters of texts become spaces: of an act that must not fail for the words that describe it.
+    cleans_texts: ClassVar[bool] = False
+
+    @field_validator("*")
+    @classmethod
+    def _without_control_characters(cls, value: FieldT, info: ValidationInfo) -> FieldT:
+        name = info.field_name or ""
+        if cls.cleans_texts and isinstance(value, str):
+            return cast(FieldT, cleaned(value))
+        lines = any(isinstance(each, SeveralLines) for each in cls.model_fields[name].metadata)
+        for text in _texts(value):
+            if found := control_character(text, lines=lines):
+                what = "a line break, tab or other control character" if not lines else "a control character"
+                words = "it has {what} ({found}); write it without"
+                raise PydanticCustomError("control_character", words, {"what": what, "found": found})
+        return value
+
+
+def _texts(value: object) -> Iterator[str]:
+    """Yield a text, those of a list, and those of a model that is no request: one of these examines its own."""
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, (list, tuple)):
+        for each in value:
+            yield from _texts(each)
+    elif isinstance(value, BaseModel) and not isinstance(value, Request):
+        for _, each in value:
+            yield from _texts(each)

@@ -42,7 +42,7 @@ class FitRequest(Request):
     """Which model to fit to which recording."""
 
     recording: int | None = Field(
-        default=None, description="Number of the recording; default: the unit's newest recording."
+        default=None, description="Number of the recording; default: the unit's newest recording that can be fitted."
     )
     recordings: list[int] = Field(default_factory=list, description=SEVERAL)
     model: str | None = Field(
@@ -71,7 +71,7 @@ class ImproveRequest(Request):
         default=None, description="Number of the version to change; default: the unit's newest version."
     )
     recording: int | None = Field(
-        default=None, description="Number of the recording; default: the unit's newest recording."
+        default=None, description="Number of the recording; default: the unit's newest recording that can be fitted."
     )
     recordings: list[int] = Field(
         default_factory=list,

@@ -7,7 +7,7 @@ from typing import Literal, get_args
 
 from pydantic import AwareDatetime, Field
 
-from labctl.services.schemas.base import Request, ResponseModel
+from labctl.services.schemas.base import LongText, Request, ResponseModel
 from labctl.services.schemas.plans import RecipeSource
 from labctl.services.schemas.reports.campaign_parts import (
     AdviceResponse,
@@ -90,7 +90,7 @@ class CampaignRequest(Request):
 class StartRequest(Request):
     """Which recipe to run on which bench, here and now."""
 
-    recipe: str
+    recipe: LongText
     bench: str | None = None
     clip: bool = False
     hide: list[str] = Field(
@@ -118,6 +118,7 @@ class StartRequest(Request):
 class ReasonRequest(Request):
     """Why something is done to a campaign, or to a key, and by whom."""
 
+    cleans_texts = True  # no abort is refused for the words that describe it
     reason: str = Field(min_length=1)
     by: str = Field(default="", max_length=200)
 
@@ -130,6 +131,7 @@ class ReasonRequest(Request):
 class ConfirmRequest(Request):
     """An answer to the question with this id; an answer to an older question is refused."""
 
+    cleans_texts = True  # as above
     prompt: str = Field(min_length=1)
     by: str = Field(min_length=1, max_length=200)
     confirmed: bool = Field(
@@ -145,6 +147,7 @@ class ConfirmRequest(Request):
 class ResumeRequest(Request):
     """How a campaign that is paused or was interrupted goes on."""
 
+    cleans_texts = True  # as above
     by: str = Field(default="a person", min_length=1, max_length=200)
     reason: str = ""
     power: Literal["lost", "kept"] | None = Field(

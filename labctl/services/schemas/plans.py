@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, Field
 
 from instruments.toml_documents import shown
-from labctl.services.schemas.base import Request, ResponseModel
+from labctl.services.schemas.base import LongText, Request, ResponseModel
 from procedures.contracts.campaign_state import CampaignState
 from procedures.contracts.errors import RecipeError
 from procedures.recipe.recipe import shipped_recipes
@@ -25,7 +25,9 @@ def never_a_path(recipe: str) -> str:
 
 
 RecipeSource = Annotated[
-    str, AfterValidator(never_a_path), Field(description="Name of a shipped recipe, or the recipe itself as TOML text.")
+    LongText,
+    AfterValidator(never_a_path),
+    Field(description="Name of a shipped recipe, or the recipe itself as TOML text."),
 ]
 
 

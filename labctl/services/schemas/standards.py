@@ -8,13 +8,12 @@ from typing import Literal
 from pydantic import AwareDatetime, Field, model_validator
 
 from instruments.bench_config import SERIAL
-from instruments.laboratory import LINE, ONE_LINE
-from labctl.services.schemas.base import Request, ResponseModel
+from labctl.services.schemas.base import LongText, Request, ResponseModel
 
 TEXT = 2000
 #: No certificate states a smaller uncertainty; the square of a much smaller one has no number.
 LEAST_U = 1e-12
-Name = Field(min_length=1, max_length=200, pattern=LINE)
+Name = Field(min_length=1, max_length=200)
 NOMINAL = "Nominal value that it holds for, in the unit of the standard; null: it holds for all."
 #: valid: may be used. no certificate: nothing is known. check it: an intermediate check is out of limits.
 StandardState = Literal["valid", "no certificate", "overdue", "check it", "bad"]
@@ -26,14 +25,14 @@ class StandardRequest(Request):
 
     label: str = Field(pattern=SERIAL, description="Name of the standard, as `name` in [[standards]] of a bench file.")
     quantity: str = Field(
-        min_length=1, max_length=20, pattern=LINE, description="Quantity: one of a bench file, such as thermometer, "
+        min_length=1, max_length=20, description="Quantity: one of a bench file, such as thermometer, "
         "clock or fixture_angle, or another one.",
     )  # fmt: skip
     unit: str | None = Field(
         default=None, min_length=1, max_length=10, description="Unit of its values; default: that of a bench file."
     )
-    serial: str = Field(default="", max_length=100, pattern=LINE)
-    description: str = Field(default="", max_length=TEXT)
+    serial: str = Field(default="", max_length=100)
+    description: LongText = Field(default="", max_length=TEXT)
     by: str = Name
 
 
@@ -64,14 +63,14 @@ class CertifiedPointRequest(Request):
 class StandardCertificateRequest(Request):
     """Enter a certificate of a standard."""
 
-    number: str = Field(min_length=1, max_length=100, pattern=LINE)
-    laboratory: str = Field(min_length=1, max_length=300, pattern=LINE)
+    number: str = Field(min_length=1, max_length=100)
+    laboratory: str = Field(min_length=1, max_length=300)
     calibrated: date
     due: date | None = Field(default=None, description="Last day on which the standard may be used.")
     adjusted: bool = Field(
         default=False, description="Whether the standard was adjusted or repaired before: no drift leads across it."
     )
-    traceability: str = Field(default="", max_length=TEXT)
+    traceability: LongText = Field(default="", max_length=TEXT)
     points: list[CertifiedPointRequest] = Field(min_length=1, max_length=200)
     reason: str = Field(
         default="", max_length=TEXT, description="Why this replaces an entry of the same number that was typed wrong."
@@ -97,7 +96,7 @@ class StandardCheckRequest(Request):
     u: float = Field(gt=0, allow_inf_nan=False, description="Standard uncertainty of the check.")
     nominal: float | None = Field(default=None, allow_inf_nan=False, description=NOMINAL)
     checked_at: AwareDatetime | None = Field(default=None, description="Default: now.")
-    note: str = Field(default="", max_length=TEXT)
+    note: LongText = Field(default="", max_length=TEXT)
     by: str = Name
 
 
@@ -106,7 +105,7 @@ class StandardBadRequest(Request):
 
     bad_from: date = Field(description="First day of which it is not known that the standard was good.")
     bad_until: date | None = Field(default=None, description="Last such day; null: it is still bad.")
-    reason: str = Field(min_length=1, max_length=TEXT, pattern=ONE_LINE)
+    reason: str = Field(min_length=1, max_length=TEXT)
     by: str = Name
 
     @model_validator(mode="after")
@@ -119,7 +118,7 @@ class StandardBadRequest(Request):
 class WithdrawFindingRequest(Request):
     """Withdraw a finding that was wrong."""
 
-    reason: str = Field(min_length=1, max_length=TEXT, pattern=ONE_LINE)
+    reason: str = Field(min_length=1, max_length=TEXT)
     by: str = Name
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from datetime import datetime
+from typing import Literal
 
 from pydantic import Field
 
@@ -66,6 +67,9 @@ class AppliedVersion(ResponseModel):
     rms_dps: float
     max_dps: float
     bias_dps: float
+    part: Literal["verification", "all"] = Field(
+        description="verification: error of the data sets that were measured to verify; all: the recording has none."
+    )
 
 
 class TrendPoint(ResponseModel):

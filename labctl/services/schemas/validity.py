@@ -7,7 +7,6 @@ from typing import Literal
 
 from pydantic import AwareDatetime, Field
 
-from instruments.laboratory import LINE
 from labctl.services.schemas.base import Request, ResponseModel
 from labctl.services.schemas.standards import ChartLimits, ChartState
 
@@ -26,7 +25,7 @@ class CheckGyroRequest(Request):
         default=None, description="First day of the chart, such as after a repair; default: all recordings."
     )
     reason: str = Field(min_length=1, max_length=2000)
-    by: str = Field(min_length=1, max_length=200, pattern=LINE)
+    by: str = Field(min_length=1, max_length=200)
 
 
 class CheckGyroPoint(ResponseModel):
@@ -124,12 +123,12 @@ class RoomEnvironmentRequest(Request):
     """Readings of the environment of the room, by an instrument that logs or by a person who reads."""
 
     readings: list[RoomRecord] = Field(min_length=1, max_length=5000)
-    source: str = Field(min_length=1, max_length=200, pattern=LINE, description="The instrument, with its number.")
+    source: str = Field(min_length=1, max_length=200, description="The instrument, with its number.")
     bench: str = Field(
         default="", max_length=200, description="Name of the bench that they hold for; empty: all benches."
     )
     by: str | None = Field(
-        default=None, min_length=1, max_length=200, pattern=LINE, description="The person who read and typed them; "
+        default=None, min_length=1, max_length=200, description="The person who read and typed them; "
         "then the audit trail has a row. null: an instrument logged them."
     )  # fmt: skip
 

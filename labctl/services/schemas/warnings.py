@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from labctl.json_types.findings import Severity
+from labctl.json_types.findings import Part, Severity
 from labctl.services.schemas.base import ResponseModel
 
 WARNINGS = "Certain and probable errors of the data or of the fit, the certain errors first; empty if there are none."
@@ -28,6 +28,11 @@ class DataWarning(ResponseModel):
     expected: str
     do: str
     text: str = Field(description="The whole warning as one sentence.")
+    part: Part = Field(
+        default="fitted",
+        description="The part of the recording that the warning concerns. `fitted`: what a fit takes in; "
+        "`verification`: data sets measured to verify a calibration, whose errors refuse no fit but a certification.",
+    )
 
 
 class RecordingInspection(ResponseModel):

@@ -14,7 +14,7 @@ from instruments.bench_config import BenchFile, GyroSettings, SimulationSettings
 from labctl.errors import BadInput
 from labctl.recording import Recording, write_recording
 from labctl.services.planning.loading import bench_for, limits_of, load_bench, load_recipe
-from labctl.services.schemas.base import Request, ResponseModel
+from labctl.services.schemas.base import LongText, Request, ResponseModel
 from labctl.services.simulation.effect_sizes import USUAL_RATE_HZ, sizes_on_plan
 from labctl.services.simulation.plan_simulation import simulate
 from procedures.planning.plan import Plan, make_plan
@@ -23,7 +23,7 @@ from procedures.planning.plan import Plan, make_plan
 class SimulateRequest(Request):
     """Which recipe on which simulated bench, and what is hidden in its gyro."""
 
-    recipe: str
+    recipe: LongText
     bench: str | None = None
     gyro: str | None = None
     hide: list[str] = Field(default_factory=list)

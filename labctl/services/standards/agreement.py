@@ -20,7 +20,14 @@ from labctl.services.schemas.benches import BenchCheckResponse, DeviceCheck, Fin
 from labctl.services.standards.checks import to_be_checked
 from labctl.services.standards.predictions import predictions_of
 from labctl.services.standards.register import due_of
-from labctl.services.standards.usage import finding_text, is_entry_of, is_named, overlaps
+from labctl.services.standards.usage import (
+    finding_text,
+    is_entry_of,
+    is_named,
+    numbered,
+    overlaps,
+    same_issuer,
+)
 from labctl.store import RegisteredStandard, Store
 from procedures.contracts.journal import Event
 
@@ -96,10 +103,23 @@ def refuse_bad(store: Store, standards: Sequence[Standard], on: date, bench: str
 
 def differences(store: Store, standards: Sequence[Standard], on: date) -> Iterator[tuple[Standard, str]]:
     """Yield each entry of a bench that does not agree with the register, with the difference in words."""
-    for entry, known in matched(store, standards):
-        if known is not None:
-            for text in _differences(entry, known, on):
-                yield entry, text
+    register = store.standards.all()
+    for entry in standards:
+        known = _match(entry, register)
+        for text in _of_issuer(entry, register) if known is None else _differences(entry, known, on):
+            yield entry, text
+
+
+def _of_issuer(entry: Standard, register: Sequence[RegisteredStandard]) -> Iterator[str]:
+    """Yield that a number is in the register by another laboratory, so that the entry is no standard of it."""
+    for one in register:
+        for certificate in numbered(one, entry):
+            yield (
+                f"certificate {entry.certificate} of {entry.issued_by} in the bench file is in the register as one of "
+                f"{certificate.laboratory}, of standard {one.row.label}; they are taken for two certificates. If it is "
+                "the same, write the same laboratory in both"
+            )
+            return
 
 
 def _differences(entry: Standard, known: RegisteredStandard, on: date) -> Iterator[str]:
@@ -112,7 +132,10 @@ def _differences(entry: Standard, known: RegisteredStandard, on: date) -> Iterat
     elif entry.due is None and due is not None and due < on:
         yield f"standard {label}: was due on {due} by the register; have it calibrated"
     numbers = [each.number for each in known.in_force]
-    if entry.certificate and numbers and entry.certificate not in numbers:
+    issuers = [each.laboratory for each in numbered(known, entry)]
+    if issuers and not any(same_issuer(each, entry.issued_by) for each in issuers):
+        yield from _of_issuer(entry, [known])
+    elif entry.certificate and numbers and entry.certificate not in numbers:
         yield (
             f"standard {label}: certificate {entry.certificate} of the bench file is not in the register, whose newest "
             f"is {numbers[-1]}; add it with `labctl standards certificate`, or correct the bench file"
@@ -167,7 +190,8 @@ def with_register(store: Store, answer: BenchCheckResponse, bench: BenchFile) ->
     """Return the check of a bench with what the register says of its standards; a bad one is a failed check."""
     standards, on = standards_of(bench), answer.checked_at.date()
     known = [(entry, one) for entry, one in matched(store, standards) if one is not None]
-    if not known:
+    said = [text for _, text in differences(store, standards, on)]
+    if not known and not said:
         return answer
     try:
         refuse_bad(store, standards, on, bench.name)
@@ -175,9 +199,7 @@ def with_register(store: Store, answer: BenchCheckResponse, bench: BenchFile) ->
     except Conflict as refused:
         bad = str(refused)
     findings = [FindingResponse(what="register", text=bad, state="bad")] if bad else []
-    findings += [
-        FindingResponse(what="register", text=text, state="doubtful") for _, text in differences(store, standards, on)
-    ]
+    findings += [FindingResponse(what="register", text=text, state="doubtful") for text in said]
     if not findings:
         labels = ", ".join(one.row.label for _, one in known)
         findings = [FindingResponse(what="register", text=f"agrees with the register: {labels}", state="good")]

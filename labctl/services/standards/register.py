@@ -23,7 +23,7 @@ from labctl.services.schemas.standards import (
 )
 from labctl.services.standards.checks import charted, check_answer, out_text, to_be_checked
 from labctl.services.standards.predictions import prediction_answer, predictions_of
-from labctl.services.standards.usage import finding_text
+from labctl.services.standards.usage import finding_text, same_issuer
 from labctl.store import (
     CertifiedPoint,
     RegisteredStandard,
@@ -52,12 +52,15 @@ def add_standard(store: Store, asked: StandardRequest, at: datetime) -> Standard
 
 
 def add_certificate(store: Store, label: str, asked: StandardCertificateRequest, at: datetime) -> StandardResponse:
-    """Enter a certificate. Raises NotFound; BadInput for a day to come; Conflict for a number that is there."""
+    """Enter a certificate.
+
+    Raises NotFound; BadInput for a day to come; Conflict for a number of the same laboratory that is there.
+    """
     standard = store.standards.get(label)
     if asked.calibrated > at.date():
         raise BadInput(f"certificate {asked.number}: calibrated {asked.calibrated} is a day to come; correct the date")
-    there = any(each.number == asked.number for each in standard.certificates)
-    if there and not asked.reason:
+    alike = [each for each in standard.certificates if each.number == asked.number]
+    if any(same_issuer(each.laboratory, asked.laboratory) for each in alike) and not asked.reason:
         raise Conflict(
             f"certificate {asked.number} of standard {standard.row.label} is in the register; to correct it, send it "
             "again with the reason (--reason TEXT)"

@@ -10,7 +10,14 @@ from instruments.standards import Standard
 from labctl.errors import BadInput
 from labctl.recording import RecordingInfo
 from labctl.services.schemas.standards import AffectedCalibration, AffectedResponse
-from labctl.store import CalibrationRecord, RecordingRow, RegisteredStandard, StandardFinding, Store
+from labctl.store import (
+    CalibrationRecord,
+    RecordingRow,
+    RegisteredStandard,
+    StandardCertificate,
+    StandardFinding,
+    Store,
+)
 
 
 def performed(store: Store, row: RecordingRow) -> tuple[date, date | None]:
@@ -25,10 +32,26 @@ def performed(store: Store, row: RecordingRow) -> tuple[date, date | None]:
 
 
 def is_entry_of(standard: RegisteredStandard, entry: Standard) -> bool:
-    """Return whether an entry of a bench file is this standard: by its label or serial number, or a certificate."""
-    numbers = {each.number for each in standard.certificates}
-    by_certificate = entry.certificate in numbers and entry.quantity == standard.row.quantity
-    return by_certificate or is_named(standard, entry)
+    """Return whether an entry of a bench file is this standard: by its label or serial number, or a certificate.
+
+    Laboratories number their certificates by themselves: number and issuer together name one.
+    """
+    return is_named(standard, entry) or any(
+        same_issuer(each.laboratory, entry.issued_by) for each in numbered(standard, entry)
+    )
+
+
+def numbered(standard: RegisteredStandard, entry: Standard) -> list[StandardCertificate]:
+    """Return the certificates of a standard that have the number, and are of the quantity, of an entry."""
+    if not entry.certificate or entry.quantity != standard.row.quantity:
+        return []
+    return [each for each in standard.certificates if each.number == entry.certificate]
+
+
+def same_issuer(first: str, second: str) -> bool:
+    """Return whether two statements of who issued a certificate agree: by their letters, or one does not say."""
+    names = ["".join(filter(str.isalnum, name)).casefold() for name in (first, second)]
+    return not all(names) or names[0] == names[1]
 
 
 def is_named(standard: RegisteredStandard, entry: Standard) -> bool:
@@ -141,17 +164,31 @@ class Notices:
 
     def of_recordings(self, recordings: Sequence[int]) -> list[str]:
         """Return a sentence for each finding on a standard that the recordings were measured with, on those days."""
+        return [finding_text(standard, finding) for standard, finding in self._touching(recordings)]
+
+    def for_customers(self, recordings: Sequence[int]) -> list[str]:
+        """Return the same for who holds a certificate: without the person and the reason, which are the laboratory's.
+
+        What the standard is, the certificate says.
+        """
+        return [
+            f"Reference standard {standard.row.label}, which was used on these days, was found bad from "
+            f"{_days_text(finding)}. Ask the laboratory before you rely on the certificate."
+            for standard, finding in self._touching(recordings)
+        ]
+
+    def _touching(self, recordings: Sequence[int]) -> list[tuple[RegisteredStandard, StandardFinding]]:
         if not self.bad:
             return []
         rows = [self.store.recordings.get(number) for number in recordings]
-        return list(
-            dict.fromkeys(
-                finding_text(standard, finding)
-                for standard, finding in self.bad
+        return [
+            (standard, finding)
+            for standard, finding in self.bad
+            if any(
+                uses(row, standard) and overlaps(*self._performed(row), finding.bad_from, finding.bad_until)
                 for row in rows
-                if uses(row, standard) and overlaps(*self._performed(row), finding.bad_from, finding.bad_until)
             )
-        )
+        ]
 
     def _performed(self, row: RecordingRow) -> tuple[date, date | None]:
         if row.id not in self._days:
@@ -161,8 +198,11 @@ class Notices:
 
 def finding_text(standard: RegisteredStandard, finding: StandardFinding) -> str:
     """Return a finding in one sentence."""
-    until = f"until {finding.bad_until}" if finding.bad_until else "until now"
     return (
-        f"standard {standard.row.label} was found bad from {finding.bad_from} {until} ({finding.reason}; {finding.by}, "
+        f"standard {standard.row.label} was found bad from {_days_text(finding)} ({finding.reason}; {finding.by}, "
         f"{finding.at:%Y-%m-%d})"
     )
+
+
+def _days_text(finding: StandardFinding) -> str:
+    return f"{finding.bad_from} until {finding.bad_until or 'now'}"

@@ -27,6 +27,8 @@ ResultT = TypeVar("ResultT")
 
 #: A server that does not answer is asked again after so long, s.
 RETRY_S = 0.5
+#: A transaction that is under way when the database is closed has so long to end, s of wall time.
+CLOSED_WITHIN_S = 2.0
 
 
 class Writer(Protocol):
@@ -233,8 +235,15 @@ class Database:
         self._backend.note_address(address)
 
     def close(self) -> None:
-        """Close the database and let the next writer in."""
-        self._dispose()
+        """Close the database and let the next writer in, once the transaction under way has ended; refuse later ones.
+
+        Where it does not end within `CLOSED_WITHIN_S`, its connection stays open, and the lock held, until the process
+        ends: nothing is taken from under it, and no other process writes beside it.
+        """
+        if self._turn.end(CLOSED_WITHIN_S):
+            self._dispose()
+        else:
+            self._reader.dispose()
 
     def _dispose(self) -> None:
         self._reader.dispose()

@@ -36,15 +36,30 @@ class WriterTurn:
         self._clock = clock or WallClock()
         self._lock = threading.RLock()
         self._turn: _Turn | None = None
+        self._is_over = False
+
+    def end(self, within_s: float) -> bool:
+        """Refuse writers from now on; waits `within_s` for who writes now. Returns whether the connection is free."""
+        if not self._lock.acquire(timeout=within_s):
+            return False
+        self._is_over = True
+        self._lock.release()
+        return True
 
     @contextmanager
     def take(self) -> Iterator[None]:
-        """Hold the connection. Raises StoreError, naming who holds it, when it does not come free in time."""
+        """Hold the connection.
+
+        Raises StoreError, naming who holds it, when it does not come free in time, and where it was closed.
+        """
         waits_s = self._patience_s()
         if not self._lock.acquire(timeout=waits_s):
             raise self._overdue(waits_s)
         outer = self._turn
         try:
+            if self._is_over:
+                cause = f"{self._location}: the database is closed, because the process that writes it ends"
+                raise StoreError(f"{cause}; nothing was stored, try again once the service runs", cause=cause)
             if outer is None:
                 self._turn = _Turn(threading.current_thread().name, _caller(), self._clock.now_s())
             yield

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import datetime, timedelta
 from typing import Literal
 
 import sqlalchemy as sa
@@ -137,6 +137,26 @@ class Campaigns:
         c = tables.campaigns.c
         on_bench = sa.select(sa.func.max(c.id)).where(c.bench_name == bench).scalar_subquery()
         return next(iter(self._rows(c.id == on_bench)), None)
+
+    def last_on_bench(self, bench: str) -> datetime | None:
+        """Return the last moment at which a campaign is known to have been on a bench; None where none began.
+
+        By its last event, step or reading of the environment: the end of a campaign that its process left unfinished is
+        written later.
+        """
+        if (newest := self.newest_on_bench(bench)) is None or newest.started_at is None:
+            return None
+        e, s, v = tables.events.c, tables.steps.c, tables.environment.c
+        queries = (
+            sa.select(sa.func.max(e.at, type_=e.at.type)).where(e.campaign_id == newest.id),
+            sa.select(sa.func.max(s.started_at, type_=s.started_at.type)).where(s.campaign_id == newest.id),
+            sa.select(sa.func.max(s.ended_at, type_=s.ended_at.type)).where(s.campaign_id == newest.id),
+        )
+        last_s = sa.select(sa.func.max(v.t_s)).where(v.recording_id.in_(newest.recordings.values()))
+        with self._database.reading() as connection:
+            known = [at for query in queries if (at := connection.scalar(query)) is not None]
+            read_s = connection.scalar(last_s)
+        return max([newest.started_at, *known, newest.started_at + timedelta(seconds=float(read_s or 0.0))])
 
     def all(self) -> list[CampaignRow]:
         """Return every campaign, newest first."""

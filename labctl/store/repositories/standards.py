@@ -97,9 +97,17 @@ class RegisteredStandard:
 
     @property
     def in_force(self) -> tuple[StandardCertificate, ...]:
-        """The certificates by day, of each number the newest row."""
-        newest = {each.number: each for each in self.certificates}
-        return tuple(sorted(newest.values(), key=lambda each: each.calibrated))
+        """The certificates by day. A row with a reason replaces one of its number, best one of its laboratory.
+
+        A row without a reason is another certificate, also where another laboratory used the same number.
+        """
+        found: list[StandardCertificate] = []
+        for each in self.certificates:
+            alike = [one for one in found if one.number == each.number]
+            if each.reason and alike:
+                found.remove(next((one for one in alike if one.laboratory == each.laboratory), alike[-1]))
+            found.append(each)
+        return tuple(sorted(found, key=lambda each: each.calibrated))
 
     @property
     def bad(self) -> tuple[StandardFinding, ...]:
@@ -158,8 +166,12 @@ class Standards:
 
     def has_findings(self) -> bool:
         """Return whether any standard was ever found bad: a point query before anything is compared."""
+        return self.last_finding() > 0
+
+    def last_finding(self) -> int:
+        """Return the number of the last act on the state of any standard; 0: there was none."""
         with self._database.reading() as connection:
-            return connection.execute(sa.select(tables.standard_findings.c.id).limit(1)).first() is not None
+            return last_finding(connection)
 
     def _registered(self, connection: sa.Connection, which: sa.ColumnElement[bool]) -> list[RegisteredStandard]:
         rows = connection.execute(sa.select(tables.standards).where(which).order_by(tables.standards.c.label)).all()
@@ -256,6 +268,11 @@ class Standards:
             )
             seal(connection, (kind, str(number)), at, act)
         return number
+
+
+def last_finding(connection: sa.Connection) -> int:
+    """Return the number of the last act on the state of any standard, as a transaction sees it; 0: there was none."""
+    return int(connection.scalar(sa.select(sa.func.max(tables.standard_findings.c.id))) or 0)
 
 
 def _taken(there: StandardRow, new: StandardRow) -> str:

@@ -27,7 +27,7 @@ standards = sa.Table(
     sa.Column("at", Instant, nullable=False),
 )
 
-#: Days as YYYY-MM-DD. The newest row of a number is in force; an earlier one was typed wrong, `reason` says how.
+#: Days as YYYY-MM-DD. A row with a reason replaces one of its number, which was typed wrong; `reason` says how.
 standard_certificates = sa.Table(
     "standard_certificates",
     metadata,

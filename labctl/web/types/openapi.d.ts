@@ -824,7 +824,7 @@ export interface paths {
          * @description The certificate as a file, always the same bytes; the ETag is the hash of its JSON and the format.
          *
          *     `X-Labctl-State` is valid, amended, superseded or withdrawn; `X-Labctl-Withdrawn` says when, by whom and why, and
-         *     `X-Labctl-Replaced-By` is the number of the certificate that replaces it.
+         *     `X-Labctl-Replaced-By` is the number of the certificate that is valid instead; absent: none is.
          */
         get: operations["certificate_api_units__serial__calibrations__version__certificate_get"];
         put?: never;
@@ -2039,6 +2039,12 @@ export interface components {
             max_dps: number;
             /** Bias Dps */
             bias_dps: number;
+            /**
+             * Part
+             * @description verification: error of the data sets that were measured to verify; all: the recording has none.
+             * @enum {string}
+             */
+            part: "verification" | "all";
         };
         /**
          * AssessmentResponse
@@ -3226,7 +3232,7 @@ export interface components {
             signed_by: components["schemas"]["SignatoryResponse"] | null;
             /**
              * Superseded By
-             * @description Number of the certificate of the version that was certified last; null: it is of this version.
+             * @description Number of the certificate of the version that was certified last; null: it is of this version, or was withdrawn.
              */
             superseded_by: string | null;
             /**
@@ -4410,6 +4416,13 @@ export interface components {
              * @description The whole warning as one sentence.
              */
             text: string;
+            /**
+             * Part
+             * @description The part of the recording that the warning concerns. `fitted`: what a fit takes in; `verification`: data sets measured to verify a calibration, whose errors refuse no fit but a certification.
+             * @default fitted
+             * @enum {string}
+             */
+            part: "fitted" | "verification";
         };
         /**
          * DatasheetResponse
@@ -5048,7 +5061,7 @@ export interface components {
         FitRequest: {
             /**
              * Recording
-             * @description Number of the recording; default: the unit's newest recording.
+             * @description Number of the recording; default: the unit's newest recording that can be fitted.
              */
             recording?: number | null;
             /**
@@ -5465,7 +5478,7 @@ export interface components {
             version?: number | null;
             /**
              * Recording
-             * @description Number of the recording; default: the unit's newest recording.
+             * @description Number of the recording; default: the unit's newest recording that can be fitted.
              */
             recording?: number | null;
             /**
@@ -6980,6 +6993,11 @@ export interface components {
             superseded_by: string | null;
             /** Valid Instead */
             valid_instead: string | null;
+            /**
+             * Notices
+             * @description Findings on the reference standards behind it since it was issued; without persons and reasons.
+             */
+            notices: string[];
         };
         /**
          * PulseResponse

@@ -13,13 +13,15 @@ import pytest
 from instruments.bench_config import read_bench
 from instruments.clock import VirtualClock
 from instruments.drivers.resolution import resolve
-from labctl.errors import BadRecording, NotEnoughData
+from labctl.errors import BadRecording, DataRefused, NotEnoughData
 from labctl.fitting import fit
 from labctl.fitting.criticism import criticise
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.data.joined import joined_recording
 from labctl.recording import Recording, read_recording, to_points, write_recording
+from labctl.recording.sanity import certain, inspect_recording
 from labctl.recording.verification import fitted_part, verification_part
+from labctl.services.calibrations.assessment import assess
 from labctl.services.calibrations.fitting import fit_unit
 from labctl.services.campaigns.execution import run
 from labctl.services.campaigns.preparation import prepare
@@ -145,3 +147,39 @@ def test_a_campaign_marks_it(tmp_path: Path) -> None:
         assert len(np.unique(points.columns["run"])) == 2
         fit_unit(store, "FOG-0001", FitRequest(effects=["bias", "scale_factor"]), AT)
         assert verify_unit(store, "FOG-0001", None, None).datasets == 4
+
+
+def without_gain(recording: Recording) -> Recording:
+    """Return a recording whose verification part has one output with the sign of another mounting."""
+    marked = np.asarray(recording.columns["verification"]) != 0
+    return replace(
+        recording, columns={n: np.where(marked, -v, v) if n == "gyro_x" else v for n, v in recording.columns.items()}
+    )
+
+
+def test_a_fault_of_the_verification_part_refuses_no_fit_but_the_certification(
+    recording: Recording, tmp_path: Path
+) -> None:
+    assert inspect_recording(recording) == []
+    wrong = without_gain(recording)
+    found = inspect_recording(wrong)
+    assert {each.part for each in certain(found)} == {"verification"}
+    with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
+        store.recordings.add_import(wrong, AT)
+        serial = wrong.info.serial
+        made = fit_unit(store, serial, FitRequest(effects=EFFECTS), AT)
+        assert made.warnings == []
+        objections = [each for each in assess(store, serial, made.version).objections if each.what == "data"]
+    assert objections
+    assert "recording 1: verification part, axis x" in objections[0].text
+    assert objections[0].do.endswith("and measure the verification part again")
+
+
+def test_a_fault_of_what_is_fitted_refuses_the_fit(recording: Recording, tmp_path: Path) -> None:
+    columns = {name: -values if name == "gyro_x" else values for name, values in recording.columns.items()}
+    wrong = replace(recording, columns=columns)
+    assert {each.part for each in certain(inspect_recording(wrong))} == {"fitted", "verification"}
+    with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
+        store.recordings.add_import(wrong, AT)
+        with pytest.raises(DataRefused, match=r"is refused: axis x"):
+            fit_unit(store, wrong.info.serial, FitRequest(effects=EFFECTS), AT)

@@ -87,6 +87,11 @@ def test_a_shared_standard_is_said_and_its_part_subtracted(store: Store) -> None
     assert any("correlated by it" in text for text in found.text)
 
 
+def test_equal_numbers_of_two_laboratories_are_no_shared_standard(store: Store) -> None:
+    first, second = (clock(9000.0, "1").model_copy(update={"issued_by": name}) for name in ("PTB", "NPL"))
+    assert compared(store, first, second, -4e-3).shared == []
+
+
 def test_what_cannot_be_compared_is_refused(store: Store) -> None:
     standard = clock(100.0, "A-1")
     version = measure(store, date(2026, 1, 5), standard)

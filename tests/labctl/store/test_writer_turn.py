@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import threading
 from pathlib import Path
 
 import pytest
 
-from labctl.errors import StoreError
-from labctl.store import open_store
-from labctl.store.connection import writer_turn
+from labctl.errors import Conflict, StoreError
+from labctl.store import Store, open_store
+from labctl.store.connection import database, writer_turn
+from labctl.store.connection.database import Database
+from labctl.store.repositories.audit import append
 from tests.helpers.held_writer import held_writer
 from tests.helpers.one_row_sets import AT
 
@@ -40,3 +43,48 @@ def test_a_thread_takes_its_own_turn_again() -> None:
             pass
         assert turn._turn is not None
     assert turn._turn is None
+
+
+def test_a_database_is_closed_after_the_transaction_that_is_under_way(tmp_path: Path) -> None:
+    path = str(tmp_path / "lab.sqlite")
+    store = Store(Database(path, write=True))
+    begun, go_on, failed = threading.Event(), threading.Event(), list[BaseException]()
+
+    def record() -> None:
+        try:
+            with store._database.writing() as connection:
+                begun.set()
+                go_on.wait(20.0)
+                append(connection, AT, "journal", "campaign 1", {})
+        except BaseException as error:  # noqa: BLE001  compared below
+            failed.append(error)
+
+    writer, closer = threading.Thread(target=record), threading.Thread(target=store.close)
+    writer.start()
+    begun.wait(20.0)
+    closer.start()
+    closer.join(0.1)
+    assert closer.is_alive()
+    go_on.set()
+    closer.join(20.0)
+    writer.join(20.0)
+    assert failed == []
+    with pytest.raises(StoreError, match=r"lab\.sqlite: the database is closed, because the process that writes it"):
+        store.audit.record(AT, "journal", "campaign 2", {})
+    store.close()  # again
+    with open_store(path, write=True) as successor:
+        assert [row.subject for row in successor.audit.rows()] == ["campaign 1"]
+
+
+def test_what_does_not_end_keeps_its_connection_and_the_lock(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(database, "CLOSED_WITHIN_S", 0.05)
+    path = str(tmp_path / "lab.sqlite")
+    store = Store(Database(path, write=True))
+    with held_writer(store) as began:
+        began()
+        store.close()
+        with pytest.raises(Conflict), open_store(path, write=True):
+            pass
+    store.close()
+    with open_store(path, write=True) as successor:
+        assert successor.audit.rows() == []

@@ -55,19 +55,30 @@ def verify(
             "signatures are verified, but not who the signer is.",
         ),
     ] = None,
+    signer: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--signer",
+            metavar="SUBJECT|SHA256",
+            help="Signer that you expect: attributes of the subject (CN=Ada Authoriser,O=Laboratory), or the SHA-256 "
+            "of the certificate (X.509); give it several times for several persons; default: "
+            "$LABCTL_EXPECTED_SIGNER, else every signer for whom an authority vouches.",
+        ),
+    ] = None,
     as_json: Json = False,
     database: Database = None,
 ) -> None:
-    """Verify the file of a certificate: whether it is as it was issued, and its signatures.
+    """Verify the file of a certificate: whether it is as it was issued, its signatures, and its state.
 
-    Exit status 1 when the file differs from the one that was issued, a signature is not valid or not trusted,
-    or neither the register nor a trusted signature confirms the file.
+    Exit status 1 when the file differs from the one that was issued, a signature is not valid, not trusted or not
+    by an expected signer, neither the register nor a trusted signature confirms the file, or the certificate was
+    withdrawn. For an amended or superseded certificate the status is 0; the state is printed.
     """
     from labctl.services.certificates.verification import verify_file
     from labctl.services.commands.open import open_readonly
 
     with one_clear_line(), open_readonly(database) as store:
-        answer = verify_file(store, file, ca)
+        answer = verify_file(store, file, ca, signer or ())
     if as_json:
         print_json(answer)
     else:
@@ -80,12 +91,28 @@ def _print(file: Path, answer: VerifiedFileResponse) -> None:
 
     number = f"certificate {answer.number}" if answer.number else "a file without a certificate's number"
     console.print(f"{file}: {number}, {REGISTER[answer.in_register]}", soft_wrap=True)
-    if answer.certificate is not None and answer.certificate.state != "valid":
-        console.print(state_text(answer.certificate), soft_wrap=True)
+    if answer.certificate is not None:
+        console.print(f"state: {state_text(answer.certificate)}", soft_wrap=True)
+        for notice in answer.certificate.notices:
+            console.print(f"notice: {notice}", soft_wrap=True)
+    else:
+        console.print(
+            "state: not known, because this database has no such certificate; the page behind its QR code says it",
+            soft_wrap=True,
+        )
+    if answer.signatures:
+        console.print(_signer(answer), soft_wrap=True)
     for each in answer.signatures:
         console.print(_signature(each), soft_wrap=True)
     if not answer.signatures:
         console.print("no signature", soft_wrap=True)
+
+
+def _signer(answer: VerifiedFileResponse) -> str:
+    signer = f"signed by {answer.signed_by.subject}" if answer.signed_by else "not signed by a valid signature"
+    if answer.expected_signers:
+        return f"{signer}; expected: {' or '.join(answer.expected_signers)}"
+    return f"{signer}; any signer is accepted, because --signer names none"
 
 
 def _signature(found: SignatureResponse) -> str:
@@ -94,4 +121,5 @@ def _signature(found: SignatureResponse) -> str:
         return f"{found.form} signature{signer}: NOT VALID: {found.problem}"
     at = "" if found.signed_at is None else f", {found.signed_at:%Y-%m-%d %H:%M} UTC as the signer states"
     trust = found.reason if found.trust == "not established" else f"{found.trust}: {found.reason}"
-    return f"{found.form} signature{signer}: valid{at}; {trust}"
+    other = "; NOT BY AN EXPECTED SIGNER" if found.expected is False else ""
+    return f"{found.form} signature{signer}: valid{at}; {trust}{other}"

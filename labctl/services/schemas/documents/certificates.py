@@ -8,11 +8,12 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Field
 
-from instruments.laboratory import LINE, ONE_LINE, Laboratory
+from instruments.laboratory import Laboratory
 from labctl.certificates.document import Customer, DecisionRule, Use
-from labctl.services.schemas.base import BY_KEY, Request, ResponseModel
+from labctl.services.schemas.base import BY_KEY, LongText, Request, ResponseModel
 
-TEXT = 2000
+#: Most characters of a text, and of one that is one line of a certificate.
+TEXT, LINE = 2000, 300
 CertificateState = Literal["valid", "amended", "superseded", "withdrawn"]
 
 
@@ -25,10 +26,10 @@ def _in_order(given: tuple[float, float]) -> tuple[float, float]:
 class OrderedItem(Request):
     """What the laboratory noted of the item when it came."""
 
-    description: str = Field(default="Gyroscope", pattern=LINE)
-    manufacturer: str = Field(default="", pattern=LINE)
-    identification: str = Field(default="", pattern=LINE, description="The customer's own number of the item.")
-    condition: str = Field(default="", max_length=TEXT, description="Condition of the item on receipt.")
+    description: str = Field(default="Gyroscope", max_length=LINE)
+    manufacturer: str = Field(default="", max_length=LINE)
+    identification: str = Field(default="", max_length=LINE, description="The customer's own number of the item.")
+    condition: LongText = Field(default="", max_length=TEXT, description="Condition of the item on receipt.")
     received: date | None = Field(default=None, description="Date of receipt; null: the results do not depend on it.")
 
 
@@ -37,10 +38,10 @@ class OrderedMethod(Request):
 
     name: str = Field(
         default="",
-        pattern=LINE,
+        max_length=LINE,
         description="Name of the method; only for an imported recording, since a campaign names its recipe.",
     )
-    deviations: str = Field(
+    deviations: LongText = Field(
         default="", max_length=TEXT, description="Additions to, deviations or exclusions from the method; empty: none."
     )
     performed_from: date | None = Field(
@@ -53,7 +54,7 @@ class OrderedMethod(Request):
 class OrderedConformity(Request):
     """The specification to which conformity is to be stated, and the rule."""
 
-    specification: str = Field(min_length=1, pattern=LINE)
+    specification: str = Field(min_length=1, max_length=LINE)
     limit_dps: float = Field(gt=0, allow_inf_nan=False, description="Largest permitted error of a corrected rate.")
     about: Use = Field(
         default="any axis",
@@ -90,9 +91,9 @@ class CertificateOrder(Request):
         default=None,
         description="Statement of conformity to a specification; null: the certificate makes no statement.",
     )
-    adjustment: str = Field(default="", max_length=TEXT, description="Adjustments or repairs other than the new "
+    adjustment: LongText = Field(default="", max_length=TEXT, description="Adjustments or repairs other than the new "
     "coefficients; empty: none.")  # fmt: skip
-    external: str = Field(
+    external: LongText = Field(
         default="",
         max_length=TEXT,
         description="Results that came from external providers, and the names of these; empty: none.",
@@ -110,9 +111,7 @@ class CertificateOrder(Request):
 class CertificateRequest(Request):
     """Issue the certificate of a version, or an amended one."""
 
-    by: str = Field(
-        min_length=1, max_length=200, pattern=LINE, description="Name of the person who issues the certificate."
-    )
+    by: str = Field(min_length=1, max_length=200, description="Name of the person who issues the certificate.")
     order: CertificateOrder = CertificateOrder()
     amend: str | None = Field(
         default=None,
@@ -133,11 +132,9 @@ class SignatoryResponse(ResponseModel):
 class WithdrawRequest(Request):
     """Withdraw a certificate; it stays withdrawn, and its bytes stay what they are."""
 
-    number: str = Field(min_length=1, max_length=100, pattern=LINE, description="Number of the certificate.")
-    by: str = Field(min_length=1, max_length=200, pattern=LINE, description="Name of the person who withdraws it.")
-    reason: str = Field(
-        min_length=1, max_length=TEXT, pattern=ONE_LINE, description="Why; the list, the file and the page say it."
-    )
+    number: str = Field(min_length=1, max_length=100, description="Number of the certificate.")
+    by: str = Field(min_length=1, max_length=200, description="Name of the person who withdraws it.")
+    reason: str = Field(min_length=1, max_length=TEXT, description="Why; the list, the file and the page say it.")
 
 
 class CertificateResponse(ResponseModel):
@@ -163,7 +160,8 @@ class CertificateResponse(ResponseModel):
     )
     superseded_by: str | None = Field(
         default=None,
-        description="Number of the certificate of the version that was certified last; null: it is of this version.",
+        description="Number of the certificate of the version that was certified last; null: it is of this version, "
+        "or was withdrawn.",
     )
     state: CertificateState = Field(
         default="valid",
@@ -200,3 +198,6 @@ class PublicCertificate(ResponseModel):
     replaced_by: str | None
     superseded_by: str | None
     valid_instead: str | None
+    notices: list[str] = Field(
+        description="Findings on the reference standards behind it since it was issued; without persons and reasons."
+    )

@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Field, FiniteFloat, model_validator
 
 from labctl.recording import OutputUnit
 from labctl.recording.info import Axis
-from labctl.services.schemas.base import Request
+from labctl.services.schemas.base import LongText, Request
 
 #: Most coefficients of an axis, most temperatures of a table, and the longest text.
 MOST_COEFFICIENTS, MOST_TEMPERATURES, LONGEST = 200, 1000, 200
@@ -74,7 +74,9 @@ AxisCoefficients = Annotated[dict[Text, Coefficient], Field(max_length=MOST_COEF
 class FixedCoefficients(Request):
     """Known coefficients by axis, each under the name that `labctl fit --json` gives it."""
 
-    source: Text = Field(default="", description="Where the values are from, such as a data sheet and its page.")
+    source: Annotated[LongText, Field(max_length=LONGEST)] = Field(
+        default="", description="Where the values are from, such as a data sheet and its page."
+    )
     reference_temperature_c: Celsius | None = Field(
         default=None, description="Reference temperature, deg C, from which the temperature terms count."
     )

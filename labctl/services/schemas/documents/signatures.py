@@ -8,7 +8,11 @@ from typing import Literal
 from pydantic import Field
 
 from labctl.services.schemas.base import ResponseModel
-from labctl.services.schemas.documents.certificates import CertificateResponse, SignatoryResponse
+from labctl.services.schemas.documents.certificates import (
+    CertificateResponse,
+    CertificateState,
+    SignatoryResponse,
+)
 
 
 class SigningKeyResponse(SignatoryResponse):
@@ -31,6 +35,9 @@ class SignatureResponse(ResponseModel):
         description="Whether an authority that was named as trusted vouches for the signer; not established: none was."
     )
     reason: str = Field(description="Why the signer is trusted, or not.")
+    expected: bool | None = Field(
+        description="Whether the signer is one that is expected; null: none was named, so any signer was accepted."
+    )
 
 
 class VerifiedFileResponse(ResponseModel):
@@ -44,7 +51,18 @@ class VerifiedFileResponse(ResponseModel):
         "unknown: the database has no certificate of this number."
     )
     certificate: CertificateResponse | None = Field(description="The certificate of this number in the database.")
+    state: CertificateState | Literal["unknown"] = Field(
+        description="State of the certificate; unknown: the database has no certificate of this number."
+    )
+    signed_by: SignatoryResponse | None = Field(
+        description="Who signed the file: by the valid signature of the PDF or the DCC itself, of a JSON file by the "
+        "register; null: no signature."
+    )
+    expected_signers: list[str] = Field(
+        description="Signers that were named as expected: subjects or fingerprints; empty: any signer is accepted."
+    )
     signatures: list[SignatureResponse]
     ok: bool = Field(
-        description="Whether the register or a trusted signature confirms the file, and no check of it failed."
+        description="Whether the file can be relied on: the register or a trusted signature confirms it, no check of "
+        "it failed, an expected signer signed it if any is named, and the certificate is not withdrawn."
     )

@@ -19,6 +19,7 @@ from labctl.store.manifests.contents import CERTIFICATE
 from labctl.store.records import Withdrawal
 from labctl.store.repositories.audit import append
 from labctl.store.repositories.documents.withdrawals import withdraw
+from labctl.store.repositories.standards import last_finding
 from labctl.store.schema import tables
 from labctl.store.sealing.seals import seal
 
@@ -72,10 +73,12 @@ class Certificates:
             return int(connection.scalar(sa.select(sa.func.count()).where(begins)) or 0)
 
     @transaction
-    def add(self, row: CertificateRow, forms: CertificateForms) -> CertificateRow:
+    def add(self, row: CertificateRow, forms: CertificateForms, finding: int | None = None) -> CertificateRow:
         """Keep a certificate that is issued now.
 
-        Raises Conflict where another one took its number, or replaces the same one; nothing was changed.
+        `finding` is the last act on the state of a standard when its evidence was read; None: it rests on no standard.
+        Raises Conflict where another certificate took its number, or replaces the same one, and where a standard was
+        found bad since; nothing was changed.
         """
         values = {
             "number": row.number, "serial": row.serial, "version": row.version, "replaces": row.replaces,
@@ -96,7 +99,13 @@ class Certificates:
                     f"{row.serial} version {row.version}",
                     detail,
                     who=row.by_key or row.by,
-                )
+                )  # from here on no other act is written
+                if finding is not None and last_finding(connection) != finding:
+                    raise Conflict(
+                        f"no certificate of {row.serial} version {row.version} was stored: while it was being written, "
+                        "a reference standard was found bad, or such a finding was withdrawn; send the request again "
+                        "(`labctl standards list` shows the standards)"
+                    )
                 seal(connection, (CERTIFICATE.name, str(number)), row.at, "issued")
         except exc.IntegrityError as error:
             raise Conflict(

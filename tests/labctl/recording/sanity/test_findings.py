@@ -230,7 +230,7 @@ def test_a_summary_of_parts_is_that_of_the_whole(one_axis: Recording) -> None:
 def test_a_finding_is_one_sentence_with_what_where_and_what_to_do(one_axis: Recording) -> None:
     found = only(inspect_recording(spoilt(one_axis, scaled(-1.0, "gyro_z"))))
     said = found.to_json()
-    assert said.keys() == {"what", "severity", "where", "said", "value", "unit", "expected", "do", "text"}
+    assert said.keys() == {"what", "severity", "where", "said", "value", "unit", "expected", "do", "text", "part"}
     assert "\n" not in found.text
     assert found.text.startswith("axis z: ")
 

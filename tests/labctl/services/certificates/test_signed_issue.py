@@ -16,10 +16,10 @@ from cryptography.hazmat.primitives.hashes import SHA256
 
 from labctl.errors import BadInput
 from labctl.services.admin.seal_keys import refuse_unusable_keys
-from labctl.services.certificates.issue import CertificateRefused, issue
+from labctl.services.certificates.issue import CertificateRefused, issue, withdraw
 from labctl.services.certificates.served import list_certificates
 from labctl.services.certificates.verification import verify_file
-from labctl.services.schemas.documents.certificates import SignatoryResponse
+from labctl.services.schemas.documents.certificates import SignatoryResponse, WithdrawRequest
 from labctl.store import CertificateForms, Store, copy_database, open_store
 from tests.helpers.certificates import AT, ORDER, SERIAL, add_version, issued, request
 from tests.helpers.lab import Lab
@@ -245,6 +245,61 @@ def test_a_replaced_certificate_is_said_to_be(store: Store, tmp_path: Path) -> N
     assert said.certificate.replaced_by == second
 
 
+ADA, BERT = "CN=Ada Authoriser,O=Lab & Sons", "CN=Bert"
+
+
+@pytest.mark.parametrize("form", ["pdf", "xml", "json"])
+def test_only_an_expected_signer_is_accepted(
+    store: Store, tmp_path: Path, signer: Owner, authority: Owner, form: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An authority vouches for many; the reader knows who signs for the laboratory."""
+    number = issue(store, SERIAL, 1, request(), AT).number
+    path, ca = issued_file(store, number, form, tmp_path), tmp_path / "ca.pem"
+    ca.write_bytes(authority.pem)
+    print_of_key = signer.certificate.fingerprint(SHA256()).hex(":").upper()
+    for expected in ([ADA], ["O=Lab & Sons"], [print_of_key], [BERT, ADA]):
+        said = verify_file(store, path, ca, expected)
+        assert (said.ok, said.expected_signers) == (True, expected)
+        assert said.signed_by is not None
+        assert said.signed_by.subject == ADA
+        assert all(each.expected for each in said.signatures)
+    for expected in ([BERT], ["CN=Ada Authoriser,O=Other"], ["00" * 32]):
+        said = verify_file(store, path, ca, expected)
+        assert not said.ok
+        assert not any(each.expected for each in said.signatures)
+    assert {each.expected for each in verify_file(store, path, ca).signatures} <= {None}
+    monkeypatch.setenv("LABCTL_EXPECTED_SIGNER", f"{BERT}; CN=Carla\\;D")
+    assert verify_file(store, path, ca).expected_signers == [BERT, "CN=Carla\\;D"]
+    assert not verify_file(store, path, ca).ok
+    with pytest.raises(BadInput, match="the expected signer 'Ada' is no subject as RFC 4514 writes it"):
+        verify_file(store, path, ca, ["Ada"])
+
+
+def test_an_unsigned_file_is_by_no_expected_signer(store: Store, tmp_path: Path) -> None:
+    path = issued_file(store, issue(store, SERIAL, 1, request(), AT).number, "pdf", tmp_path)
+    assert verify_file(store, path, None).ok
+    said = verify_file(store, path, None, [ADA])
+    assert (said.ok, said.signed_by, said.in_register) == (False, None, "same")
+
+
+def test_a_withdrawn_certificate_is_not_to_be_relied_on(
+    store: Store, tmp_path: Path, signer: Owner, authority: Owner
+) -> None:
+    number = issue(store, SERIAL, 1, request(), AT).number
+    path, ca = issued_file(store, number, "pdf", tmp_path), tmp_path / "ca.pem"
+    ca.write_bytes(authority.pem)
+    assert verify_file(store, path, ca).state == "valid"
+    issue(store, SERIAL, 1, request().model_copy(update={"amend": "address"}), AT)
+    said = verify_file(store, path, ca)
+    assert (said.ok, said.state) == (True, "amended")
+    withdraw(store, WithdrawRequest(number=number, by="Rita", reason="wrong item"), AT)
+    said = verify_file(store, path, ca)
+    assert (said.ok, said.state, said.in_register) == (False, "withdrawn", "same")
+    with open_store(str(tmp_path / "customer.sqlite"), write=True) as other:
+        said = verify_file(other, path, ca)
+    assert (said.ok, said.state) == (True, "unknown")
+
+
 @pytest.mark.parametrize(
     ("content", "said"),
     [
@@ -276,6 +331,11 @@ def test_the_commands(
     assert lab.json("certificates", "list", SERIAL) == lab.json("certificates", SERIAL)
     said = lab.run("certificates", "verify", pdf, "--ca", str(tmp_path / "ca.pem")).stdout
     assert "as it was issued, byte for byte" in said
+    assert "state: valid" in said
+    assert f"signed by {ADA}; any signer is accepted, because --signer names none" in said
+    of_two = lab.run("certificates", "verify", pdf, "--signer", BERT, "--signer", ADA).stdout
+    assert f"signed by {ADA}; expected: {BERT} or {ADA}" in of_two
+    assert "NOT BY AN EXPECTED SIGNER" in lab.run("certificates", "verify", pdf, "--signer", BERT, status=1).stdout
     assert said.count("valid") >= 2
     assert "trusted: issued by CN=Root authority" in said
     assert lab.json("certificates", "verify", pdf)["ok"] is True
@@ -285,6 +345,13 @@ def test_the_commands(
     assert "NOT VALID: something was added to the file after it was signed" in said
     said = lab.run("signing-key", "show").stdout
     assert f"fingerprint: {lab.json('signing-key', 'show')['fingerprint']}" in said
+    issued = str(tmp_path / "issued.pdf")
+    lab.run("certificate", SERIAL, "--out", issued)
+    (number,) = [each["number"] for each in lab.json("certificates", SERIAL)]
+    lab.run("certificate", "withdraw", number, "--by", "Rita", "--reason", "wrong item")
+    said = lab.run("certificates", "verify", issued, status=1).stdout
+    assert "state: withdrawn since" in said
+    assert "(wrong item)" in said
     monkeypatch.delenv("LABCTL_SIGN_KEY")
     assert "LABCTL_SIGN_KEY is not set" in lab.run("signing-key", "show", status=2).stderr
 

@@ -14,6 +14,7 @@ import sqlalchemy as sa
 from alembic import command
 
 from labctl.acting_user import Actor, acting
+from labctl.cli.printing.certificates import state_text
 from labctl.errors import Conflict, NotFound
 from labctl.services.calibrations.certification import revoke
 from labctl.services.calibrations.served import calibration_file
@@ -85,12 +86,28 @@ def test_from_valid_over_amended_and_superseded_to_withdrawn(store: Store) -> No
     third = certificate_by_number(store, THIRD)
     assert (third.state_reason, third.state_by, third.state_since) == ("was dropped", "Rita", AT + 4 * DAY)
     assert third.valid_instead is None
+    second = certificate_by_number(store, SECOND)
+    assert (second.superseded_by, second.valid_instead, second.state_since) == (None, None, AT + 3 * DAY)
+    assert second.state_reason.endswith(f"was certified, and has certificate {THIRD}, which was withdrawn")
+    assert "X-Labctl-Replaced-By" not in certificate_file(store, SERIAL, 1, "pdf", SECOND).headers()
+    assert state_text(second).endswith(f"{THIRD}, which was withdrawn); none is valid instead")
 
     certify(store, 1, 5)  # a rollback
     assert states(store) == {FIRST: "amended", SECOND: "valid", THIRD: "withdrawn"}
     assert certificate_by_number(store, THIRD).superseded_by == SECOND
     certify(store, 2, 6)
     assert states(store)[THIRD] == "withdrawn"  # for good
+
+
+def test_an_amended_certificate_says_that_the_one_in_its_place_was_withdrawn(store: Store) -> None:
+    amend(store, 1)
+    withdraw(store, WithdrawRequest(number=SECOND, by="Rita", reason="wrong item"), AT + 2 * DAY)
+    first = certificate_by_number(store, FIRST)
+    assert (first.state, first.replaced_by, first.valid_instead) == ("amended", SECOND, None)
+    assert first.state_reason == f"street was wrong; certificate {SECOND}, which replaces it, was withdrawn"
+    third = amend(store, 3)
+    assert certificate_by_number(store, FIRST).valid_instead == third
+    assert certificate_file(store, SERIAL, 1, "pdf", FIRST).headers()["X-Labctl-Replaced-By"] == third
 
 
 def test_a_revocation_withdraws_every_certificate_of_the_version_and_of_no_other(store: Store) -> None:

@@ -30,6 +30,7 @@ from labctl.services.schemas.campaigns import CampaignRequest, StartRequest
 from labctl.services.schemas.certification import CertifyRequest
 from labctl.services.schemas.reports.drafts import DraftResponse, DraftsRequest
 from labctl.store import Store, open_store
+from labctl.store.connection.database import Database
 from procedures.contracts.errors import RecipeError
 from procedures.recipe.recipe import parse_recipe, shipped_recipes
 from tests.helpers.waiting import eventually
@@ -274,7 +275,7 @@ def scheduled(tmp_path: Path) -> Iterator[Callable[[CampaignRequest], LabService
 
     def begin(request: CampaignRequest) -> LabService:
         bench = load_bench("single-axis-sim")
-        store = open_store(str(tmp_path / "lab.sqlite"), write=True).__enter__()
+        store = Store(Database(str(tmp_path / "lab.sqlite"), write=True))  # which the service closes
         add_start(store, request, bench, NOW)
         service = LabService(store, SystemClock(), BenchRunner(store, bench, lambda: VirtualClock(NOW)))
         opened.append(service)

@@ -22,7 +22,9 @@ from labctl.services.local_bench import LocalBench
 from labctl.services.schedule.queue import cancel_start, list_starts, start_status
 from labctl.services.schedule.scheduler import REAL_BENCH_LATE_LIMIT_S
 from labctl.services.schemas.campaigns import BENCH_CHECKS
-from labctl.store import Store, open_store
+from labctl.store import NewCampaign, Store, StoreJournal, open_store
+from procedures.contracts.campaign_state import CampaignState
+from procedures.contracts.journal import Event
 from tests.helpers.schedule_lab import BENCH, START, Lab
 
 CONFIRMED: dict[str, Any] = {"confirmed_by": "Ann", "checks": list(BENCH_CHECKS)}
@@ -129,6 +131,61 @@ def test_a_campaign_that_a_new_service_resumes_does_not_excuse_what_was_missed_b
     real.occupy(occupied=False)
     real.scheduler.tick()
     assert (real.outcomes(fresh), len(real.begun)) == (["refused"], 1)
+
+
+def under_way(real: Lab) -> StoreJournal:
+    """Write down a campaign on the bench that begins now, as its engine does."""
+    at = real.clock.utc()
+    new = NewCampaign("short", {}, BENCH.name, {}, "0" * 64, 1.0, [{"kind": "soak", "expected_s": 1.0}], [])
+    journal = real.store.campaigns.journal(real.store.campaigns.create(new, at))
+    journal.campaign_state(CampaignState.RUNNING, "", 0.0, at)
+    real.occupy(occupied=True)
+    return journal
+
+
+def test_a_restart_does_not_make_a_start_late_that_queues_behind_a_campaign(real: Lab) -> None:
+    journal = under_way(real)
+    waits = real.enter(at="2026-01-05T10:00Z")
+    real.live(6 * H)
+    journal.event(Event("soak", "a soak begins"), 6 * 3600.0, real.clock.utc())
+    real.clock.sleep(600)  # no service for ten minutes
+    real.scheduler = real.service()
+    real.live(2 * H)  # the campaign is resumed
+    assert real.outcomes(waits) == []
+    journal.campaign_state(CampaignState.DONE, "", 8 * 3600.0, real.clock.utc())
+    real.clock.sleep(600)  # again none, between the campaigns
+    real.occupy(occupied=False)
+    real.scheduler = real.service()
+    real.scheduler.tick()
+    assert (len(real.begun), real.outcomes(waits)) == (1, ["refused"])
+
+
+def test_a_restart_after_hours_without_a_service_excuses_no_start(real: Lab) -> None:
+    journal = under_way(real)
+    missed = real.enter(at="2026-01-05T10:00Z")
+    real.live(4 * H)
+    journal.event(Event("soak", "a soak begins"), 4 * 3600.0, real.clock.utc())
+    real.clock.sleep(2 * 3600)
+    real.store.campaigns.close_unfinished(1, "not resumed", real.clock.utc())  # by the next service
+    real.occupy(occupied=False)
+    real.scheduler = real.service()
+    real.scheduler.tick()
+    assert (real.begun, real.outcomes(missed)) == ([], ["missed"])
+    assert "4 h 00 min late, 2 h 00 min of it without a campaign on the bench" in real.message(missed)
+
+
+def test_a_service_reads_the_past_before_it_resumes_a_campaign(store: Store, monkeypatch: pytest.MonkeyPatch) -> None:
+    order: list[str] = []
+    local = LabService(store, VirtualClock(START), BenchRunner(store, BENCH, VirtualClock)).bench_access
+    assert isinstance(local, LocalBench)
+    assert local.runner is not None
+    assert local.scheduler is not None
+    monkeypatch.setattr(local.runner, "resume_unfinished", lambda: order.append("resume"))
+    monkeypatch.setattr(local.scheduler, "read_the_past", lambda: order.append("past"))
+    monkeypatch.setattr(local.scheduler, "start", lambda: None)
+    local.start()
+    local.close()
+    assert order[:2] == ["past", "resume"]
 
 
 def test_the_time_without_a_campaign_after_one_is_what_counts(real: Lab) -> None:

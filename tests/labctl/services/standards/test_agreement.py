@@ -77,6 +77,32 @@ def test_what_differs_is_said(store: Store, changed: dict[str, Any], words: str)
     assert words in said(store, Standard.model_validate({**ENTRY.model_dump(), **changed}))
 
 
+def test_equal_numbers_of_two_laboratories_are_two_certificates(store: Store) -> None:
+    register.certificate(store, "T-1", date(2023, 12, 1), 0.5, due="2026-06-30")
+    unnamed = thermometer("T-1", name="probe of the chamber", calibrated="2023-12-01", due="2026-06-30")
+    assert as_used(store, [unnamed], TODAY)[0].value == 0.5  # DKD in both
+    assert as_used(store, [unnamed.model_copy(update={"issued_by": " d.k.d "})], TODAY)[0].value == 0.5
+    assert as_used(store, [unnamed.model_copy(update={"issued_by": ""})], TODAY)[0].value == 0.5
+    other = unnamed.model_copy(update={"issued_by": "NPL"})
+    assert as_used(store, [other], TODAY) == (other,)
+    expected = "certificate T-1 of NPL in the bench file is in the register as one of DKD, of standard Pt100-7"
+    assert expected in said(store, other)
+    assert expected in said(store, ENTRY.model_copy(update={"issued_by": "NPL"}))  # the standard by its name
+
+
+def test_a_standard_may_have_certificates_of_one_number_by_two_laboratories(store: Store) -> None:
+    register.certificate(store, "1", date(2023, 12, 1), 0.01)
+    register.certificate(store, "1", date(2024, 12, 1), 0.02, laboratory="NPL")
+    with pytest.raises(Conflict, match="certificate 1 of standard Pt100-7 is in the register; to correct it"):
+        register.certificate(store, "1", date(2024, 12, 1), 0.03, laboratory="npl")
+    register.certificate(store, "1", date(2024, 12, 1), 0.03, laboratory="NPL", reason="typed wrong")
+    found = one_standard(store, "Pt100-7", TODAY).certificates
+    assert [(each.laboratory, each.points[0].value) for each in found] == [("DKD", 0.01), ("NPL", 0.03)]
+    register.certificate(store, "1", date(2024, 12, 1), 0.03, laboratory="PTB", reason="laboratory was wrong")
+    found = one_standard(store, "Pt100-7", TODAY).certificates
+    assert [each.laboratory for each in found] == ["DKD", "PTB"]
+
+
 def test_the_less_favourable_statement_counts(store: Store) -> None:
     register.certificate(store, "T-1", date(2023, 12, 1), None, due="2026-06-30")
     (used,) = as_used(store, [thermometer("T-1", u=0.005, due="2027-01-31")], TODAY)

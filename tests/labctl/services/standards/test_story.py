@@ -9,14 +9,16 @@ from contextlib import closing
 from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from labctl.errors import CertificationRefused
+from labctl.errors import CertificationRefused, Conflict
 from labctl.services.calibrations.certification import certify
 from labctl.services.calibrations.fitting import list_calibrations, one_version
+from labctl.services.certificates import issue as issuing
 from labctl.services.certificates.issue import CertificateRefused, issue
-from labctl.services.certificates.served import certificate_file, list_certificates
+from labctl.services.certificates.served import certificate_file, list_certificates, public_certificate
 from labctl.services.schemas.certification import CertifyRequest
 from labctl.services.schemas.standards import StandardResponse, WithdrawFindingRequest
 from labctl.services.standards.register import one_standard, withdraw_finding
@@ -88,7 +90,12 @@ def test_they_have_a_notice_wherever_they_are_shown(laboratory: Laboratory) -> N
     assert not one_version(store, "FOG-C", 1).notices
     assert unit(store, "FOG-B", noon(FOUND)).notices  # its version in force
     assert not unit(store, "FOG-A", noon(FOUND)).notices
-    assert list_certificates(store, "FOG-A")[-1].notices == [notice]
+    touched = list_certificates(store, "FOG-A")[-1]
+    assert touched.notices == [notice]
+    _, hash_ = store.calibrations.document("FOG-A", 2)
+    (said,) = public_certificate(store, touched.number, hash_).notices  # behind the QR code
+    assert "Pt100-7, which was used on these days, was found bad from 2025-04-01 until 2025-09-15. Ask" in said
+    assert "sheath" not in said  # what the laboratory wrote for itself
 
 
 def test_new_certificates_of_them_are_refused_and_the_others_are_issued(laboratory: Laboratory) -> None:
@@ -175,3 +182,27 @@ def test_a_finding_that_was_wrong_is_withdrawn_and_stays_readable(tmp_path: Path
         assert answer.findings[0].withdrawn == "Q. Manager, 2025-09-15: the reference of the check was wrong"
         assert not list_calibrations(store, "FOG-B")[0].notices
         assert issue(store, "FOG-B", 1, request(), noon(FOUND)).number
+
+
+def test_a_standard_that_is_found_bad_while_a_certificate_is_written_refuses_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    on = date(2025, 3, 3)
+    with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
+        register.add(store)
+        register.certificate(store, "T-1", date(2024, 12, 1), 0.010, due="2025-12-31")
+        register.measured(store, "FOG-A", on, COUNTER, thermometer("T-1"))
+        write = issuing.forms_of
+
+        def found_bad_meanwhile(*given: Any) -> Any:
+            register.bad(store, on, on, on)
+            return write(*given)
+
+        with monkeypatch.context() as patched:
+            patched.setattr(issuing, "forms_of", found_bad_meanwhile)
+            with pytest.raises(Conflict, match=r"no certificate of FOG-A version 1 was stored.*send the request again"):
+                issue(store, "FOG-A", 1, request(), noon(on))
+        assert store.certificates.of_unit("FOG-A") == []
+        assert not [row for row in store.audit.rows() if row.action == "certificate"]
+        with pytest.raises(CertificateRefused, match="Pt100-7 was found bad"):
+            issue(store, "FOG-A", 1, request(), noon(on))

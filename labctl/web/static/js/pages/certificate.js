@@ -54,6 +54,12 @@ function shown(known) {
         ? null
         : h("p", {}, instead ? `Valid now: certificate ${instead}.` : "None is valid now."),
     ),
+    known.notices.length
+      ? notice(
+          "bad",
+          known.notices.map((each) => h("p", {}, each)),
+        )
+      : null,
     factList([
       ["State", stateChip(known.state)],
       ["Number", known.number],

@@ -44,7 +44,7 @@ export function certificateTable(issued) {
           ),
       },
       { title: "Why", prose: true, cell: (row) => row.state_reason || "–" },
-      { title: "Replaced by", cell: (row) => row.replaced_by ?? row.superseded_by ?? "–" },
+      { title: "Valid instead", cell: (row) => row.valid_instead ?? "–" },
       {
         title: "",
         cell: (row) =>

@@ -1,0 +1,32 @@
+"""Free texts that people type: reasons, names, notes. What a terminal, a list or a file would obey is found here."""
+
+from __future__ import annotations
+
+import unicodedata
+
+#: Characters that turn the direction of a text, so that it reads as another one.
+_DIRECTIONS = frozenset(map(chr, (*range(0x202A, 0x202F), *range(0x2066, 0x206A))))
+#: Control characters, separators of lines and paragraphs, and halves of a character (Unicode categories).
+_CATEGORIES = frozenset({"Cc", "Zl", "Zp", "Cs"})
+#: What a text of several lines may have of these.
+_LINES = frozenset("\n\r\t")
+
+
+def control_character(text: str, *, lines: bool = False) -> str:
+    """Return the first control character of a text as words, such as "U+001B at character 5"; empty: it has none.
+
+    With `lines` the text may have several lines, and tabs.
+    """
+    for place, each in enumerate(text, 1):
+        if _is_control(each) and not (lines and each in _LINES):
+            return f"U+{ord(each):04X} at character {place}"
+    return ""
+
+
+def cleaned(text: str) -> str:
+    """Return a text with a space in place of each control character."""
+    return "".join(" " if _is_control(each) else each for each in text)
+
+
+def _is_control(character: str) -> bool:
+    return character in _DIRECTIONS or unicodedata.category(character) in _CATEGORIES

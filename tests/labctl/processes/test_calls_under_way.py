@@ -1,0 +1,89 @@
+"""The end of a bench process: what is under way is answered, what comes later is refused, and neither takes long."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+from typing import Any, cast
+
+import pytest
+
+from instruments.clock import WallClock
+from labctl.errors import BenchSilent
+from labctl.processes import bench_calls
+from labctl.processes.bench_calls import BenchCalls
+from labctl.processes.calls import Caller, CallServer
+from labctl.processes.held_address import HeldAddress
+from labctl.processes.supervision import Supervision
+from labctl.services.local_bench import LocalBench
+from labctl.store import Store
+
+WAIT_S = 20.0
+
+
+class SlowStore:
+    """A store whose transaction lasts until `go_on` is set, and that notes a use after it was closed."""
+
+    def __init__(self) -> None:
+        self.begun, self.go_on = threading.Event(), threading.Event()
+        self.is_closed, self.used_closed = False, False
+
+    def run(self, *_: Any) -> str:
+        self.begun.set()
+        self.go_on.wait(WAIT_S)
+        self.used_closed |= self.is_closed
+        return "stored"
+
+
+class Bench:
+    """The calls of a bench process over their socket, with one that is under way."""
+
+    def __init__(self, folder: Path) -> None:
+        self.store = SlowStore()
+        local = LocalBench(cast(Store, self.store), WallClock(), None)
+        self.calls = BenchCalls(
+            cast(Store, self.store), local, cast(Supervision, None), cast(HeldAddress, None), WallClock()
+        )
+        self.server = CallServer(folder / "calls", self.calls.answer)
+        self.server.start()
+        self.caller, self.other = (Caller(folder / "calls", WAIT_S) for _ in range(2))
+        assert self.caller.call("bench.describe") is None  # its connection is kept
+        self.answers: list[object] = []
+        self.asking = threading.Thread(target=lambda: self.answers.append(self.other.call("store.x")))
+        self.asking.start()
+        self.store.begun.wait(WAIT_S)
+
+    def leave(self) -> None:
+        """Let what is under way end, and close the connections."""
+        self.store.go_on.set()
+        self.asking.join(WAIT_S)
+        self.caller.close()
+        self.other.close()
+
+    def end(self) -> None:
+        """Close in the order of the process."""
+        self.server.close()
+        self.calls.close()
+        self.store.is_closed = True
+
+
+def test_a_call_that_is_under_way_is_answered_before_the_database_is_closed(tmp_path: Path) -> None:
+    bench = Bench(tmp_path)
+    ending = threading.Thread(target=bench.end)
+    ending.start()
+    while not bench.calls._under_way._is_over:
+        threading.Event().wait(0.01)
+    with pytest.raises(BenchSilent, match="the bench process is ending; wait for its restart, then try again"):
+        bench.caller.call("store.x")  # over the connection that is kept
+    assert ending.is_alive()
+    bench.leave()
+    ending.join(WAIT_S)
+    assert (bench.answers, bench.store.used_closed) == (["stored"], False)
+
+
+def test_a_call_that_does_not_end_is_not_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bench_calls, "UNDER_WAY_S", 0.05)
+    bench = Bench(tmp_path)
+    bench.end()
+    assert bench.store.is_closed
+    bench.leave()
