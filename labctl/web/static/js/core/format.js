@@ -76,8 +76,9 @@ export function mean(value, spread) {
 export function duration(seconds) {
   if (!isNumber(seconds)) return "–";
   const whole = Math.max(0, Math.round(seconds));
-  const [hours, minutes] = [Math.floor(whole / 3600), Math.floor((whole % 3600) / 60)];
-  if (hours) return `${hours} h ${minutes} min`;
+  const rounded = Math.round(whole / 60);
+  if (rounded >= 60) return `${Math.floor(rounded / 60)} h ${rounded % 60} min`;
+  const minutes = Math.floor(whole / 60);
   return minutes ? `${minutes} min ${whole % 60} s` : `${whole} s`;
 }
 
