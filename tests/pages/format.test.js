@@ -47,9 +47,9 @@ test("means line up at one place beyond their spread", () => {
 
 test("a duration is in the two units that matter", () => {
   holds(format.duration, [
-    [4780.6, "1 h 20 min"],
-    [3599, "1 h 0 min"],
-    [3569, "59 min 29 s"],
+    [[4780.6], "1 h 20 min"],
+    [[3599], "1 h 0 min"],
+    [[3569], "59 min 29 s"],
     [[162_600], "45 h 10 min"],
     [[200], "3 min 20 s"],
     [[12.4], "12 s"],
