@@ -15,7 +15,7 @@ from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.trend_line import LEAST_POINTS, TrendLine, trend_line
 from labctl.services.cache import UNNAMED, compute
 from labctl.services.criticism.measurements import Measurements
-from labctl.services.criticism.verification.of_version import LARGEST_RATIO, applied_errors, expected_dps, verify
+from labctl.services.criticism.verification.of_version import LARGEST_RATIO, applied_errors, expected_dps, left_by
 from labctl.services.criticism.versions import version_of
 from labctl.services.schemas.units import (
     AppliedVersion,
@@ -101,7 +101,7 @@ def _applied(store: Store, version: Sequence[CalibrationRecord], data: Measureme
     if not version:
         return None
     try:
-        found = verify(store, version[0], data)
+        found = left_by(store, version[0], data)
     except LabctlError:
         return None
     return AppliedVersion(
