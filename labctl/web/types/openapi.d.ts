@@ -2015,7 +2015,7 @@ export interface components {
             expected_dps: number | null;
             /**
              * Ok
-             * @description Whether `rms_dps` is at most twice `expected_dps`.
+             * @description Whether the RMS error of each axis is at most the limit of the axis.
              */
             ok: boolean;
             /**
@@ -2284,6 +2284,21 @@ export interface components {
             max_dps: number;
             /** Bias Dps */
             bias_dps: number;
+            /**
+             * Expected Dps
+             * @description RMS error that is expected of the version on this axis, deg/s: that over all axes times the share of the axis in what the version leaves of its own data; null: unknown.
+             */
+            expected_dps: number | null;
+            /**
+             * Limit Dps
+             * @description Largest RMS error of an axis that holds, deg/s: twice `expected_dps`, or more where the recording or the data of the fit have few independent errors. In at most 5 % of the recordings of versions that hold is any axis beyond its limit.
+             */
+            limit_dps: number | null;
+            /**
+             * Ok
+             * @description Whether `rms_dps` is at most `limit_dps`; null: unknown.
+             */
+            ok: boolean | null;
         };
         /**
          * BackupNote
@@ -8976,6 +8991,11 @@ export interface components {
                 [key: string]: components["schemas"]["AxisVerification"];
             };
             /**
+             * Axes Off
+             * @description Axes whose RMS error is beyond the limit of the axis.
+             */
+            axes_off: string[];
+            /**
              * Outside Validity
              * @description Number of data sets outside the rates or temperatures of the calibration.
              */
@@ -8987,7 +9007,7 @@ export interface components {
             expected_dps: number | null;
             /**
              * Ok
-             * @description Whether `rms_dps` is at most twice `expected_dps`.
+             * @description Whether the RMS error of each axis is at most the limit of the axis.
              */
             ok: boolean;
         };

@@ -41,7 +41,7 @@ def own_errors(
 ) -> dict[str, OwnError]:
     """Return axis -> what a version leaves of its own data sets, (m,) deg/s of each of its recordings.
 
-    It is {} where an axis has no more data sets than coefficients, or no error at all: the axes are then not told apart.
+    It is {} where an axis has no more data sets than coefficients, or no error: one expectation then serves all axes.
     """
     found = {}
     for axis, parts in errors.items():
