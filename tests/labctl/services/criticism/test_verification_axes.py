@@ -1,8 +1,6 @@
-"""Each axis is judged by its own expectation: one axis off alone is found, and a version that holds is rarely doubted."""
+"""Each axis is judged by its own expectation: one axis off alone is found, and a version that holds is not doubted."""
 
 from __future__ import annotations
-
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -122,7 +120,9 @@ def test_the_limit_is_twice_the_expectation_or_more_where_less_is_independent() 
 
 def test_sessions_and_temperature_levels_are_groups() -> None:
     assert independent_groups(recording(1)) == 15
-    still = Recording(RecordingInfo(serial="A", axes=("x",), kind="points", started_at=STARTED), {"dataset": np.ones(3)})
+    still = Recording(
+        RecordingInfo(serial="A", axes=("x",), kind="points", started_at=STARTED), {"dataset": np.ones(3)}
+    )
     assert independent_groups(still) == 1
 
 
