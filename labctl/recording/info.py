@@ -83,6 +83,9 @@ class RecordingInfo(BaseModel):
     started_at: AwareDatetime
     #: Whether `started_at` is the date of the measurement; false: that is unknown, and it is the time of the import.
     date_known: bool = True
+    #: What of the file that it was read from could not be read, in words, and its share, 0 to 1.
+    unread: str = ""
+    unread_share: float | None = Field(default=None, ge=0, le=1)
     power_on_s: float | None = None
     latitude_deg: float | None = Field(default=None, ge=-90, le=90)
     table_axis: Literal["up"] = "up"

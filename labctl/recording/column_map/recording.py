@@ -29,8 +29,11 @@ Array = NDArray[np.float64]
 LEAST_ROWS = 2
 #: Keys of recording.toml that the map has in places of its own, or that the data decide.
 _TAKEN = frozenset(
-    {"format", "serial", "axes", "kind", "motion", "started_at", "date_known", "output", "sample_rate_hz"}
-)
+    {
+        "format", "serial", "axes", "kind", "motion", "started_at", "date_known", "output", "sample_rate_hz", "unread",
+        "unread_share",
+    }
+)  # fmt: skip
 #: An instant of a file before this is that of a clock that was never set: seconds since power-on, or a simulation.
 EARLIEST = datetime(1990, 1, 1, tzinfo=UTC)
 #: Specific force at rest that units of g allow, g.
@@ -204,6 +207,8 @@ def _info(
         "sample_rate_hz": column_map.sample_rate_hz,
         "notes": str(column_map.info.get("notes") or table.facts.get("notes") or ""),
     }  # fmt: skip
+    if table.unread is not None:
+        head |= {"unread": table.unread.text, "unread_share": table.unread.share}
     try:
         return RecordingInfo.model_validate(head)
     except ValidationError as error:

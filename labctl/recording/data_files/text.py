@@ -11,8 +11,10 @@ import pyarrow.csv as pacsv
 from numpy.typing import NDArray
 
 from labctl.errors import BadRecording
+from labctl.recording.data_files.last_line import cut_last_line
 from labctl.recording.data_files.limits import VALUE_BYTES, Space, checked_names, refuse_too_many
 from labctl.recording.data_files.values import ColumnValues
+from labctl.recording.unread import TAKE_AGAIN
 
 #: The longest header that is read.
 MOST_HEADER_BYTES = 1 << 16
@@ -21,6 +23,8 @@ MOST_HEADER_BYTES = 1 << 16
 def read_csv(path: Path) -> dict[str, NDArray[np.generic]]:
     """Read a CSV file into named columns, block by block; raises BadRecording naming file, column and row."""
     names = _header(path)
+    if (cut := cut_last_line(path, "utf-8", ",")) is not None:
+        raise BadRecording(f"{path}: {cut.text}; {TAKE_AGAIN}, or remove the last line")
     checked_names(path, names)
     space = Space(path)
     columns = [ColumnValues(path, name, space) for name in names]

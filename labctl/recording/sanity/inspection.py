@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from labctl.recording.recording import Columns, Recording
+from labctl.recording.sanity.damage import check_damage
 from labctl.recording.sanity.finding import Finding
 from labctl.recording.sanity.gain import check_responses
 from labctl.recording.sanity.outlying import check_outlying
@@ -26,9 +27,11 @@ def findings_of(summary: Summary, environment: Columns | None = None) -> list[Fi
     if len(summary) == 0:
         return []
     if summary.info.motion == "poses":  # no rate is known that an output could follow
-        return sorted(check_time(summary, environment), key=lambda finding: finding.severity != "certain")
+        found = [*check_damage(summary.info), *check_time(summary, environment)]
+        return sorted(found, key=lambda finding: finding.severity != "certain")
     if summary.info.motion == "profile":  # a rate may change, and so may the output
-        found = [*check_responses(summary, responses(summary)), *check_time(summary, environment)]
+        timed = [*check_damage(summary.info), *check_time(summary, environment)]
+        found = [*check_responses(summary, responses(summary)), *timed]
         return sorted(found, key=lambda finding: finding.severity != "certain")
     off = off_turns(summary)
     sound = np.ones(len(summary), dtype=bool)
@@ -36,6 +39,7 @@ def findings_of(summary: Summary, environment: Columns | None = None) -> list[Fi
     trusted = summary.take(sound) if off else summary
     whole = summary.take(~np.any([with_two_rates(summary, axis) for axis in summary.info.axes], axis=0))
     found = [
+        *check_damage(summary.info),
         *check_turned(summary, off),
         *check_responses(trusted, responses(trusted)),
         *(check_outlying(whole, responses(whole)) if summary.info.motion != "turns" else ()),
