@@ -23,11 +23,11 @@ def performed(store: Store, row: RecordingRow) -> Days:
         campaign = store.campaigns.get(row.campaign)
         begun = campaign.started_at or campaign.created_at
         return begun.date(), None if campaign.ended_at is None else campaign.ended_at.date()
-    begun = measured_at(row.info)
-    if begun is None:
+    at = measured_at(row.info)
+    if at is None:
         return None, None
     ends = [each.t_until_s for each in store.recordings.data_sets(row.id) if each.t_until_s is not None]
-    return begun.date(), (begun + timedelta(seconds=max(ends))).date() if ends else None
+    return at.date(), (at + timedelta(seconds=max(ends))).date() if ends else None
 
 
 def is_entry_of(standard: RegisteredStandard, entry: Standard) -> bool:

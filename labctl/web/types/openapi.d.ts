@@ -1821,14 +1821,11 @@ export interface components {
             campaigns: number[];
             /**
              * Performed From
-             * Format: date
+             * @description null: the date of a recording is not known.
              */
-            performed_from: string;
-            /**
-             * Performed Until
-             * Format: date
-             */
-            performed_until: string;
+            performed_from: string | null;
+            /** Performed Until */
+            performed_until: string | null;
             /** In Force */
             in_force: boolean;
             /**
@@ -3819,10 +3816,9 @@ export interface components {
             laboratory: string;
             /**
              * Measured On
-             * Format: date
-             * @description First day of its newest recording.
+             * @description First day of its newest recording; null: not known.
              */
-            measured_on: string;
+            measured_on: string | null;
         };
         /**
          * ComparedModel
@@ -5447,6 +5443,11 @@ export interface components {
              * @default bias_scale
              */
             suggested_model: string;
+            /**
+             * Measured At
+             * @description Date of the measurement; null: the file states none, and it is not known.
+             */
+            measured_at: string | null;
             /**
              * Warnings
              * @description Certain and probable errors of the data or of the fit, the certain errors first; empty if there are none.
@@ -7886,6 +7887,11 @@ export interface components {
              */
             suggested_model: string;
             /**
+             * Measured At
+             * @description Date of the measurement; null: the file states none, and it is not known.
+             */
+            measured_at: string | null;
+            /**
              * Warnings
              * @description Certain and probable errors of the data or of the fit, the certain errors first; empty if there are none.
              */
@@ -8626,6 +8632,11 @@ export interface components {
             drifts: components["schemas"]["Drift"][];
             /** Leaves */
             leaves: components["schemas"]["Leaving"][];
+            /**
+             * Undated
+             * @description Recordings whose date of measurement is not known; they are left out.
+             */
+            undated: number[];
             /** Text */
             text: string[];
         };
