@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +15,6 @@ from labctl.recording.columns import BY_NAME, holds_flags
 from labctl.recording.data_files.damaged_files import parsed_by_library
 from labctl.recording.data_files.limits import VALUE_BYTES, Space, checked_names, refuse_too_large, refuse_too_many
 from labctl.recording.data_files.values import ColumnValues, holds_words
-from labctl.recording.unread import share_text
 
 #: Rows that are unpacked at a time.
 PIECE_ROWS = 1 << 16
@@ -24,8 +23,6 @@ BUFFER_BYTES = 1 << 20
 #: Above this, no footer of so few columns is one: 256 columns of 100,000 rows a group need a tenth of it.
 MOST_FOOTER_BYTES = 16 << 20
 MAGIC = b"PAR1"
-#: No instrument gives a number above this; random bits do.
-LARGEST_NUMBER = 1e30
 
 
 def read_parquet(path: Path, accept: Callable[[pa.Schema], None] | None = None) -> dict[str, NDArray[np.generic]]:
@@ -82,20 +79,7 @@ def _read(path: Path, accept: Callable[[pa.Schema], None] | None) -> dict[str, N
         raise BadRecording(
             f"{path}: its footer states {rows} rows, but the file has {columns[0].rows}; write the file again"
         )
-    found = {column.name: column.whole() for column in columns}
-    _refuse_damaged_values(path, found)
-    return found
-
-
-def _refuse_damaged_values(path: Path, columns: Mapping[str, NDArray[np.generic]]) -> None:
-    """Raise BadRecording for numbers that no instrument gives: pages without a checksum show damage by nothing else."""
-    for name, values in columns.items():
-        if values.dtype.kind == "f" and (odd := np.isfinite(values) & (np.abs(values) > LARGEST_NUMBER)).any():
-            rows = np.flatnonzero(odd) + 1
-            raise BadRecording(
-                f"{path}: column {name[:80]!r}, rows {rows[0]} to {rows[-1]}: {share_text(len(rows) / len(values))} of "
-                f"the numbers are larger than {LARGEST_NUMBER:g}, which damage leaves; write or copy the file again"
-            )
+    return {column.name: column.whole() for column in columns}
 
 
 def _refuse_large_footer(path: Path) -> None:
