@@ -23,8 +23,6 @@ MOST_HEADER_BYTES = 1 << 16
 def read_csv(path: Path) -> dict[str, NDArray[np.generic]]:
     """Read a CSV file into named columns, block by block; raises BadRecording naming file, column and row."""
     names = _header(path)
-    if (cut := cut_last_line(path, "utf-8", ",")) is not None:
-        raise BadRecording(f"{path}: {cut.text}; {TAKE_AGAIN}, or remove the last line")
     checked_names(path, names)
     space = Space(path)
     columns = [ColumnValues(path, name, space) for name in names]
@@ -52,7 +50,10 @@ def read_csv(path: Path) -> dict[str, NDArray[np.generic]]:
         ) from error
     if rows == 0:
         raise BadRecording(f"{path}: no rows below the header; expected at least one")
-    return {column.name: column.whole() for column in columns}
+    found = {column.name: column.whole() for column in columns}
+    if (cut := cut_last_line(path, "utf-8", ",")) is not None:
+        raise BadRecording(f"{path}: {cut.text}; {TAKE_AGAIN}, or remove the last line")
+    return found
 
 
 def _header(path: Path) -> list[str]:
