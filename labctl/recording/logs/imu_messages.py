@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,32 @@ NEIGHBOURS = 5
 NS = 1_000_000_000
 
 
-def is_damaged(message: Any) -> bool:
+class Vector(Protocol):
+    """A geometry_msgs/Vector3."""
+
+    x: float
+    y: float
+    z: float
+
+
+class Head(Protocol):
+    """A std_msgs/Header."""
+
+    frame_id: str
+
+
+class ImuMessage(Protocol):
+    """A sensor_msgs/Imu, as rosbags gives it."""
+
+    header: Head
+    orientation_covariance: NDArray[np.float64]
+    angular_velocity: Vector
+    angular_velocity_covariance: NDArray[np.float64]
+    linear_acceleration: Vector
+    linear_acceleration_covariance: NDArray[np.float64]
+
+
+def is_damaged(message: ImuMessage) -> bool:
     """Return whether the numbers or the name of the frame of a message are none that a driver writes."""
     numbers = np.concatenate([
         message.orientation_covariance, message.angular_velocity_covariance, message.linear_acceleration_covariance,

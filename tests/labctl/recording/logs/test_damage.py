@@ -13,10 +13,10 @@ import pytest
 
 from labctl.errors import BadRecording
 from labctl.recording import Recording
+from tests.helpers.bags import bag, imported
 from tests.helpers.lab import Lab
 from tests.helpers.service import open_client
 from tests.helpers.written_logs import at_rest, csv_text, resting_ulog
-from tests.labctl.recording.logs.test_logs import bag, imported
 
 ROWS = at_rest(3000)
 PLACES = 24
