@@ -14,7 +14,6 @@ from labctl.errors import BadRecording
 from labctl.recording.data_files.last_line import cut_last_line
 from labctl.recording.data_files.limits import VALUE_BYTES, Space, checked_names, refuse_too_many
 from labctl.recording.data_files.values import ColumnValues
-from labctl.recording.unread import TAKE_AGAIN
 
 #: The longest header that is read.
 MOST_HEADER_BYTES = 1 << 16
@@ -52,7 +51,7 @@ def read_csv(path: Path) -> dict[str, NDArray[np.generic]]:
         raise BadRecording(f"{path}: no rows below the header; expected at least one")
     found = {column.name: column.whole() for column in columns}
     if (cut := cut_last_line(path, "utf-8", ",")) is not None:
-        raise BadRecording(f"{path}: {cut.text}; {TAKE_AGAIN}, or remove the last line")
+        raise BadRecording(f"{path}: {cut.text}; copy the file again, or remove the last line")
     return found
 
 
