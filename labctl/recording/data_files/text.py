@@ -51,7 +51,7 @@ def read_csv(path: Path) -> dict[str, NDArray[np.generic]]:
         raise BadRecording(f"{path}: no rows below the header; expected at least one")
     found = {column.name: column.whole() for column in columns}
     if (cut := cut_last_line(path, "utf-8", ",")) is not None:
-        raise BadRecording(f"{path}: {cut.text}; copy the file again, or remove the last line")
+        raise BadRecording(f"{path}: {cut.text}; write the file again or remove its last line")
     return found
 
 
