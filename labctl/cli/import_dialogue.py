@@ -131,9 +131,10 @@ def show(found: MappedFile) -> None:
     if log is not None:
         info = log.recording.info
         sets = len(set(log.recording.columns["dataset"].tolist()))
+        known = info.measured_at
         console.print(
             f"serial {info.serial}; motion {log.motion}; data sets by {found.column_map.datasets.by}: {sets}; "
-            f"began {info.started_at:%Y-%m-%d %H:%M:%S} UTC"
+            + (f"began {known:%Y-%m-%d %H:%M:%S} UTC" if known else "date of the measurement not known")
         )  # fmt: skip
         if log.unused:
             console.print(f"not used: {', '.join(log.unused)}")

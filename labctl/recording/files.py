@@ -90,7 +90,9 @@ def write_recording(recording: Recording, folder: Path, file_format: FileFormat 
     with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}-") as made:
         whole = Path(made) / "recording"
         whole.mkdir()
-        unstated = {name for name in ("standards", "thermometer") if not getattr(recording.info, name)}
+        unstated = {name for name in ("standards", "thermometer", "unread") if not getattr(recording.info, name)}
+        if recording.info.date_known:
+            unstated.add("date_known")
         head = recording.info.model_dump(mode="json", exclude_none=True, exclude=unstated)
         (whole / HEAD).write_bytes(tomli_w.dumps(head).encode())
         write_table(recording.columns, whole / f"{recording.info.kind}.{file_format}")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Generic, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
 
 from labctl.recording.raw_table import RawTable
 from labctl.recording.recording import Recording
@@ -25,6 +25,7 @@ class TableOptions(BaseModel):
     model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True)
 
     serial: str | None = Field(default=None, max_length=64)  #: instead of the map's or the file's
+    started_at: AwareDatetime | None = None  #: instant of the first reading, instead of the map's or the file's
 
 
 OptionsT = TypeVar("OptionsT", bound=BaseModel)

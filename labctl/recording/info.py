@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from datetime import UTC, datetime
 from typing import Any, Literal
 
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, model_validator
@@ -26,6 +28,14 @@ REFERENCES: dict[RateReference, str] = {
 
 #: Units that are rates already: what one deg/s is in them.
 RATE_UNITS = {"deg/s": 1.0, "rad/s": math.pi / 180.0, "deg/h": 3600.0}
+
+
+#: `started_at` of a recording without a date that is not in a store yet: the store puts the time of the import there.
+NO_DATE = datetime(1970, 1, 1, tzinfo=UTC)
+#: What the notes of a recording say that an earlier version of labctl gave the date of its file.
+DATE_OF_FILE = "the time at which the file was last written is used as started_at"
+#: What to do about a date that is not known.
+GIVE_DATE = "import it again with `--option started_at=2026-01-05T08:00:00Z`, or with started_at in the column map"
 
 
 class OutputUnit(BaseModel):
@@ -71,6 +81,11 @@ class RecordingInfo(BaseModel):
     kind: Literal["samples", "points", "coefficients"]
     motion: Motion = "rates"
     started_at: AwareDatetime
+    #: Whether `started_at` is the date of the measurement; false: that is unknown, and it is the time of the import.
+    date_known: bool = True
+    #: What of the file that it was read from could not be read, in words, and its share, 0 to 1.
+    unread: str = ""
+    unread_share: float | None = Field(default=None, ge=0, le=1)
     power_on_s: float | None = None
     latitude_deg: float | None = Field(default=None, ge=-90, le=90)
     table_axis: Literal["up"] = "up"
@@ -98,6 +113,11 @@ class RecordingInfo(BaseModel):
         return datasheet_figure(name, self.datasheet, self.datasheet_conventions, self.model)
 
     @property
+    def measured_at(self) -> datetime | None:
+        """The instant of `t_s` = 0; None where the date of the measurement is not known."""
+        return self.started_at if self.date_known and DATE_OF_FILE not in self.notes else None
+
+    @property
     def stability_dps(self) -> float | None:
         """The bias stability by the data sheet as a standard deviation, deg/s; None where it is not known."""
         figure = self.datasheet_figure("bias_stability_dps")
@@ -114,3 +134,15 @@ class RecordingInfo(BaseModel):
         if len(set(self.axes)) != len(self.axes):
             raise ValueError(f"an axis is repeated in axes = {list(self.axes)}; name each axis once")
         return self
+
+
+def measured_at(info: Mapping[str, object]) -> datetime | None:
+    """Return the instant of `t_s` = 0 of a stored head; None where the date of the measurement is not known."""
+    if not info.get("date_known", True) or DATE_OF_FILE in str(info.get("notes") or ""):
+        return None
+    return datetime.fromisoformat(str(info["started_at"]))
+
+
+def ordered_at(info: Mapping[str, object]) -> datetime:
+    """Return the instant that orders recordings: of the measurement, else of the import; no date to compute by."""
+    return datetime.fromisoformat(str(info["started_at"]))

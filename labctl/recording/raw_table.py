@@ -10,6 +10,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.recording.unread import Unread
+
 #: Rows of a file that a preview shows.
 SHOWN_ROWS = 8
 
@@ -76,6 +78,7 @@ class RawTable:
     facts: Mapping[str, object] = field(default_factory=dict)
     first_rows: Sequence[Sequence[str]] = ()
     started_at: datetime | None = None
+    unread: Unread | None = None  #: what of the file could not be read
 
     def shown_rows(self) -> list[list[str]]:
         """Return the first rows as text, at most SHOWN_ROWS."""

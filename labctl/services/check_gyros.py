@@ -16,6 +16,7 @@ from labctl.calibration import read_calibration
 from labctl.errors import BadInput, LabctlError, NotEnoughData
 from labctl.metrology.control_chart import ChartPoint, Judged, judged
 from labctl.recording.checks import POSSIBLE
+from labctl.recording.info import GIVE_DATE, measured_at, ordered_at
 from labctl.services.cache import UNNAMED, compute
 from labctl.services.calibrations.uncertainty import coefficients_at
 from labctl.services.schemas.validity import CheckGyroChart, CheckGyroPoint, CheckGyroRequest, CheckGyroResponse
@@ -106,9 +107,12 @@ def _results(store: Store, serial: str, at_c: float, first: date | None) -> tupl
     measured = [
         row
         for row in store.recordings.of_unit(serial)
-        if row.kind != "coefficients" and row.datasets and (first is None or _begun(row).date() >= first)
+        if row.kind != "coefficients" and row.datasets and (first is None or ordered_at(row.info).date() >= first)
     ]
-    for row in sorted(measured, key=lambda each: (_begun(each), each.id)):
+    for row in sorted(measured, key=lambda each: (ordered_at(each.info), each.id)):
+        if measured_at(row.info) is None:
+            left_out[row.id] = f"the date of the measurement is not known; {GIVE_DATE}"
+            continue
         own = next((each for each in versions if each.recordings == (row.id,)), None)
         if own is None:
             left_out[row.id] = f"no version is fitted to it alone: `labctl fit {serial} --recording {row.id}`"
@@ -120,10 +124,6 @@ def _results(store: Store, serial: str, at_c: float, first: date | None) -> tupl
             continue
         found.append(_Found(row, own.version, dict(values)))
     return found, left_out
-
-
-def _begun(row: RecordingRow) -> datetime:
-    return datetime.fromisoformat(str(row.info["started_at"]))
 
 
 @lru_cache(maxsize=MOST_RESULTS)
@@ -150,7 +150,7 @@ def _charts(found: Sequence[_Found]) -> Iterator[tuple[CheckGyroChart, list[Judg
 
 def _point(found: _Found, one: Judged) -> CheckGyroPoint:
     return CheckGyroPoint(
-        recording=found.row.id, campaign=found.row.campaign, at=_begun(found.row), version=found.version,
+        recording=found.row.id, campaign=found.row.campaign, at=ordered_at(found.row.info), version=found.version,
         value=one.point.value, u=one.point.u, state=one.state, limits=[limits_answer(each) for each in one.limits],
     )  # fmt: skip
 

@@ -77,6 +77,7 @@ def import_(
     database: Database = None,
 ) -> None:
     """Import data made on any bench: in the interchange format, or a log, whose columns a map names."""
+    from labctl.recording.info import GIVE_DATE
     from labctl.services.commands.open import execute
     from labctl.services.commands.registry import IMPORT_RECORDING
     from labctl.services.commands.requests import RecordingFolder
@@ -97,6 +98,10 @@ def import_(
         print_json(answer)
         return
     print_warnings(answer.warnings)
+    if answer.measured_at is None:
+        console.print(
+            f"The file states no date, so the date of the measurement is not known; {GIVE_DATE}.", markup=False
+        )
     console.print(
         f"recording {answer.recording} of {answer.serial}: {answer.datasets} data sets, {answer.readings} readings"
     )

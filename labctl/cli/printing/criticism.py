@@ -25,11 +25,13 @@ def print_verification(answer: VerificationResponse) -> None:
     from labctl.services.criticism.verification.text import verification_sentence
 
     console.print(verification_sentence(answer), soft_wrap=not console.is_terminal)
-    rows = table("", "axis", "RMS deg/s", "largest", "mean", numbers=3)
+    rows = table("", "axis", "RMS deg/s", "expected", "limit", "largest", "mean", numbers=5)
     for axis, found in answer.axes.items():
-        rows.add_row(axis, format_number(found.rms_dps), format_number(found.max_dps), format_number(found.bias_dps))
+        figures = (found.rms_dps, found.expected_dps, found.limit_dps, found.max_dps, found.bias_dps)
+        rows.add_row(axis, *map(format_number, figures))
     console.print(rows)
-    console.print("as expected" if answer.ok else "NOT as expected: fit a new version, or criticise this version")
+    off = f" on axis {', '.join(answer.axes_off)}" if answer.axes_off and len(answer.axes) > 1 else ""
+    console.print("as expected" if answer.ok else f"NOT as expected{off}: fit a new version, or criticise this version")
 
 
 def print_criticism(answer: CriticismResponse) -> None:

@@ -84,7 +84,8 @@ def print_affected(answer: AffectedResponse) -> None:
         for each in answer.calibrations:
             rows.add_row(
                 each.serial, str(each.version), ", ".join(map(str, each.campaigns)) or "imported",
-                f"{each.performed_from} to {each.performed_until}", "in force" if each.in_force else "",
+                f"{each.performed_from} to {each.performed_until}" if each.performed_from else "date not known",
+                "in force" if each.in_force else "",
                 ", ".join(each.certificates) or "–",
             )  # fmt: skip
         console.print(rows)
@@ -115,7 +116,8 @@ def print_comparison(answer: LaboratoryComparison) -> None:
     """Print two calibrations compared."""
     for name, side in (("first", answer.first), ("second", answer.second)):
         where = ", ".join(filter(None, (side.laboratory, side.bench))) or "imported"
-        said = f"{name}: {side.serial} version {side.version}, {where}, measured on {side.measured_on}"
+        day = side.measured_on or "a date that is not known"
+        said = f"{name}: {side.serial} version {side.version}, {where}, measured on {day}"
         console.print(said, markup=False)
     title = f"at {answer.temperature_c:g} deg C"
     rows = table(title, "axis", "result", "unit", "first", "U", "second", "U", "En", "zeta", numbers=6)

@@ -20,7 +20,7 @@ from labctl.recording.column_map.proposal import serial_of
 from labctl.recording.column_map.sources import refuse_wrong_cells, sources, unused
 from labctl.recording.column_map.time_axis import TimeAxis, time_axis
 from labctl.recording.columns import BY_NAME, holds_flags
-from labctl.recording.info import Motion, OutputUnit, RecordingInfo
+from labctl.recording.info import NO_DATE, Motion, OutputUnit, RecordingInfo
 from labctl.recording.raw_table import RawColumn, RawTable
 from labctl.recording.recording import Recording
 
@@ -28,7 +28,14 @@ Array = NDArray[np.float64]
 #: Readings that a recording has at least.
 LEAST_ROWS = 2
 #: Keys of recording.toml that the map has in places of its own, or that the data decide.
-_TAKEN = frozenset({"format", "serial", "axes", "kind", "motion", "started_at", "output", "sample_rate_hz"})
+_TAKEN = frozenset(
+    {
+        "format", "serial", "axes", "kind", "motion", "started_at", "date_known", "output", "sample_rate_hz", "unread",
+        "unread_share",
+    }
+)  # fmt: skip
+#: An instant of a file before this is that of a clock that was never set: seconds since power-on, or a simulation.
+EARLIEST = datetime(1990, 1, 1, tzinfo=UTC)
 #: Specific force at rest that units of g allow, g.
 _AT_REST_G = (0.5, 2.0)
 
@@ -190,21 +197,18 @@ def _info(
             f"[info] {taken[0]}: this key belongs at the top level of a map, or comes from the file; leave it out here"
         )
         return None
-    started = column_map.started_at or times.started_at or table.started_at
-    noted = [str(column_map.info.get("notes") or table.facts.get("notes") or "")]
-    if started is None:
-        started = _modified(table)
-        noted.append(
-            "the file contains no start time; the time at which the file was last written is used as started_at"
-        )
+    started = column_map.started_at or _dated(times.started_at) or _dated(table.started_at)
     head = {
         **{key: value for key, value in table.facts.items() if key not in _TAKEN},
         **column_map.info,
         "serial": column_map.serial or serial_of(table), "axes": column_map.axes, "kind": column_map.kind,
         "motion": motion,
-        "started_at": started, "output": output, "sample_rate_hz": column_map.sample_rate_hz,
-        "notes": "; ".join(filter(None, noted)),
+        "started_at": started or NO_DATE, "date_known": started is not None, "output": output,
+        "sample_rate_hz": column_map.sample_rate_hz,
+        "notes": str(column_map.info.get("notes") or table.facts.get("notes") or ""),
     }  # fmt: skip
+    if table.unread is not None:
+        head |= {"unread": table.unread.text, "unread_share": table.unread.share}
     try:
         return RecordingInfo.model_validate(head)
     except ValidationError as error:
@@ -214,6 +218,6 @@ def _info(
         return None
 
 
-def _modified(table: RawTable) -> datetime:
-    """Return when the file was written, where nothing in it says when its readings were taken."""
-    return datetime.fromtimestamp(table.path.stat().st_mtime, tz=UTC)
+def _dated(instant: datetime | None) -> datetime | None:
+    """Return the instant of a file's own clock; None where the clock was not set, and counted from 1970, say."""
+    return instant if instant is not None and instant >= EARLIEST else None

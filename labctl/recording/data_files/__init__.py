@@ -36,6 +36,13 @@ def write_table(columns: Columns, path: Path) -> None:
     if path.suffix == ".parquet":
         floats = [name for name in table.column_names if pa.types.is_floating(table.schema.field(name).type)]
         others = [name for name in table.column_names if name not in floats]
-        pq.write_table(table, path, compression="zstd", use_dictionary=others, use_byte_stream_split=floats)
+        pq.write_table(
+            table,
+            path,
+            compression="zstd",
+            use_dictionary=others,
+            use_byte_stream_split=floats,
+            write_page_checksum=True,
+        )
     else:
         pacsv.write_csv(table, path)

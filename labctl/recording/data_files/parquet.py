@@ -69,7 +69,8 @@ def _read(path: Path, accept: Callable[[pa.Schema], None] | None) -> dict[str, N
         if column.name not in words:
             space.take(column.name, rows * VALUE_BYTES)
     # words stay numbers of a dictionary: one long word in a million rows is one word
-    with pq.ParquetFile(path, read_dictionary=words, buffer_size=BUFFER_BYTES, pre_buffer=False) as opened:
+    options = {"buffer_size": BUFFER_BYTES, "pre_buffer": False, "page_checksum_verification": True}
+    with pq.ParquetFile(path, read_dictionary=words, **options) as opened:
         for group in range(metadata.num_row_groups):
             for piece in opened.iter_batches(PIECE_ROWS, row_groups=[group], use_threads=False):
                 for column, values in zip(columns, piece.columns, strict=True):

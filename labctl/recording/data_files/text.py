@@ -11,6 +11,7 @@ import pyarrow.csv as pacsv
 from numpy.typing import NDArray
 
 from labctl.errors import BadRecording
+from labctl.recording.data_files.last_line import cut_last_line
 from labctl.recording.data_files.limits import VALUE_BYTES, Space, checked_names, refuse_too_many
 from labctl.recording.data_files.values import ColumnValues
 
@@ -48,7 +49,10 @@ def read_csv(path: Path) -> dict[str, NDArray[np.generic]]:
         ) from error
     if rows == 0:
         raise BadRecording(f"{path}: no rows below the header; expected at least one")
-    return {column.name: column.whole() for column in columns}
+    found = {column.name: column.whole() for column in columns}
+    if (cut := cut_last_line(path, "utf-8", ",")) is not None:
+        raise BadRecording(f"{path}: {cut.text}; write the file again or remove its last line")
+    return found
 
 
 def _header(path: Path) -> list[str]:

@@ -13,6 +13,7 @@ from labctl.recording.column_map.model import ColumnMap
 from labctl.recording.column_map.names import name_says
 from labctl.recording.column_map.sources import source
 from labctl.recording.raw_table import RawColumn, RawTable
+from labctl.recording.unread import of_several
 
 Array = NDArray[np.float64]
 #: How far the nearest reading of a further file may be from a reading of the log, in its usual steps of time.
@@ -45,7 +46,9 @@ def joined(table: RawTable, others: Sequence[RawTable], column_map: ColumnMap | 
                     f"another file has the same name and gives column {called!r} too; give the files different names",
                 )
             columns[called] = replace(column, name=called)
-    return replace(table, columns=columns, problems=tuple(problems), first_rows=()) if others else table
+    unread = of_several([table.unread, *(other.unread for other in others)])
+    made = replace(table, columns=columns, problems=tuple(problems), first_rows=(), unread=unread)
+    return made if others else table
 
 
 def _time(table: RawTable, column_map: ColumnMap | None, main: RawColumn | None) -> RawColumn | None:

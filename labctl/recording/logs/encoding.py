@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 from labctl.errors import BadRecording
+from labctl.recording.unread import share_text
 
 BLOCK_BYTES = 1 << 20
 _UTF16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
@@ -86,9 +87,13 @@ class TextStream:
                 "save it as UTF-8"
             ) from error
         if "\0" in text:
+            sound = self._taken + max(block.find(b"\0"), 0)
+            share = share_text(1 - sound / self.path.stat().st_size)
             raise BadRecording(
-                f"{self.path}: the file has a NUL byte after byte {self._taken}, so it is binary, or a log "
-                f"whose end was lost when the power was switched off; remove everything after byte {self._taken}"
+                f"{self.path}: the file has a NUL byte at byte {sound + 1}, so it is binary, damaged, or a log whose "
+                "end was lost when the power was switched off; remove everything "
+                f"after byte {sound} ({share} of the file), "
+                "or copy it again from where it was recorded"
             )
         self._taken += len(block)
         if not self.blanks:

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
+from labctl.errors import BadRecording
 from labctl.recording.data_files.parquet import MAGIC, is_boolean, read_parquet
 from labctl.recording.importer import TableImporter, TableOptions
 from labctl.recording.logs.recognition import head_of
 from labctl.recording.raw_table import RawColumn, RawTable
+from labctl.recording.unread import share_text
+
+#: No instrument gives a number above this; random bits do.
+LARGEST_NUMBER = 1e30
 
 
 def probe(path: Path) -> float:
@@ -25,12 +32,24 @@ def read(path: Path, _: TableOptions) -> RawTable:
     head_of(path)
     booleans: list[str] = []
     columns = read_parquet(path, lambda schema: booleans.extend(f.name for f in schema if is_boolean(f.type)))
+    _refuse_damaged_values(path, columns)
     rows = len(next(iter(columns.values()), ()))
     return RawTable(
         path,
         {name: _column(name, values, is_boolean=name in booleans) for name, values in columns.items()},
         rows,
     )
+
+
+def _refuse_damaged_values(path: Path, columns: Mapping[str, NDArray[np.generic]]) -> None:
+    """Raise BadRecording for numbers that no instrument gives: pages without a checksum show damage by nothing else."""
+    for name, values in columns.items():
+        if values.dtype.kind == "f" and (odd := np.isfinite(values) & (np.abs(values) > LARGEST_NUMBER)).any():
+            rows = np.flatnonzero(odd) + 1
+            raise BadRecording(
+                f"{path}: column {name[:80]!r}, rows {rows[0]} to {rows[-1]}: {share_text(len(rows) / len(values))} of "
+                f"the numbers are larger than {LARGEST_NUMBER:g}, which damage leaves; write or copy the file again"
+            )
 
 
 def _column(name: str, values: np.ndarray, *, is_boolean: bool) -> RawColumn:

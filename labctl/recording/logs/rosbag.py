@@ -18,8 +18,10 @@ from pydantic import Field
 from labctl.errors import BadInput, BadRecording
 from labctl.recording.data_files.damaged_files import parsed_by_library
 from labctl.recording.importer import TableImporter, TableOptions
+from labctl.recording.logs.imu_messages import is_damaged, unread_messages, with_damaged_times
 from labctl.recording.logs.recognition import MOST_LOG_BYTES, head_of, refuse_large
 from labctl.recording.raw_table import RawColumn, RawTable
+from labctl.recording.unread import Unread, refuse_unread
 
 ROS1 = b"#ROSBAG V2.0"
 MCAP = b"\x89MCAP0\r\n"
@@ -59,13 +61,14 @@ def read(path: Path, options: BagOptions) -> RawTable:
     with _opened(path) as bag:
         topic = _topic(path, bag, options.topic, IMU, "topic")
         assert topic is not None
-        imu = _imu(bag, topic)
+        imu, unread = _imu(bag, topic)
+        refuse_unread(path, unread)
         thermometer = _topic(path, bag, options.temperature, TEMPERATURE, "temperature")
         if thermometer is not None and len(imu["stamp"]):
             imu["temperature"] = _temperature(bag, thermometer, imu["stamp"])
     if not len(imu["stamp"]):
         raise BadRecording(f"{path}: topic {topic} holds no message; take another bag, or another topic")
-    return _table(path, topic, imu)
+    return _table(path, topic, imu, unread)
 
 
 @contextmanager
@@ -106,35 +109,44 @@ def _topic(path: Path, bag: Any, asked: str | None, kind: str, option: str) -> s
     )
 
 
-def _messages(bag: Any, topic: str) -> Iterator[tuple[int, Any]]:
-    """Yield the time of each message, ns since 1970 (of its head, else of its arrival), and the message."""
+def _messages(bag: Any, topic: str) -> Iterator[tuple[int, int, Any]]:
+    """Yield the time of the head of each message and of its arrival, ns since 1970, and the message."""
     connections = [each for each in bag.connections if each.topic == topic]
     for connection, arrived_ns, raw in bag.messages(connections=connections):
         message = bag.deserialize(raw, connection.msgtype)
         stamp = message.header.stamp
-        yield (stamp.sec * NS + stamp.nanosec or int(arrived_ns)), message
+        yield stamp.sec * NS + stamp.nanosec, int(arrived_ns), message
 
 
-def _imu(bag: Any, topic: str) -> dict[str, NDArray[Any]]:
+def _imu(bag: Any, topic: str) -> tuple[dict[str, NDArray[Any]], Unread | None]:
+    """Return the columns of the messages that are sound, and what of the topic could not be read."""
     rows = [
         (
-            at_ns, message.angular_velocity.x, message.angular_velocity.y, message.angular_velocity.z,
+            at_ns, arrived_ns, is_damaged(message),
+            message.angular_velocity.x, message.angular_velocity.y, message.angular_velocity.z,
             message.linear_acceleration.x, message.linear_acceleration.y, message.linear_acceleration.z,
             message.linear_acceleration_covariance[0],
         )
-        for at_ns, message in _messages(bag, topic)
+        for at_ns, arrived_ns, message in _messages(bag, topic)
     ]  # fmt: skip
-    whole = np.array([row[1:] for row in rows], dtype=np.float64).reshape(-1, 7)
+    whole = np.array([row[3:] for row in rows], dtype=np.float64).reshape(-1, 7)
+    at_ns, arrived_ns = (np.array([row[k] for row in rows], dtype=np.int64) for k in (0, 1))
+    damaged = with_damaged_times(np.array([row[2] for row in rows], dtype=np.bool_), at_ns, arrived_ns, whole[:, :6])
+    unread = unread_messages(damaged, arrived_ns, int(bag.topics[topic].msgcount))
+    stamps, whole = np.where(at_ns == 0, arrived_ns, at_ns)[~damaged], whole[~damaged]
     names = ("gyro_x", "gyro_y", "gyro_z", "accel_x", "accel_y", "accel_z")
-    columns: dict[str, NDArray[Any]] = {"stamp": np.array([row[0] for row in rows], dtype=np.int64)}
+    columns: dict[str, NDArray[Any]] = {"stamp": stamps}
     columns.update({name: whole[:, index] for index, name in enumerate(names)})
     if (whole[:, 6] == -1).any():  # sensor_msgs/Imu: -1 says that the sensor has no such output
         columns = {name: values for name, values in columns.items() if not name.startswith("accel_")}
-    return columns
+    return columns, unread
 
 
 def _temperature(bag: Any, topic: str, at_ns: NDArray[np.int64]) -> Array:
-    rows = [((ns - int(at_ns[0])) / NS, message.temperature) for ns, message in _messages(bag, topic)]
+    rows = [
+        (((head_ns or arrived_ns) - int(at_ns[0])) / NS, message.temperature)
+        for head_ns, arrived_ns, message in _messages(bag, topic)
+    ]
     times, values = np.array(rows, dtype=np.float64).reshape(-1, 2).T
     return np.interp((at_ns - at_ns[0]) / NS, times, values) if rows else np.full(len(at_ns), np.nan)
 
@@ -146,7 +158,7 @@ _TARGETS = {
 }  # fmt: skip
 
 
-def _table(path: Path, topic: str, imu: dict[str, NDArray[Any]]) -> RawTable:
+def _table(path: Path, topic: str, imu: dict[str, NDArray[Any]], unread: Unread | None) -> RawTable:
     at_ns = imu.pop("stamp")
     if not np.isfinite(imu.get("temperature", np.zeros(1))).all():
         del imu["temperature"]
@@ -157,6 +169,7 @@ def _table(path: Path, topic: str, imu: dict[str, NDArray[Any]]) -> RawTable:
         targets={name: _TARGETS[name][0] for name in raw},
         facts={"notes": f"ROS bag, topic {topic}"},
         started_at=datetime(1970, 1, 1, tzinfo=UTC) + timedelta(microseconds=int(at_ns[0]) // 1000),
+        unread=unread,
     )  # fmt: skip
 
 

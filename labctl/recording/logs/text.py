@@ -13,6 +13,7 @@ from pydantic import Field
 from labctl.errors import BadRecording
 from labctl.recording.column_map.model import FileKeys
 from labctl.recording.column_map.problems import rows_text
+from labctl.recording.data_files.last_line import cut_last_line
 from labctl.recording.data_files.limits import MOST_COLUMNS, refuse_too_many
 from labctl.recording.importer import TableImporter, TableOptions
 from labctl.recording.logs.cells import column_of
@@ -52,6 +53,9 @@ def read_text(path: Path, options: TextOptions) -> RawTable:
     layout, names = layout_of(path, head, options.file)
     _refuse_names(path, names)
     blocks, ragged = _blocks(path, layout, names)
+    cut = cut_last_line(path, layout.encoding, layout.separator)
+    if cut is not None:
+        blocks, ragged = _without_last(blocks, ragged)
     rows = sum(block.num_rows for block in blocks)
     if rows == 0:
         raise BadRecording(f"{path}: no row of {len(names)} columns below the header; expected at least one")
@@ -67,7 +71,19 @@ def read_text(path: Path, options: TextOptions) -> RawTable:
         tuple(_ragged_lines(ragged, len(names), layout)),
         layout,
         first_rows=_first_rows(head, layout, names),
+        unread=cut,
     )
+
+
+def _without_last(blocks: list[Any], ragged: list[tuple[int, int]]) -> tuple[list[Any], list[tuple[int, int]]]:
+    """Return the rows of a file without its last line, which is among those of another width or among the blocks."""
+    rows = sum(block.num_rows for block in blocks) + len(ragged)
+    if ragged and ragged[-1][0] in (0, rows):
+        return blocks, ragged[:-1]
+    last = next((k for k in reversed(range(len(blocks))) if blocks[k].num_rows), None)
+    if last is None:
+        return blocks, ragged
+    return [*blocks[:last], blocks[last].slice(0, blocks[last].num_rows - 1)], ragged
 
 
 def _refuse_names(path: Path, names: list[str]) -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from contextlib import redirect_stdout, suppress
 from datetime import UTC, datetime, timedelta
-from io import StringIO
+from io import BytesIO, StringIO
 from pathlib import Path
 from typing import Any, Literal
 
@@ -21,7 +21,9 @@ from labctl.errors import BadInput, BadRecording
 from labctl.recording.data_files.damaged_files import parsed_by_library
 from labctl.recording.importer import TableImporter, TableOptions
 from labctl.recording.logs.recognition import MOST_LOG_BYTES, head_of, refuse_large
+from labctl.recording.logs.ulog_messages import sound_bytes
 from labctl.recording.raw_table import RawColumn, RawTable
+from labctl.recording.unread import Unread, refuse_unread
 
 #: ULog format, "File header": the first seven bytes of every log.
 MAGIC = b"ULog\x01\x12\x35"
@@ -62,7 +64,7 @@ def read(path: Path, options: ULogOptions) -> RawTable:
 
 
 def _read(path: Path, options: ULogOptions) -> RawTable:
-    log = _parsed(path)
+    log, unread = _parsed(path)
     data = {(each.name, each.multi_id): each.data for each in log.data_list}
     there = sorted(key for key in data if key[0] in TOPICS)
     rawest = next((topic for topic in TOPICS if any(name == topic for name, _ in there)), None)
@@ -84,10 +86,11 @@ def _read(path: Path, options: ULogOptions) -> RawTable:
     instance = options.instance if topic != COMBINED else 0
     _add_temperature(columns, data, instance)
     _add_force(columns, data, instance)
-    return _table(path, log, f"{topic} {options.instance} (of {listed})", columns, _booted(data))
+    return _table(path, log, f"{topic} {options.instance} (of {listed})", columns, _booted(data), unread)
 
 
-def _parsed(path: Path) -> Any:
+def _parsed(path: Path) -> tuple[Any, Unread | None]:
+    """Return the log of the sound messages of a file, and what could not be read of it. Raises BadRecording."""
     from pyulog.core import ULog  # noqa: PLC0415  0.1 s that only logs need
 
     class BoundedLog(ULog):  # type: ignore[misc]  # pyulog has no types
@@ -98,9 +101,10 @@ def _parsed(path: Path) -> Any:
                 _values_of(path, self.message_name, formats)
                 super()._parse_format(formats)
 
-    # it prints what it finds damaged, and leaves a file that it opened itself open when it fails
-    with path.open("rb") as file, redirect_stdout(StringIO()):
-        return BoundedLog(file, [*TOPICS, *RECEIVERS, ACCEL])
+    content, unread = sound_bytes(path.read_bytes())
+    refuse_unread(path, unread)
+    with redirect_stdout(StringIO()):  # it prints what it finds damaged
+        return BoundedLog(BytesIO(content), [*TOPICS, *RECEIVERS, ACCEL]), unread
 
 
 def _values_of(path: Path, kind: str, formats: Mapping[str, Any], within: tuple[str, ...] = ()) -> int:
@@ -186,15 +190,19 @@ _TARGETS = {
 }  # fmt: skip
 
 
-def _table(path: Path, log: Any, taken: str, columns: dict[str, Array], started: datetime | None) -> RawTable:
-    damaged = "; damaged in places, which are left out" if log.file_corruption else ""
+def _table(
+    path: Path, log: Any, taken: str, columns: dict[str, Array], started: datetime | None, unread: Unread | None
+) -> RawTable:
+    damaged = "; damaged in places, which are left out" if log.file_corruption or unread else ""
     facts: dict[str, object] = {"notes": f"PX4 ULog, {taken}{damaged}"}
     uid = log.msg_info_dict.get("sys_uuid", "")
     if isinstance(uid, str) and uid.isalnum() and uid.isascii():
         facts["serial"] = f"{uid[-16:]}-{taken.split(' ')[1]}"
     raw = {name: RawColumn(name, values, unit=_TARGETS[name][1]) for name, values in columns.items()}
     targets = {name: _TARGETS[name][0] for name in raw}
-    return RawTable(path, raw, len(columns["timestamp"]), targets=targets, facts=facts, started_at=started)
+    return RawTable(
+        path, raw, len(columns["timestamp"]), targets=targets, facts=facts, started_at=started, unread=unread
+    )
 
 
 def _booted(data: Mapping[tuple[str, int], Any]) -> datetime | None:

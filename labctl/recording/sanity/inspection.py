@@ -8,6 +8,7 @@ import numpy as np
 
 from labctl.recording.columns import VERIFICATION
 from labctl.recording.recording import Columns, Recording
+from labctl.recording.sanity.damage import check_damage
 from labctl.recording.sanity.finding import Finding
 from labctl.recording.sanity.gain import check_responses
 from labctl.recording.sanity.outlying import check_outlying
@@ -33,7 +34,9 @@ def findings_of(summary: Summary, environment: Columns | None = None) -> list[Fi
     if len(summary) == 0:
         return []
     aside = np.asarray(summary[VERIFICATION], dtype=np.bool_)
-    found = _findings(summary.take(~aside), environment) if not aside.all() else []
+    found = list(check_damage(summary.info))
+    if not aside.all():
+        found += _findings(summary.take(~aside), environment)
     if aside.any():
         of_part = _findings(summary.take(aside), None)
         found += [replace(each, part="verification", where=f"verification part, {each.where}") for each in of_part]

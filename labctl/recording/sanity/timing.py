@@ -95,7 +95,9 @@ def _origin(summary: Summary, first_s: float) -> Iterator[Finding]:
         f"the first reading is at {first_s:.6g} s: the time stamps count from another instant, such as 1970, not "
         "from started_at"
     )
-    do = f"subtract the instant of started_at ({summary.info.started_at:%Y-%m-%d %H:%M} UTC) from column t_s"
+    begun = summary.info.measured_at
+    instant = f"the instant of started_at ({begun:%Y-%m-%d %H:%M} UTC)" if begun else "the time of the first reading"
+    do = f"subtract {instant} from column t_s"
     yield Finding("time_origin", "likely", "column t_s", said, first_s, "s", "seconds since started_at", do)
 
 

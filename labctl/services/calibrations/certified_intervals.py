@@ -22,17 +22,20 @@ def versions_apart(
 ) -> list[CertifiedVersion]:
     """Return the versions up to one by the times of their measurements, rising; that one is the last.
 
-    Of versions that lie closer together than `least`, or share a recording with the one before, the first counts.
+    Of versions that lie closer together than `least`, or share a recording with the one before, the first counts. A
+    version without a date of its measurements is left out, and alone where it is the last.
     """
     earlier = [each for each in versions if each.version != last.version]
     kept: list[CertifiedVersion] = []
-    for each in sorted(earlier, key=lambda one: (one.measured_at, one.version)):
+    for _, _, each in sorted((one.measured_at, one.version, one) for one in earlier if one.measured_at is not None):
         if (not kept or _is_apart(kept[-1], each, least)) and _is_apart(each, last, least):
             kept.append(each)
     return [*kept, last]
 
 
 def _is_apart(before: CertifiedVersion, after: CertifiedVersion, least: timedelta) -> bool:
+    if before.measured_at is None or after.measured_at is None:
+        return False
     return after.measured_at - before.measured_at >= least and not before.recordings & after.recordings
 
 
@@ -61,7 +64,7 @@ def rates_of(
     errors = [grid.errors_dps(calibrations[each.id]) for each in versions]
     rates, years = [], []
     for (before, old), (after, new) in pairwise(zip(versions, errors, strict=True)):
-        if old is not None and new is not None:
+        if old is not None and new is not None and before.measured_at and after.measured_at:
             years.append((after.measured_at - before.measured_at).total_seconds() / YEAR_S)
             rates.append((new - old) / years[-1])
     return np.stack(rates) if rates else np.zeros((0, 0)), np.asarray(years, dtype=np.float64)

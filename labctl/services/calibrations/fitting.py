@@ -86,7 +86,7 @@ def reference_of(rows: Sequence[RecordingRow]) -> dict[str, str]:
 
 
 def days_of(rows: Sequence[RecordingRow]) -> list[date]:
-    """Return the days on which recordings were begun."""
+    """Return the days on which recordings were begun; of one without a date that of its import, the latest possible."""
     return [RecordingInfo.model_validate(row.info).started_at.date() for row in rows]
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from labctl.calibration import read_calibration
 from labctl.fitting.uncertainty.drift_prediction import DriftPrediction, of_item, with_drift
+from labctl.recording.info import GIVE_DATE, measured_at
 from labctl.services.calibrations.certified_intervals import YEAR_S, calibrations_of, rates_of, versions_apart
 from labctl.services.calibrations.error_grid import About, ErrorGrid
 from labctl.services.calibrations.type_drift import TypeDrift, drift_of_type
@@ -66,6 +67,8 @@ def stability_of(store: Store, serial: str, version: int, about: About = "own ax
     """
     certified = store.certified_versions.of_unit(serial, version)
     last = next((each for each in certified if each.version == version), None)
+    if last is not None and last.measured_at is None:
+        return f"the date of its measurement is not known; {GIVE_DATE}"
     calibration = read_calibration(store.calibrations.get(serial, version).document)
     assert last is not None
     grid = ErrorGrid.of(calibration, about)
@@ -97,12 +100,13 @@ def _is_typical(own: Stability, of_type: DriftPrediction) -> bool:
     return bool(np.all(own.predicted.u_dps <= within))
 
 
-def years_until(store: Store, row: CalibrationRecord, until: datetime) -> float:
+def years_until(measured: datetime, until: datetime) -> float:
     """Return the years from the measurement of a version to a date; 0 where the date is before it."""
-    return max((until - measured_at(store, row)).total_seconds() / YEAR_S, 0.0)
+    return max((until - measured).total_seconds() / YEAR_S, 0.0)
 
 
-def measured_at(store: Store, row: CalibrationRecord) -> datetime:
-    """Return when the newest recording of a version was begun."""
-    begun = [datetime.fromisoformat(str(store.recordings.get(n).info["started_at"])) for n in row.recordings]
-    return max(begun, default=row.created_at)
+def version_measured_at(store: Store, row: CalibrationRecord) -> datetime | None:
+    """Return when the newest recording of a version was begun; None where one of them has no date."""
+    begun = [measured_at(store.recordings.get(n).info) for n in row.recordings]
+    known = [each for each in begun if each is not None]
+    return max(known, default=row.created_at) if len(known) == len(begun) else None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import timedelta
+from datetime import UTC, datetime, timedelta
 from itertools import groupby
 
 import numpy as np
@@ -24,6 +24,7 @@ LEAST_APART = timedelta(days=90)
 #: certificate takes does not grow with the fleet.
 MOST_UNITS, MOST_VERSIONS = 40, 5
 NO_MODEL = "the model of the item is not stated, so that it has no type"
+NEVER = datetime.min.replace(tzinfo=UTC)
 TOO_FEW = (
     "of its model, {model}, {units} other {noun} certified calibrations of the same outputs, {days} days apart or "
     "more, that cover all of the range; the drift of a type takes {least}"
@@ -93,8 +94,10 @@ def _chosen(versions: Sequence[CertifiedVersion]) -> Iterator[list[CertifiedVers
     """Yield the newest versions of each unit that has several far enough apart, up to the number of units."""
     units = 0
     for _, every in groupby(versions, key=lambda each: each.serial):
-        of_unit = list(every)
-        last = max(of_unit, key=lambda each: (each.measured_at, each.version))
+        of_unit = [each for each in every if each.measured_at is not None]
+        if not of_unit:
+            continue
+        last = max(of_unit, key=lambda each: (each.measured_at or NEVER, each.version))
         apart = versions_apart(of_unit, last, LEAST_APART)[-MOST_VERSIONS:]
         if len(apart) > 1 and units < MOST_UNITS:
             units += 1

@@ -101,7 +101,9 @@ def facts_of(store: Store, serial: str, version: int, order: CertificateOrder) -
     campaign = store.campaigns.get(measured[-1].campaign) if measured and measured[-1].campaign is not None else None
     bench = None if campaign is None else BenchFile.model_validate(campaign.bench)
     spans = [performed(store, each) for each in measured]
-    until = [last for _, last in spans if last is not None]
+    since = [first for first, _ in spans if first is not None]
+    since = since if len(since) == len(spans) else []  # of a recording without a date the order states the days
+    until = [last for _, last in spans if last is not None] if since else []
     method = order.method
     return Facts(
         row=row,
@@ -112,8 +114,8 @@ def facts_of(store: Store, serial: str, version: int, order: CertificateOrder) -
         laboratory=(bench.laboratory if bench else None) or order.laboratory or Laboratory(),
         standards=_standards(measured),
         authorised=next((act for act in store.calibrations.history(serial) if act.version == version), None),
-        performed_from=min((first for first, _ in spans), default=None) if campaign else method.performed_from
-        or min((first for first, _ in spans), default=None),
+        performed_from=min(since, default=None) if campaign else method.performed_from
+        or min(since, default=None),
         performed_until=max(until, default=None) if campaign else method.performed_until or max(until, default=None),
         simulated=(bench is not None and bench.has_simulated)
         or any(each.traceability == SIMULATED for each in _standards(measured)),

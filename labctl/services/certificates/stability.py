@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from datetime import datetime
+from datetime import UTC, datetime, time
 
 from labctl.certificates.document import ResultPoint, StabilityResult, TypeOfItem
 from labctl.fitting.uncertainty.drift_prediction import with_drift
-from labctl.services.calibrations.stability import Stability, stability_of, years_until
+from labctl.services.calibrations.stability import Stability, stability_of, version_measured_at, years_until
 from labctl.services.certificates.facts import Facts
 from labctl.store import Store
 
@@ -31,7 +31,8 @@ SINGLE = " (its one interval between calibrations is within what follows)"
 def stability_until(store: Store, facts: Facts, until: datetime) -> StabilityResult:
     """Return what the item is expected to drift by until a date: by its own history, by its type, or unknown."""
     about = "own axis" if facts.order.conformity is None else facts.order.conformity.about
-    known, years = stability_of(store, facts.row.serial, facts.row.version, about), years_until(store, facts.row, until)
+    known = stability_of(store, facts.row.serial, facts.row.version, about)
+    years = years_until(_measured(store, facts), until)
     if isinstance(known, str):
         return StabilityResult(
             until=until.date(), years=years, per_year_dps=None, intervals=0, drift_dps=None, about=about, why=known
@@ -42,6 +43,14 @@ def stability_until(store: Store, facts: Facts, until: datetime) -> StabilityRes
         intervals=round(freedom) if known.of_type is None else known.intervals, drift_dps=known.expanded_dps(years),
         about=about, type=_type(known, years),
     )  # fmt: skip
+
+
+def _measured(store: Store, facts: Facts) -> datetime:
+    """Return when a version was measured: by its recordings, else by the order, without which nothing is issued."""
+    found = version_measured_at(store, facts.row)
+    if found is None and facts.performed_until is not None:
+        return datetime.combine(facts.performed_until, time(), UTC)
+    return found or facts.row.created_at
 
 
 def _type(known: Stability, years: float) -> TypeOfItem | None:

@@ -90,14 +90,14 @@ def _applied_here(store: Store, others: Sequence[CalibrationRecord], recording: 
     if len(others) > QUICK_VERSIONS:
         compute(UNNAMED)
     from labctl.services.criticism.measurements import Measurements  # noqa: PLC0415  loads the fit's libraries
-    from labctl.services.criticism.verification.of_version import verify  # noqa: PLC0415  as above
+    from labctl.services.criticism.verification.of_version import left_by  # noqa: PLC0415  as above
 
     head: RecordingRow = store.recordings.get(recording)
     measured = Measurements(store, (head,))
 
     def applied(row: CalibrationRecord) -> float | None:
         try:
-            return verify(store, row, measured).rms_dps
+            return left_by(store, row, measured).rms_dps
         except LabctlError:
             return None
 

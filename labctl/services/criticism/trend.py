@@ -13,9 +13,11 @@ from labctl.errors import BadInput, LabctlError
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.trend_line import LEAST_POINTS, TrendLine, trend_line
+from labctl.recording.info import ordered_at
 from labctl.services.cache import UNNAMED, compute
 from labctl.services.criticism.measurements import Measurements
-from labctl.services.criticism.verification.of_version import LARGEST_RATIO, applied_errors, expected_dps, verify
+from labctl.services.criticism.occasions import in_time, occasions_of, occasions_text, undated_text
+from labctl.services.criticism.verification.of_version import LARGEST_RATIO, applied_errors, expected_dps, left_by
 from labctl.services.criticism.versions import version_of
 from labctl.services.schemas.units import (
     AppliedVersion,
@@ -46,28 +48,27 @@ def trend_unit(store: Store, serial: str, version: int | None = None, limit_dps:
     reference = version_of(store, serial, version if version is not None or not rows else rows[0].version)
     if limit_dps is not None and not (math.isfinite(limit_dps) and limit_dps > 0):
         raise BadInput(f"limit {limit_dps} deg/s: give a number above 0")
-    measured = sorted(
-        (
-            row
-            for row in store.recordings.of_unit(serial)
-            if row.kind == "points" or (row.kind == "samples" and row.datasets)
-        ),
-        key=lambda row: (_start(row), row.id),
+    measured, undated = in_time(
+        row
+        for row in store.recordings.of_unit(serial)
+        if row.kind == "points" or (row.kind == "samples" and row.datasets)
     )
-    points = [_point(store, row, reference, rows, measured) for row in measured]
-    lines = list(_lines(points))
+    dated = [row for row in rows if not {each.id for each in undated}.intersection(row.recordings)]
+    points = [_point(store, row, reference, dated, measured) for row in measured]
+    occasions = occasions_of(store, measured)
+    lines = list(_lines(points)) if len(occasions) > 1 else []
     limit = limit_dps if limit_dps is not None else _stated(reference)
-    leaves = list(_leaving(lines, points, limit)) if limit else []
+    leaves = list(_leaving(lines, points, limit)) if limit and lines else []
     drawn = _drawn(points, leaves)
     drifts = [_drift(axis, what, unit, line, points, drawn) for axis, what, unit, line in lines]
     return TrendResponse(
         serial=serial, version=reference.version, limit_dps=limit, points=points, drifts=drifts, leaves=leaves,
-        text=[*_text(drifts, len(points)), *_leaving_text(leaves, limit)],
+        undated=[row.id for row in undated],
+        text=[
+            *_text(drifts, len(points)), *occasions_text(occasions, drifted=bool(drifts)),
+            *_leaving_text(leaves, limit), *undated_text(undated),
+        ],
     )  # fmt: skip
-
-
-def _start(row: RecordingRow) -> datetime:
-    return datetime.fromisoformat(str(row.info["started_at"]))
 
 
 def _stated(row: CalibrationRecord) -> float | None:
@@ -80,7 +81,7 @@ def _point(
 ) -> TrendPoint:  # fmt: skip
     """Return what the versions leave of one recording."""
     data = Measurements(store, (row,))
-    at = {each.id: _start(each) for each in measured}
+    at = {each.id: ordered_at(each.info) for each in measured}
     before = [v for v in versions if v.recordings and all(at[n] < at[row.id] for n in v.recordings if n in at)]
     own = [v for v in versions if row.id in v.recordings]
     found = TrendPoint(
@@ -101,7 +102,7 @@ def _applied(store: Store, version: Sequence[CalibrationRecord], data: Measureme
     if not version:
         return None
     try:
-        found = verify(store, version[0], data)
+        found = left_by(store, version[0], data)
     except LabctlError:
         return None
     return AppliedVersion(
@@ -194,7 +195,7 @@ def _leaving(
 
 
 def _text(drifts: Sequence[Drift], points: int) -> Iterator[str]:
-    if not drifts:
+    if not drifts and points < 2:
         word = "recording" if points == 1 else "recordings"
         yield f"{points} {word} in time: a drift needs two recordings, and its uncertainty three."
     for each in drifts:

@@ -60,6 +60,8 @@ def mapped_file(
     chosen = proposal.column_map
     if options.serial is not None:
         chosen = checked_map({**map_document(chosen), "serial": options.serial}, "--option serial")
+    if options.started_at is not None:
+        chosen = chosen.model_copy(update={"started_at": options.started_at})
     made = MappedFile(name, importer.title, table, chosen, column_map is None, proposal.guesses)
     try:
         log = recording_of(table, chosen)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from typing import IO, BinaryIO, Literal
@@ -13,8 +13,9 @@ from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile
 
 from labctl.errors import BadRecording
 from labctl.fitting.estimation.suggestion import suggested_model
-from labctl.recording import read_recording, write_recording
+from labctl.recording import Recording, read_recording, write_recording
 from labctl.recording.files import FILE_NAMES
+from labctl.recording.info import NO_DATE
 from labctl.recording.verification import is_marked
 from labctl.services.recordings.inspection import inspect_stored
 from labctl.services.recordings.loading import points_of
@@ -29,7 +30,7 @@ EFFORT = 1
 
 def import_folder(store: Store, folder: Path, at: datetime) -> ImportResponse:
     """Import a recording from a folder; all of it or nothing. Raises BadRecording."""
-    recording = read_recording(folder)
+    recording = _ordered(read_recording(folder), at)
     number = store.recordings.add_import(recording, at)
     row = store.recordings.get(number)
     readings = row.readings if recording.info.kind == "samples" else len(recording)
@@ -40,8 +41,16 @@ def import_folder(store: Store, folder: Path, at: datetime) -> ImportResponse:
         datasets=datasets,
         readings=readings,
         suggested_model=model_for(store, row),
+        measured_at=recording.info.measured_at,
         warnings=inspect_stored(store, row, recording).warnings,
     )
+
+
+def _ordered(recording: Recording, at: datetime) -> Recording:
+    """Return a recording without a date with the time of its import in its place, which only orders recordings."""
+    if recording.info.date_known or recording.info.started_at != NO_DATE:
+        return recording
+    return replace(recording, info=recording.info.model_copy(update={"started_at": at}))
 
 
 def model_for(store: Store, row: RecordingRow) -> str:

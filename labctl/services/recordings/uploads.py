@@ -21,7 +21,7 @@ ResultT = TypeVar("ResultT")
 def with_staged(name: str, content: BinaryIO, modified_ms: float | None, work: Callable[[Path], ResultT]) -> ResultT:
     """Return what `work` returns for a file that holds an upload; raises what it raises, without the staging folder.
 
-    `modified_ms` is when the file was last written, ms since 1970: it may be all that says when it was recorded.
+    `modified_ms` is when the file was last written, ms since 1970; it is no date of the readings.
     """
     with staging_folder() as folder:
         path = folder / _plain(name)

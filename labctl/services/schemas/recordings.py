@@ -58,6 +58,9 @@ class ImportResponse(ResponseModel):
     datasets: int
     readings: int
     suggested_model: str = Field(default="bias_scale", description="Name of a model that suits this kind of recording.")
+    measured_at: datetime | None = Field(
+        default=None, description="Date of the measurement; null: the file states none, and it is not known."
+    )
     warnings: list[DataWarning] = Field(default_factory=list, description=WARNINGS)
 
 

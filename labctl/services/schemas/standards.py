@@ -222,8 +222,8 @@ class AffectedCalibration(ResponseModel):
     version: int
     recordings: list[int] = Field(description="Its recordings that were measured with the standard.")
     campaigns: list[int]
-    performed_from: date
-    performed_until: date
+    performed_from: date | None = Field(description="null: the date of a recording is not known.")
+    performed_until: date | None
     in_force: bool
     certificates: list[str] = Field(description="Numbers of the certificates issued of it, the newest first.")
     findings: list[int] = Field(description="Findings of the standard that hold for these days.")

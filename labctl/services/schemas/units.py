@@ -163,6 +163,9 @@ class TrendResponse(ResponseModel):
     points: list[TrendPoint]
     drifts: list[Drift]
     leaves: list[Leaving]
+    undated: list[int] = Field(
+        default_factory=list, description="Recordings whose date of measurement is not known; they are left out."
+    )
     text: list[str]
 
 

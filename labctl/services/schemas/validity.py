@@ -70,7 +70,7 @@ class ComparedCalibration(ResponseModel):
     version: int
     bench: str = Field(description="Name of the bench; empty: not known.")
     laboratory: str = Field(description="Name of the laboratory of the bench; empty: not stated.")
-    measured_on: date = Field(description="First day of its newest recording.")
+    measured_on: date | None = Field(description="First day of its newest recording; null: not known.")
 
 
 class ComparedResult(ResponseModel):

@@ -9,6 +9,7 @@ from datetime import date, timedelta
 from instruments.standards import Standard
 from labctl.errors import BadInput
 from labctl.recording import RecordingInfo
+from labctl.recording.info import measured_at
 from labctl.services.schemas.standards import AffectedCalibration, AffectedResponse
 from labctl.store import (
     CalibrationRecord,
@@ -19,16 +20,21 @@ from labctl.store import (
     Store,
 )
 
+#: First and last day (UTC) of a measurement; None: unknown.
+Days = tuple[date | None, date | None]
 
-def performed(store: Store, row: RecordingRow) -> tuple[date, date | None]:
-    """Return the first and the last day (UTC) of a campaign or of an imported recording; None: the last is unknown."""
+
+def performed(store: Store, row: RecordingRow) -> Days:
+    """Return the first and the last day of a campaign or of an imported recording."""
     if row.campaign is not None:
         campaign = store.campaigns.get(row.campaign)
         begun = campaign.started_at or campaign.created_at
         return begun.date(), None if campaign.ended_at is None else campaign.ended_at.date()
-    begun = RecordingInfo.model_validate(row.info).started_at
+    at = measured_at(row.info)
+    if at is None:
+        return None, None
     ends = [each.t_until_s for each in store.recordings.data_sets(row.id) if each.t_until_s is not None]
-    return begun.date(), (begun + timedelta(seconds=max(ends))).date() if ends else None
+    return at.date(), (at + timedelta(seconds=max(ends))).date() if ends else None
 
 
 def is_entry_of(standard: RegisteredStandard, entry: Standard) -> bool:
@@ -64,9 +70,11 @@ def uses(row: RecordingRow, standard: RegisteredStandard) -> bool:
     return any(is_entry_of(standard, each) for each in RecordingInfo.model_validate(row.info).standards)
 
 
-def overlaps(first: date, last: date | None, bad_from: date | None, bad_until: date | None) -> bool:
-    """Return whether days of a measurement are among those between two others; None: open, or its end unknown."""
-    return (bad_until is None or first <= bad_until) and (bad_from is None or last is None or last >= bad_from)
+def overlaps(first: date | None, last: date | None, bad_from: date | None, bad_until: date | None) -> bool:
+    """Return whether days of a measurement are among those between two others; None: open, or unknown."""
+    return (bad_until is None or first is None or first <= bad_until) and (
+        bad_from is None or last is None or last >= bad_from
+    )
 
 
 def affected(store: Store, label: str, bad_from: date | None = None, bad_until: date | None = None) -> AffectedResponse:
@@ -106,19 +114,20 @@ def _affected(
     store: Store,
     version: CalibrationRecord,
     rows: Sequence[RecordingRow],
-    days: dict[int, tuple[date, date | None]],
+    days: dict[int, Days],
     standard: RegisteredStandard,
 ) -> AffectedCalibration:
-    first = min(days[row.id][0] for row in rows)
-    last = max(days[row.id][1] or days[row.id][0] for row in rows)
+    begun = [day for row in rows if (day := days[row.id][0]) is not None]
+    ended = [day for row in rows if (day := days[row.id][1] or days[row.id][0]) is not None]
+    known = len(begun) == len(rows)
     history = store.calibrations.history(version.serial)
     return AffectedCalibration(
         serial=version.serial,
         version=version.version,
         recordings=[row.id for row in rows],
         campaigns=sorted({row.campaign for row in rows if row.campaign is not None}),
-        performed_from=first,
-        performed_until=last,
+        performed_from=min(begun) if known else None,
+        performed_until=max(ended) if known else None,
         in_force=bool(history) and history[0].act == "certify" and history[0].version == version.version,
         certificates=[
             each.number for each in store.certificates.of_unit(version.serial) if each.version == version.version
@@ -153,7 +162,7 @@ class Notices:
 
     store: Store
     bad: tuple[tuple[RegisteredStandard, StandardFinding], ...]
-    _days: dict[int, tuple[date, date | None]] = field(default_factory=dict)
+    _days: dict[int, Days] = field(default_factory=dict)
 
     @staticmethod
     def of(store: Store) -> Notices:
@@ -190,7 +199,7 @@ class Notices:
             )
         ]
 
-    def _performed(self, row: RecordingRow) -> tuple[date, date | None]:
+    def _performed(self, row: RecordingRow) -> Days:
         if row.id not in self._days:
             self._days[row.id] = performed(self.store, row)
         return self._days[row.id]

@@ -10,6 +10,7 @@ from typing import Any
 import sqlalchemy as sa
 
 from labctl.json_types import JsonObject
+from labctl.recording.info import measured_at
 from labctl.store.connection.database import Database
 from labctl.store.schema import tables
 
@@ -24,14 +25,14 @@ class CertifiedVersion:
     id: int
     serial: str
     version: int
-    measured_at: datetime  #: when its newest recording was begun
+    measured_at: datetime | None  #: when its newest recording was begun; None where one has no date
     recordings: frozenset[int]
     campaigns: frozenset[int]  #: of its recordings; those that were imported have none
 
 
 def _heads() -> sa.Select[*tuple[Any, ...]]:
     c, f, r = tables.calibrations.c, tables.calibration_recordings.c, tables.recordings.c
-    begun = r.info["started_at"].as_string().label("begun")
+    begun = r.info.label("head")
     joined = tables.calibrations.outerjoin(tables.calibration_recordings, f.calibration_id == c.id)
     columns = (c.id, c.serial, c.version, c.created_at, r.id.label("recording"), r.campaign_id, begun)
     return sa.select(*columns).select_from(joined.outerjoin(tables.recordings, r.id == f.recording_id))
@@ -98,9 +99,11 @@ def _versions(rows: sa.CursorResult[*tuple[Any, ...]]) -> list[CertifiedVersion]
 
 def _version(rows: list[Any]) -> CertifiedVersion:
     first = rows[0]
-    begun = [datetime.fromisoformat(row.begun) for row in rows if row.begun is not None]
+    begun = [measured_at(row.head) for row in rows if row.head is not None]
+    known = [each for each in begun if each is not None]
+    newest = max(known, default=first.created_at) if len(known) == len(begun) else None
     return CertifiedVersion(
-        first.id, first.serial, first.version, max(begun, default=first.created_at),
+        first.id, first.serial, first.version, newest,
         frozenset(row.recording for row in rows if row.recording is not None),
         frozenset(row.campaign_id for row in rows if row.campaign_id is not None),
     )  # fmt: skip

@@ -89,6 +89,7 @@ export type NoiseFigure = Schema<"NoiseFigure">;
 export type Preview = Schema<"PreviewResponse">;
 export type ResidualMap = Schema<"ResidualMap">;
 export type Suspect = Schema<"Suspect">;
+export type Verification = Schema<"VerificationResponse">;
 export type Version = Schema<"VersionResponse"> | Schema<"ImprovedVersionResponse">;
 export type CoefficientTable = Schema<"CoefficientTable">;
 /** The unit of each output axis. */

@@ -1821,14 +1821,11 @@ export interface components {
             campaigns: number[];
             /**
              * Performed From
-             * Format: date
+             * @description null: the date of a recording is not known.
              */
-            performed_from: string;
-            /**
-             * Performed Until
-             * Format: date
-             */
-            performed_until: string;
+            performed_from: string | null;
+            /** Performed Until */
+            performed_until: string | null;
             /** In Force */
             in_force: boolean;
             /**
@@ -2015,7 +2012,7 @@ export interface components {
             expected_dps: number | null;
             /**
              * Ok
-             * @description Whether `rms_dps` is at most twice `expected_dps`.
+             * @description Whether the RMS error of each axis is at most the limit of the axis.
              */
             ok: boolean;
             /**
@@ -2290,6 +2287,21 @@ export interface components {
             max_dps: number;
             /** Bias Dps */
             bias_dps: number;
+            /**
+             * Expected Dps
+             * @description RMS error that is expected of the version on this axis, deg/s: that over all axes times the share of the axis in what the version leaves of its own data; null: unknown.
+             */
+            expected_dps: number | null;
+            /**
+             * Limit Dps
+             * @description Largest RMS error of an axis that holds, deg/s: twice `expected_dps`, or more where the recording or the data of the fit have few independent errors. In at most 5 % of the recordings of versions that hold is any axis beyond its limit.
+             */
+            limit_dps: number | null;
+            /**
+             * Ok
+             * @description Whether `rms_dps` is at most `limit_dps`; null: unknown.
+             */
+            ok: boolean | null;
         };
         /**
          * BackupNote
@@ -3810,10 +3822,9 @@ export interface components {
             laboratory: string;
             /**
              * Measured On
-             * Format: date
-             * @description First day of its newest recording.
+             * @description First day of its newest recording; null: not known.
              */
-            measured_on: string;
+            measured_on: string | null;
         };
         /**
          * ComparedModel
@@ -5445,6 +5456,11 @@ export interface components {
              * @default bias_scale
              */
             suggested_model: string;
+            /**
+             * Measured At
+             * @description Date of the measurement; null: the file states none, and it is not known.
+             */
+            measured_at: string | null;
             /**
              * Warnings
              * @description Certain and probable errors of the data or of the fit, the certain errors first; empty if there are none.
@@ -7889,6 +7905,11 @@ export interface components {
              */
             suggested_model: string;
             /**
+             * Measured At
+             * @description Date of the measurement; null: the file states none, and it is not known.
+             */
+            measured_at: string | null;
+            /**
              * Warnings
              * @description Certain and probable errors of the data or of the fit, the certain errors first; empty if there are none.
              */
@@ -8629,6 +8650,11 @@ export interface components {
             drifts: components["schemas"]["Drift"][];
             /** Leaves */
             leaves: components["schemas"]["Leaving"][];
+            /**
+             * Undated
+             * @description Recordings whose date of measurement is not known; they are left out.
+             */
+            undated: number[];
             /** Text */
             text: string[];
         };
@@ -8994,6 +9020,11 @@ export interface components {
                 [key: string]: components["schemas"]["AxisVerification"];
             };
             /**
+             * Axes Off
+             * @description Axes whose RMS error is beyond the limit of the axis.
+             */
+            axes_off: string[];
+            /**
              * Outside Validity
              * @description Number of data sets outside the rates or temperatures of the calibration.
              */
@@ -9005,7 +9036,7 @@ export interface components {
             expected_dps: number | null;
             /**
              * Ok
-             * @description Whether `rms_dps` is at most twice `expected_dps`.
+             * @description Whether the RMS error of each axis is at most the limit of the axis.
              */
             ok: boolean;
         };

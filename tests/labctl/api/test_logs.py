@@ -49,8 +49,8 @@ def test_problems_are_listed_in_a_preview_and_refused_in_an_import(client: TestC
     assert made.status_code == 201
     assert made.json()["serial"] == "U-9"
     info = client.get("/api/recordings/1").json()["info"]
-    assert info["started_at"] == "2025-06-15T15:06:40Z"
-    assert "the time at which the file was last written is used as started_at" in info["notes"]
+    assert info["started_at"] > "2026"  # of the import, for order
+    assert info["date_known"] is False
 
 
 def test_a_ulog_is_imported_with_an_option(client: TestClient, tmp_path: Path) -> None:

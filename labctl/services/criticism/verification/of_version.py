@@ -2,27 +2,60 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from labctl.calibration import Calibration, read_calibration
 from labctl.compensator import Compensator
-from labctl.errors import BadInput
+from labctl.errors import BadInput, LabctlError
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.recording import Recording
-from labctl.recording.verification import verification_part
+from labctl.recording.verification import fitted_part, verification_part
 from labctl.services.criticism.measurements import Measurements
+from labctl.services.criticism.verification.expectation import (
+    LARGEST_RATIO,
+    OwnError,
+    independent_groups,
+    judged,
+    own_errors,
+    rms,
+)
 from labctl.services.criticism.verification.of_poses import errors_in_poses
 from labctl.services.criticism.versions import version_of
-from labctl.services.recordings.loading import motion_of, newest_row, source_of
-from labctl.services.schemas.criticism import AxisVerification, VerificationResponse
+from labctl.services.recordings.loading import motion_of, newest_row, points_of, source_of
+from labctl.services.schemas.criticism import VerificationResponse
 from labctl.store import CalibrationRecord, Store
 
-#: Largest ratio of the error found to the error expected of a version that holds: coverage factor of 95 %.
-LARGEST_RATIO = 2.0
+__all__ = ["LARGEST_RATIO", "Left", "applied_errors", "expected_dps", "left_by", "verify", "verify_unit"]
+
+
+@dataclass(frozen=True)
+class Left:
+    """What a version leaves of a recording: errors over all axes, (k,) deg/s, and axis -> those of the axis, (m,)."""
+
+    pooled: NDArray[np.float64]
+    errors: dict[str, NDArray[np.float64]]
+    outside: NDArray[np.bool_]  #: which data sets lie outside the validity, (m,)
+    is_part: bool  #: whether of the data sets that were measured to verify
+    groups: int  #: parts whose errors are independent of each other
+
+    @property
+    def rms_dps(self) -> float:
+        """Root mean square over data sets and axes."""
+        return rms(self.pooled)
+
+    @property
+    def max_dps(self) -> float:
+        """Largest size."""
+        return float(np.max(np.abs(self.pooled)))
+
+    @property
+    def bias_dps(self) -> float:
+        """Mean over data sets and axes."""
+        return float(np.mean(self.pooled))
 
 
 def verify_unit(
@@ -38,6 +71,33 @@ def verify_unit(
 
 
 def verify(store: Store, row: CalibrationRecord, measured: Measurements) -> VerificationResponse:
+    """Apply a version to a recording and compare each axis with what the version promises of it.
+
+    Raises BadInput, NotEnoughData as `left_by`.
+    """
+    left, expected = left_by(store, row, measured), expected_dps(row)
+    own = _own_errors(store, row, measured, left) if expected is not None and len(left.errors) > 1 else {}
+    axes = judged(left.errors, expected, own, left.groups)
+    return VerificationResponse(
+        serial=row.serial,
+        version=row.version,
+        recording=measured.row.id,
+        recorded_unit=measured.row.serial,
+        seen=not left.is_part and measured.row.id in row.recordings,
+        part="verification" if left.is_part else "all",
+        datasets=len(left.outside),
+        rms_dps=left.rms_dps,
+        max_dps=left.max_dps,
+        bias_dps=left.bias_dps,
+        axes=axes,
+        axes_off=[axis for axis, found in axes.items() if found.ok is False],
+        outside_validity=int(np.count_nonzero(left.outside)),
+        expected_dps=expected,
+        ok=all(found.ok is True for found in axes.values()),
+    )
+
+
+def left_by(store: Store, row: CalibrationRecord, measured: Measurements) -> Left:
     """Apply a version to the means of a recording, as its consumer applies it to readings.
 
     Where a part of the recording was measured to verify, to that part. In poses to the readings: what gravity is off by
@@ -47,30 +107,34 @@ def verify(store: Store, row: CalibrationRecord, measured: Measurements) -> Veri
     """
     document, _ = store.calibrations.document(row.serial, row.version)
     calibration = read_calibration(document)
-    aside = None
     if motion_of(measured.row) == "poses":
         pooled, errors, outside = errors_in_poses(calibration, source_of(store, measured.row))
-    else:
-        aside = verification_part(measured.points)
-        errors, outside = applied_errors(calibration, measured.points if aside is None else aside)
-        pooled = np.concatenate(list(errors.values()))
-    rms, expected = _rms(pooled), expected_dps(row)
-    return VerificationResponse(
-        serial=row.serial,
-        version=row.version,
-        recording=measured.row.id,
-        recorded_unit=measured.row.serial,
-        seen=aside is None and measured.row.id in row.recordings,
-        part="all" if aside is None else "verification",
-        datasets=len(outside),
-        rms_dps=rms,
-        max_dps=float(np.max(np.abs(pooled))),
-        bias_dps=float(np.mean(pooled)),
-        axes={axis: _of_axis(values) for axis, values in errors.items()},
-        outside_validity=int(np.count_nonzero(outside)),
-        expected_dps=expected,
-        ok=expected is not None and rms <= LARGEST_RATIO * expected,
-    )
+        return Left(pooled, errors, outside, is_part=False, groups=1)
+    aside = verification_part(measured.points)
+    points = measured.points if aside is None else aside
+    errors, outside = applied_errors(calibration, points)
+    pooled = np.concatenate(list(errors.values()))
+    return Left(pooled, errors, outside, is_part=aside is not None, groups=independent_groups(points))
+
+
+def _own_errors(store: Store, row: CalibrationRecord, measured: Measurements, left: Left) -> dict[str, OwnError]:
+    """Return what a version leaves of each axis of its own recordings; {} where that is not known."""
+    calibration = read_calibration(row.document)
+    parts: dict[str, list[NDArray[np.float64]]] = {}
+    try:
+        for number in row.recordings:
+            head = store.recordings.get(number)
+            if number == measured.row.id and not left.is_part:
+                errors = left.errors
+            elif motion_of(head) == "poses":
+                _, errors, _ = errors_in_poses(calibration, source_of(store, head))
+            else:
+                errors, _ = applied_errors(calibration, fitted_part(points_of(store, head)))
+            for axis, values in errors.items():
+                parts.setdefault(axis, []).append(values)
+    except LabctlError:  # a table of coefficients, say
+        return {}
+    return own_errors(parts, row.answer["axes"]) if set(parts) == set(left.errors) else {}
 
 
 def applied_errors(
@@ -124,13 +188,3 @@ def expected_dps(row: CalibrationRecord) -> float | None:
     later = joint["heldout_rms_dps"] if joint else None  # of several recordings each was predicted by the others
     known = [figure for figure in (error["heldout_rms_dps"], error["rms_dps"], later) if figure is not None]
     return max(known, default=None)
-
-
-def _of_axis(values: NDArray[np.float64]) -> AxisVerification:
-    return AxisVerification(
-        rms_dps=_rms(values), max_dps=float(np.max(np.abs(values))), bias_dps=float(np.mean(values))
-    )
-
-
-def _rms(values: NDArray[np.float64]) -> float:
-    return math.sqrt(float(np.mean(values**2)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from labctl.services.schemas.criticism import VerificationResponse
+from labctl.services.schemas.criticism import AxisVerification, VerificationResponse
 
 
 def verification_sentence(found: VerificationResponse) -> str:
@@ -20,4 +20,11 @@ def verification_sentence(found: VerificationResponse) -> str:
         text += f"; expected of this version: {found.expected_dps:.3g} deg/s RMS"
     if found.outside_validity:
         text += f"; {found.outside_validity} of {found.datasets} data sets lie outside its validity"
-    return f"{text}."
+    return ". ".join([text, *(_off(axis, found.axes[axis]) for axis in found.axes_off)]) + "."
+
+
+def _off(axis: str, found: AxisVerification) -> str:
+    return (
+        f"Axis {axis} is off: {found.rms_dps:.3g} deg/s RMS, {found.bias_dps:+.3g} deg/s in the mean, where "
+        f"{found.expected_dps:.3g} deg/s RMS is expected and {found.limit_dps:.3g} deg/s is the limit"
+    )

@@ -49,7 +49,7 @@ class AppliedDraft(ResponseModel):
     bias_dps: float
     axes: dict[str, AxisVerification]
     expected_dps: float | None = Field(description="RMS error that is expected of the version, deg/s; null: unknown.")
-    ok: bool = Field(description="Whether `rms_dps` is at most twice `expected_dps`.")
+    ok: bool = Field(description="Whether the RMS error of each axis is at most the limit of the axis.")
     lines: dict[str, RemainingLine] = Field(
         default_factory=dict, description="For each axis: bias and scale factor error that the version leaves."
     )

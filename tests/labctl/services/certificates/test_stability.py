@@ -14,7 +14,14 @@ from labctl.certificates.document import Certificate
 from labctl.errors import BadInput
 from labctl.recording import Recording, to_points
 from labctl.services.calibrations.fitting import fit_unit
-from labctl.services.calibrations.stability import NO_HISTORY, NOT_COMPARABLE, Stability, stability_of, years_until
+from labctl.services.calibrations.stability import (
+    NO_HISTORY,
+    NOT_COMPARABLE,
+    Stability,
+    stability_of,
+    version_measured_at,
+    years_until,
+)
 from labctl.services.certificates.issue import issue
 from labctl.services.schemas.calibrations import FitRequest
 from labctl.store import Store, open_store
@@ -63,8 +70,10 @@ def test_the_drift_is_that_of_the_unit_per_year(store: Store) -> None:
     assert per_year_dps == pytest.approx(np.sqrt((0.02**2 + 0.01**2) / 2), rel=1e-3)
     assert found.expanded_dps(2.0) == pytest.approx(student(2).ppf(0.97725) * per_year_dps * 2.0, rel=1e-3)
     row = store.calibrations.get(SERIAL, version)
-    assert years_until(store, row, BEGUN + timedelta(days=365.25 * 4.0)) == pytest.approx(1.5)
-    assert years_until(store, row, BEGUN) == 0.0
+    measured = version_measured_at(store, row)
+    assert measured is not None
+    assert years_until(measured, BEGUN + timedelta(days=365.25 * 4.0)) == pytest.approx(1.5)
+    assert years_until(measured, BEGUN) == 0.0
 
 
 def test_it_is_that_of_the_worst_place(store: Store) -> None:

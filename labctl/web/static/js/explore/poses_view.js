@@ -3,11 +3,11 @@
 import { get } from "../core/http/api.js";
 import { h, setChildren } from "../core/elements.js";
 import { number } from "../core/format.js";
-import { cardWithHeader, chip, factList, loadInto } from "../core/components.js";
+import { cardWithHeader, chip, factList, loadInto, table } from "../core/components.js";
 import { ladderFigure } from "./error_ladder.js";
 import { motionComparison } from "./compare/motion_comparison.js";
 
-/** @import { Version } from "../../../types/api.js" */
+/** @import { Verification, Version } from "../../../types/api.js" */
 
 /**
  * @param {string} serial
@@ -48,6 +48,7 @@ export function posesView(serial, calibration, recording, signal) {
         found.expected_dps === null ? null : ["Expected of this version", number(found.expected_dps), "deg/s"],
         ["Turns", `${found.datasets}`],
       ]),
+      verifiedAxes(found),
     ];
   });
   const ladder = h("div", {});
@@ -62,4 +63,23 @@ export function posesView(serial, calibration, recording, signal) {
     cardWithHeader("Error of the versions", null, ladder),
   );
   return element;
+}
+
+/**
+ * Each axis beside what is expected of it.
+ * @param {Verification} found
+ */
+function verifiedAxes(found) {
+  return table(
+    [
+      { title: "Axis", cell: (row) => row.axis },
+      { title: "RMS, deg/s", number: true, cell: (row) => number(row.rms_dps) },
+      { title: "Expected, deg/s", number: true, cell: (row) => number(row.expected_dps) },
+      { title: "Limit, deg/s", number: true, cell: (row) => number(row.limit_dps) },
+      { title: "Mean, deg/s", number: true, cell: (row) => number(row.bias_dps) },
+      { title: "", cell: (row) => (row.ok === false ? chip("off", "bad") : null) },
+    ],
+    Object.entries(found.axes).map(([axis, each]) => ({ axis, ...each })),
+    { label: "Error of each axis", dense: true },
+  );
 }

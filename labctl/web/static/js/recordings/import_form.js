@@ -149,6 +149,13 @@ function acceptedNotice(made, left) {
       `Imported as recording ${made.recording} of unit ${made.serial}: ${count(made.datasets)} data sets, ${count(made.readings)} readings.`,
     ),
     warnings.map((warning) => h("p", {}, `${warning.severity === "certain" ? "Wrong" : "Check"}: ${warning.text}`)),
+    made.measured_at === null
+      ? h(
+          "p",
+          { class: "small" },
+          "The file states no date, so the date of the measurement is not known: trends and certificates leave the recording out. To state the date, import the file again with started_at in its column map.",
+        )
+      : null,
     left.length ? h("p", { class: "small" }, `Files not used: ${left.join(", ")}.`) : null,
     h(
       "div",
