@@ -12,8 +12,6 @@ Place = Literal["laboratory", "customer", "laboratoryBranch", "customerBranch", 
 COUNTRY = r"^[A-Z]{2}$"
 #: One line of text; an empty one is a fact that is missing.
 LINE = r"^[^\x00-\x1f\x7f]{0,300}$"
-#: One line of any length: without characters that a terminal or a list would take for its own.
-ONE_LINE = r"^[^\x00-\x1f\x7f]*$"
 
 
 class Contact(BaseModel):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +42,11 @@ class Left:
     outside: NDArray[np.bool_]  #: which data sets lie outside the validity, (m,)
     is_part: bool  #: whether of the data sets that were measured to verify
     groups: int  #: parts whose errors are independent of each other
+
+    @property
+    def part(self) -> Literal["all", "verification"]:
+        """Which data sets these are."""
+        return "verification" if self.is_part else "all"
 
     @property
     def rms_dps(self) -> float:
@@ -84,7 +90,7 @@ def verify(store: Store, row: CalibrationRecord, measured: Measurements) -> Veri
         recording=measured.row.id,
         recorded_unit=measured.row.serial,
         seen=not left.is_part and measured.row.id in row.recordings,
-        part="verification" if left.is_part else "all",
+        part=left.part,
         datasets=len(left.outside),
         rms_dps=left.rms_dps,
         max_dps=left.max_dps,
