@@ -158,7 +158,7 @@ def build_calibration(
     days of several recordings, on which the standards of the bench were used; default: the day of `info`.
     """
     exported, left_out = result.exported()
-    bench = conditions_of(info, result.environment, used_on, result.mountings)
+    bench = conditions_of(info, result.environment, used_on, result.mountings, result.angles_rad)
     use = {axis: one.to_json() for axis, one in (evidence or {}).items()}
     document: CalibrationJson = {
         "schema": SCHEMA,

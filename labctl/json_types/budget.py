@@ -39,6 +39,7 @@ class BenchConditionsJson(TypedDict):
     max_rate_dps: float | None
     stated: list[StandardJson]
     mountings: NotRequired[dict[str, float]]  #: position -> its share in the slopes over the rate
+    angles_rad: NotRequired[dict[str, dict[str, float]]]  #: output -> name -> angle of the mountings that was fitted
 
 
 class BudgetLineJson(TypedDict):

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from labctl.fitting.criticism.candidates import base_rows, temperature_slope
 from labctl.fitting.criticism.reduction import ReducedRecording
+from labctl.fitting.data.mounting_angles import placed_rad
 from labctl.fitting.data.shifts import shift_contrasts
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.temperature import LagrangeTable
@@ -19,7 +20,7 @@ SLOPE_ERROR = 0.5
 def base_of(data: ReducedRecording, model: ErrorModel, axis: str) -> tuple[NDArray[np.float64], Array]:
     """Return the coordinates of the base (R, m, k), and the prior precision of each column (k,)."""
     base, _, precision = base_rows(data, model, axis)
-    shifts, largest = shift_contrasts(data.nodes, axis)
+    shifts, largest = shift_contrasts(data.nodes, axis, placed_rad(data.info.standards))
     if len(largest):
         base = np.concatenate([base, data.rows_of(shifts)], axis=2)
         precision = np.concatenate([precision, largest**-2.0])

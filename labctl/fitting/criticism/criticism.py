@@ -20,7 +20,7 @@ from labctl.fitting.criticism.suspects import Suspect, suspects_of
 from labctl.fitting.criticism.verdict import Verdict
 from labctl.fitting.criticism.visibility import not_testable
 from labctl.fitting.data.fit_data import FitData, fit_data_of
-from labctl.fitting.data.mounting_angles import angle_columns, leaning_rates
+from labctl.fitting.data.mounting_angles import leaning_rates
 from labctl.fitting.data.noise_floor import NoiseFloor
 from labctl.fitting.data.static_record import LONG_S, static_record
 from labctl.fitting.data.temperature.channel import with_temperature
@@ -203,7 +203,7 @@ def _leaning(data: ReducedRecording, fit_data: FitData, forward: ErrorModel) -> 
 
     What is left of the angles stays free in the base; so small, only its first order matters.
     """
-    if not any(len(angle_columns(fit_data.channels, axis)) for axis in fit_data.outputs):
+    if not any(len(fit_data.angle_columns(axis)) for axis in fit_data.outputs):
         return data
     angles = {axis: found.angles_rad for axis, found in solve_axes(fit_data, forward).nuisance.items()}
     return replace(data, nodes=data.nodes.with_rates(leaning_rates(data.nodes, angles)))

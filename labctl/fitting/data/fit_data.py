@@ -14,6 +14,7 @@ from labctl.fitting.data.channels import Argument, Channels, channels_of
 from labctl.fitting.data.covered import Covered, covered_by_means, covered_by_readings
 from labctl.fitting.data.earth import up_rate_dps
 from labctl.fitting.data.mean_noise import white_var_of
+from labctl.fitting.data.mounting_angles import AngleColumns, angle_columns, placed_rad
 from labctl.fitting.data.noise_floor import NoiseFloor, noise_floor_of
 from labctl.fitting.data.rate_profile import RateProfile, Response, rate_profile
 from labctl.fitting.data.temperature.channel import with_temperature
@@ -75,6 +76,11 @@ class FitData:
         """The noise of these data sets, whatever the model."""
         errors = {axis: self.outputs[axis] - self.true_rate_dps(axis) for axis in self.outputs}
         return noise_floor_of(self.channels, errors, {axis: self.scatter(axis) for axis in self.outputs})
+
+    def angle_columns(self, axis: str) -> AngleColumns:
+        """Return the regressors of the angles that the mountings separate, of one output; none where they are known."""
+        placed = placed_rad(self.info.standards)
+        return AngleColumns() if self.angles_known else angle_columns(self.channels, axis, placed)
 
     def true_rate_dps(self, axis: str) -> Array:
         """Return the true rate along an axis, (m,) deg/s."""

@@ -9,11 +9,16 @@ table's rate
 
 with s = 1 or -1 for the end of o that points up, m the misalignment towards o, and angles f and t of this end. With one
 mounting nothing of this is separated, and m has the angles in full. The two ends of o separate the sum of their angles,
-half the difference stays in m. A unit turned by 180 deg on its face separates all of them.
+half the difference stays in m. A unit turned by 180 deg on its face separates all of them. What is different in each
+mounting, because a unit is never placed alike, is a random effect of the size that the bench states.
+
+Several recordings may be of several benches, whose angles are not the same: nothing is separated there, and the shifts
+between mountings (`shifts`) have the angles.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
@@ -23,7 +28,9 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from labctl.fitting.data.channels import BODY_AXES, Channels
+from labctl.fitting.data.joined import recordings_in
 from labctl.fitting.numeric.arrays import Array
+from labctl.recording import Standard
 from labctl.recording.positions import Position
 
 #: Standard deviation of an angle before anything was measured, rad: far above that of any fixture.
@@ -32,6 +39,11 @@ WIDE_RAD = 0.1
 ANGLE_QUANTITIES = ("fixture_angle", "tilt", "mounting_repeatability")
 #: What stays below the turned part, and the two components of its angle.
 PARTS, WAVES = ("fixture", "table"), ("cos", "sin")
+#: End of the name of what a single mounting is off by.
+PLACED = " placed"
+#: Its coefficients are in units of so little of the angle that their standard deviation is this number: far above the
+#: drift of any gyro in deg/s, which a fit adds to what is known of every coefficient.
+PLACED_SIZE = 10.0
 #: Shares of a singular value below which a direction is not seen.
 UNSEEN = 1e-9
 
@@ -59,6 +71,11 @@ class _Scheme:
     angles: NDArray[np.float64]  #: (p, l): what each mounting shows of each angle
     separated: NDArray[np.float64]  #: (l, k): orthonormal combinations that are separated from the misalignment
 
+    @property
+    def separates(self) -> bool:
+        """Whether any angle is separated from the misalignment."""
+        return self.separated.shape[1] > 0
+
     def gains(self, shares: Mapping[str, float]) -> AngleGains:
         """Return the gains of a fit to so much of each position: the weighted least squares of the mountings."""
         root = np.sqrt([shares[str(position)] for position in self.positions])
@@ -77,6 +94,7 @@ class AngleColumns:
     names: tuple[str, ...] = ()  #: of the l angles
     combined: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))  #: (l, k)
     values: NDArray[np.float64] = field(default_factory=lambda: np.zeros((0, 0)))  #: (n, k) deg/s per radian
+    size: Array = field(default_factory=lambda: np.zeros(0))  #: (k,) standard deviation before the measurement
 
     def __len__(self) -> int:
         """Return k."""
@@ -87,19 +105,32 @@ class AngleColumns:
         return dict(zip(self.names, (self.combined @ found).tolist(), strict=True))
 
 
-def angle_columns(channels: Channels, axis: str) -> AngleColumns:
-    """Return the regressors of one output: of the mountings in which the table turned it about another axis."""
+def angle_columns(channels: Channels, axis: str, placed_rad: float = 0.0) -> AngleColumns:
+    """Return the regressors of one output: of the mountings in which the table turned it about another axis.
+
+    `placed_rad` is the standard deviation by which one mounting differs from the same another time (`placed_rad`).
+    """
+    if len(recordings_in(channels.columns)) > 1:
+        return AngleColumns(values=np.zeros((len(channels), 0)))
     names: list[str] = []
-    values, blocks = [np.zeros((len(channels), 0))], []
+    values, blocks, sizes = [np.zeros((len(channels), 0))], [], [np.zeros(0)]
     for scheme in _schemes(turned_positions(channels), axis):
-        if scheme.separated.shape[1] == 0:
+        if not scheme.separates:
             continue
-        shown = np.column_stack([angle_regressor(channels, name) for name in scheme.names])
-        names += scheme.names
-        values.append(shown @ scheme.separated)
-        blocks.append(scheme.separated)
+        placed = [f"{position}{PLACED}" for position in scheme.positions] if placed_rad else []
+        shown = np.column_stack([angle_regressor(channels, name) for name in (*scheme.names, *placed)])
+        names += [*scheme.names, *placed]
+        blocks.append(np.asarray(block_diag(scheme.separated, np.eye(len(placed)) * placed_rad / PLACED_SIZE)))
+        values.append(shown @ blocks[-1])
+        sizes += [np.full(scheme.separated.shape[1], WIDE_RAD), np.full(len(placed), PLACED_SIZE)]
     combined = np.asarray(block_diag(*blocks)) if blocks else np.zeros((0, 0))
-    return AngleColumns(tuple(names), combined, np.concatenate(values, axis=1))
+    return AngleColumns(tuple(names), combined, np.concatenate(values, axis=1), np.concatenate(sizes))
+
+
+def placed_rad(standards: Iterable[Standard]) -> float:
+    """Return the standard deviation by which a mounting differs from the same another time, rad; 0 where not stated."""
+    stated = [each.standard_u for each in standards if each.quantity == "mounting_repeatability"]
+    return math.radians(math.hypot(*stated))
 
 
 def leaning_rates(channels: Channels, angles_rad: Mapping[str, Mapping[str, float]]) -> dict[str, Array]:
@@ -120,7 +151,9 @@ def angle_regressor(channels: Channels, name: str) -> Array:
     found = np.zeros(len(channels))
     for text, rows in channels.positions():
         position = Position.of(text)
-        if name in _names(position):
+        if name == f"{position}{PLACED}":
+            found[rows] = 1.0
+        elif name in _names(position):
             found[rows] = _shown(position, (name,))[0]
     return np.asarray(found * channels.table_rate_dps())
 
@@ -132,7 +165,12 @@ def turned_positions(channels: Channels) -> tuple[str, ...]:
 
 
 def mountings_of(channels: Channels) -> dict[str, float]:
-    """Return position -> the share of its data sets in what is known of slopes over the rate: squares of the rate."""
+    """Return position -> the share of its data sets in what is known of slopes over the rate: squares of the rate.
+
+    Of several recordings nothing: each may have been on another fixture.
+    """
+    if len(recordings_in(channels.columns)) > 1:
+        return {}
     squares = channels.table_rate_dps() ** 2
     return shares_of({position: float(squares[rows].sum()) for position, rows in channels.positions()})
 
@@ -148,7 +186,9 @@ def angle_gains(shares: Mapping[str, float], axis: str, *, separates: bool = Tru
 
     Where nothing `separates` the angles, the slope is that of a line through all mountings.
     """
-    known = {str(Position.of(text)): share for text, share in shares.items()}
+    known: dict[str, float] = {}
+    for text, share in shares.items():
+        known[str(Position.of(text))] = known.get(str(Position.of(text)), 0.0) + share
     scheme = _scheme(tuple(sorted(known)), axis)
     if scheme is None:
         return AngleGains()
@@ -156,6 +196,12 @@ def angle_gains(shares: Mapping[str, float], axis: str, *, separates: bool = Tru
         none = np.zeros((len(scheme.names), 0))
         scheme = _Scheme(scheme.positions, scheme.names, scheme.sign, scheme.angles, none)
     return scheme.gains(known)
+
+
+def separates_any(positions: Iterable[str], axis: str) -> bool:
+    """Return whether the mountings with a body axis along the table axis separate an angle from the misalignment."""
+    scheme = _scheme(tuple(sorted(positions)), axis)
+    return scheme is not None and scheme.separates
 
 
 def _schemes(positions: tuple[str, ...], axis: str) -> Iterable[_Scheme]:

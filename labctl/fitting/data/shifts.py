@@ -16,7 +16,7 @@ from scipy.linalg import helmert
 
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.data.joined import recordings_in
-from labctl.fitting.data.mounting_angles import WIDE_RAD, angle_columns
+from labctl.fitting.data.mounting_angles import angle_columns
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording.columns import RECORDING
 
@@ -71,7 +71,7 @@ def shift_columns(channels: Channels, axis: str) -> NDArray[np.float64]:
     return np.column_stack(found) if found else np.zeros((len(channels), 0))
 
 
-def shift_contrasts(channels: Channels, axis: str) -> tuple[NDArray[np.float64], Array]:
+def shift_contrasts(channels: Channels, axis: str, placed_rad: float = 0.0) -> tuple[NDArray[np.float64], Array]:
     """Return contrasts between the shifts of one axis, (n, k), and the largest standard deviation of each, (k,).
 
     What all recordings have in common is no shift: an error of the bias that they share can still be found. So it is
@@ -80,8 +80,8 @@ def shift_contrasts(channels: Channels, axis: str) -> tuple[NDArray[np.float64],
     kinds: dict[tuple[ShiftKind, str], list[Array]] = {}
     for shift in shifts_of(channels, axis):
         kinds.setdefault((shift.kind, shift.along), []).append(shift.values)
-    angles = angle_columns(channels, axis)
-    columns, largest = [angles.values], [WIDE_RAD] * len(angles)
+    angles = angle_columns(channels, axis, placed_rad)
+    columns, largest = [angles.values], angles.size.tolist()
     for (kind, _), values in kinds.items():
         columns.append(np.column_stack(values) @ helmert(len(values)).T)
         largest += [KINDS[kind].largest] * (len(values) - 1)

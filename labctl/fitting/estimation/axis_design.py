@@ -13,7 +13,7 @@ from labctl.errors import NotEnoughData
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.data.earth import turning_columns
 from labctl.fitting.data.fit_data import FitData
-from labctl.fitting.data.mounting_angles import AngleColumns, angle_columns
+from labctl.fitting.data.mounting_angles import AngleColumns
 from labctl.fitting.data.shifts import Shift, shifts_of
 from labctl.fitting.effects import Column
 from labctl.fitting.estimation.held.propagation import HeldColumns, HeldPart
@@ -87,7 +87,7 @@ def axis_design(
         held.part,
         tuple(laws),
         tuple(shifts_of(data.channels, axis)),
-        AngleColumns() if data.angles_known else angle_columns(data.channels, axis),
+        data.angle_columns(axis),
     )
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from labctl.errors import NotEnoughData
 from labctl.fitting.data.earth import turning_columns, turning_size_dps, with_known_size, with_prior
 from labctl.fitting.data.fit_data import FitData
-from labctl.fitting.data.mounting_angles import WIDE_RAD, leaning_rates
+from labctl.fitting.data.mounting_angles import leaning_rates
 from labctl.fitting.data.rate_profile import TIME_CONSTANT
 from labctl.fitting.data.shifts import KINDS, shifts_of
 from labctl.fitting.estimation.axis_design import AxisDesign, axis_design
@@ -167,8 +167,7 @@ def _solve_axis(data: FitData, model: ErrorModel, axis: str, design: AxisDesign,
     if design.shifts or len(design.angles):
         known = _with_white_noise(design, y, known)
     columns, y, scatter = with_known_size(design.columns, design.turning, y, known, turning_size_dps(data.info))
-    wide_rad2 = np.full(len(design.angles), WIDE_RAD**2)
-    columns, y, scatter = with_prior(columns, design.angles.values, y, scatter, wide_rad2)
+    columns, y, scatter = with_prior(columns, design.angles.values, y, scatter, design.angles.size**2)
     if design.shifts:
         wide = np.array([KINDS[shift.kind].largest for shift in design.shifts])
         values = np.column_stack([shift.values for shift in design.shifts])

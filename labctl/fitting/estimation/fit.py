@@ -85,6 +85,7 @@ def fit_preset(data: FitData, preset: Preset) -> FitResult:
         left_out_dps=_left_out_dps(fitted, data),
         joint=joint_findings(data, model, preset, found),
         mountings=mountings_of(data.channels),
+        angles_rad={axis: each.angles_rad for axis, each in found.nuisance.items() if each.angles_rad},
     )
 
 

@@ -40,6 +40,8 @@ class FitResult:
     left_out_dps: Mapping[str, float] = field(default_factory=dict)  #: effect that is not exported -> its RMS, deg/s
     joint: JointJson | None = None  #: what several recordings say together; None for a single one
     mountings: Mapping[str, float] = field(default_factory=dict)  #: position -> its share in the slopes over the rate
+    #: Output -> name -> angle of the mountings, rad, as far as they are separated from the misalignments.
+    angles_rad: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     def exported(self) -> tuple[FittedModel, list[LeftOut]]:
         """Return the part of the model that belongs to the unit, and what was left out, with its size."""

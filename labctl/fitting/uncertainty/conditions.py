@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import date
 from typing import Literal
 
-from labctl.fitting.data.mounting_angles import AngleGains, angle_gains
+from labctl.fitting.data.mounting_angles import AngleGains, angle_gains, placed_rad, separates_any
 from labctl.json_types.budget import BenchConditionsJson
 from labctl.json_types.models import FitEnvironment
 from labctl.recording import RecordingInfo, Standard
@@ -27,6 +27,8 @@ class BenchConditions:
     max_rate_dps: float | None = None
     standards: tuple[Standard, ...] = field(default_factory=tuple)
     mountings: Mapping[str, float] = field(default_factory=dict)  #: position -> its share in the slopes over the rate
+    #: Output -> name -> angle of the mountings that the fit separated, rad: of this bench, in these recordings.
+    angles_rad: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     separates: bool = True  #: whether angles of the mountings were fitted beside the slopes
 
     def of(self, quantity: str) -> tuple[Standard, ...]:
@@ -34,8 +36,17 @@ class BenchConditions:
         return tuple(each for each in self.standards if each.quantity == quantity)
 
     def angle_gains(self, axis: str) -> AngleGains:
-        """Return how the misalignment towards a body axis follows the angles of its mountings; 1 where not stored."""
-        return angle_gains(self.mountings, axis, separates=self.separates)
+        """Return how the misalignment towards a body axis follows the angles of its mountings; 1 where not stored.
+
+        What a fit takes as a random effect of each mounting is in the u of its coefficients.
+        """
+        found = angle_gains(self.mountings, axis, separates=self.separates)
+        return replace(found, mounting=0.0) if self.fits_placement(axis) else found
+
+    def fits_placement(self, axis: str) -> bool:
+        """Return whether the fit took into account how a unit is placed in each mounting with an axis up."""
+        stated = self.separates and placed_rad(self.standards) > 0
+        return stated and separates_any(self.mountings, axis)
 
     def to_json(self) -> BenchConditionsJson:
         """Return this as JSON."""
@@ -46,6 +57,8 @@ class BenchConditions:
         }  # fmt: skip
         if self.mountings:
             found["mountings"] = dict(self.mountings)
+        if self.angles_rad:
+            found["angles_rad"] = {axis: dict(named) for axis, named in self.angles_rad.items()}
         return found
 
     @staticmethod
@@ -55,6 +68,7 @@ class BenchConditions:
             date.fromisoformat(record["used_on"]), record["motion"], record["thermometer"], record["latitude_deg"],
             record["turn_common_u"], record["max_rate_dps"],
             tuple(Standard.model_validate(each) for each in record["stated"]), record.get("mountings", {}),
+            record.get("angles_rad", {}),
         )  # fmt: skip
 
 
@@ -63,15 +77,16 @@ def conditions_of(
     environment: FitEnvironment,
     used_on: Sequence[date] = (),
     mountings: Mapping[str, float] | None = None,
+    angles_rad: Mapping[str, Mapping[str, float]] | None = None,
 ) -> BenchConditions:
     """Return the conditions of a fit: head of its recording, which thermometer it went by, and the recordings' days.
 
-    `mountings` is that of the fit's result.
+    `mountings` and `angles_rad` are those of the fit's result.
     """
     thermometer: Thermometer = (
         "reference" if info.thermometer else "chamber" if "temperature" in environment else "unit"
     )
     return BenchConditions(
         max(used_on, default=info.started_at.date()), info.motion, thermometer, info.latitude_deg, info.turn_common_u,
-        info.max_rate_dps, info.standards, mountings or {},
+        info.max_rate_dps, info.standards, mountings or {}, angles_rad or {},
     )  # fmt: skip

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from labctl.fitting.data.channels import BODY_AXES
 from labctl.fitting.data.earth import EARTH_RATE_DPS
-from labctl.fitting.data.mounting_angles import ANGLE_QUANTITIES, AngleGains
+from labctl.fitting.data.mounting_angles import ANGLE_QUANTITIES, AngleGains, separates_any
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.uncertainty.budget import BudgetLine
 from labctl.fitting.uncertainty.conditions import BenchConditions
@@ -28,6 +29,7 @@ NO_TIME_BASE = (
 )
 NO_LATITUDE = "not known: latitude_deg is not stated, so the Earth's rate is part of the bias"
 SECOND = "with the second order (GUM 5.1.2, note)"
+PLACED_IN_COEFFICIENTS = "in the coefficients, where the fit takes it for each mounting"
 IN_COEFFICIENTS = "in the coefficients: the fit takes turn_common_u of the recipe"
 NO_SENSITIVITY = "its sensitivity is not known: the model has no supply_sensitivity"
 
@@ -149,10 +151,21 @@ def _sensitivity(standard: Standard, bench: BenchConditions, s: Sensitivities) -
         return np.zeros_like(s.temperature), OWN_THERMOMETER
     if standard.quantity == "turn_angle" and bench.turn_common_u is not None:
         return np.zeros_like(s.relative_rate), IN_COEFFICIENTS
+    if standard.quantity in ANGLE_QUANTITIES and (why := _why_less(standard.quantity, bench)):
+        return _SENSITIVITY[standard.quantity, standard.unit_name](s, bench), why
     found = _SENSITIVITY[standard.quantity, standard.unit_name](s, bench)
     if found is None:
         return None, NO_SENSITIVITY if standard.quantity == "supply" else NO_LATITUDE
     return found, ""
+
+
+def _why_less(quantity: str, bench: BenchConditions) -> str:
+    """Return why an angle of the mountings is smaller in the result than it is stated; empty where it is not."""
+    if not bench.separates or not any(separates_any(bench.mountings, axis) for axis in BODY_AXES):
+        return ""
+    if quantity == "mounting_repeatability":
+        return PLACED_IN_COEFFICIENTS
+    return f"as far as the mountings {', '.join(sorted(bench.mountings))} do not separate it from the misalignment"
 
 
 def _size(sensitivity: Array) -> float:

@@ -147,7 +147,9 @@ def _standard(given: Standard) -> StandardUsed:
 def _states(store: Store, facts: Facts, found: Measurements) -> tuple[StateOfItem, StateOfItem, str]:
     """Return the errors as found and as left, and what was adjusted between."""
     row, calibration = facts.row, facts.calibration
-    left = measured.corrected(found, calibration, f"the calibration that is certified, version {row.version}")
+    left = measured.corrected(
+        found, calibration, f"the calibration that is certified, version {row.version}", calibration
+    )
     before = _version_before(store, facts)
     new = f"The coefficients of the correction were determined anew: version {row.version}."
     said = f"{new} {facts.order.adjustment or 'Nothing else was adjusted or repaired.'}"
@@ -155,7 +157,7 @@ def _states(store: Store, facts: Facts, found: Measurements) -> tuple[StateOfIte
         document, _ = store.calibrations.document(row.serial, before)
         try:
             basis = f"the calibration in force before, version {before}"
-            return measured.corrected(found, read_calibration(document), basis), left, said
+            return measured.corrected(found, read_calibration(document), basis, calibration), left, said
         except (BadInput, NotEnoughData):  # its model needs what was not recorded this time
             pass
     return measured.uncorrected(found, calibration.axes), left, said

@@ -13,12 +13,13 @@ from labctl.certificates.document import Evidence, Use
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import BODY_AXES
 from labctl.fitting.data.fit_data import FitData, fit_data_of
-from labctl.fitting.uncertainty.budget import Budget
-from labctl.recording import Recording
+from labctl.fitting.data.mounting_angles import placed_rad
+from labctl.fitting.uncertainty.budget import Budget, BudgetLine, budget_of
+from labctl.recording import Recording, Standard
 from labctl.recording.verification import fitted_part, verification_part
 from labctl.services.calibrations.uncertainty import budgets_at
 from labctl.services.criticism.measurements import Measurements
-from labctl.services.criticism.verification.of_version import applied_errors
+from labctl.services.criticism.verification.of_version import applied_errors, mounting_angles_of
 
 #: A verification has to reach into this share of the range of rates at either end.
 END_SHARE = 1.0 / 3.0
@@ -74,9 +75,10 @@ class _Part:
     outside: np.ndarray
 
     @staticmethod
-    def of(calibration: Calibration, points: Recording) -> _Part:
+    def of(calibration: Calibration, points: Recording, *, anew: bool = False) -> _Part:
         """Correct without the rates about axes that have no output, which a user does not know."""
-        errors, outside = applied_errors(calibration, points, across_known=False)
+        angles = mounting_angles_of(calibration, anew=anew)
+        errors, outside = applied_errors(calibration, points, across_known=False, angles_rad=angles)
         return _Part(fit_data_of(points), errors, outside)
 
     def belongs(self, row: int, axis: str, about: Use) -> bool:
@@ -84,6 +86,20 @@ class _Part:
         if about == "any axis" or not self.data.channels.table_rate_dps()[row]:
             return True
         return bool(self.data.channels.up(axis)[row])
+
+    def _with_placement(self, budget: Budget, row: int, axis: str, calibration: Calibration) -> Budget:
+        """Return the budget of an error with how the unit was placed anew for it: across, a part of the rate."""
+        channels = self.data.channels
+        across = 0.0 if channels.up(axis)[row] else abs(float(channels.table_rate_dps()[row]))
+        stated = calibration.document.get("standards")
+        u_rad = placed_rad([Standard.model_validate(each) for each in stated["stated"]]) if stated else 0.0
+        if budget.combined is None or not across * u_rad:
+            return budget
+        line = BudgetLine(
+            "mounting_repeatability", "mounting_repeatability (of the mounting that verifies)", "B", "normal",
+            math.degrees(u_rad), "deg", math.radians(across), across * u_rad,
+        )  # fmt: skip
+        return budget_of(budget.result, budget.unit, [*budget.lines, line], budget.value)
 
     def largest(self, about: Use) -> list[float]:
         """Return the largest error of each data set that shows one."""
@@ -101,6 +117,7 @@ class _Part:
             if self.belongs(row, axis, about):
                 warm = float(self.data.channels.temperature_c(axis)[row])
                 budget = budgets_at(calibration, rates if about == "any axis" else rates[axis], warm)[axis]
+                budget = self._with_placement(budget, row, axis, calibration)
                 place = (rates["x"], rates["y"], rates["z"])
                 yield VerifiedError(axis, place, warm if knows else None, float(values[row]), budget)
 
@@ -117,7 +134,7 @@ def errors_of(measured: Measurements, calibration: Calibration, about: Use) -> E
     found: list[VerifiedError] = []
     datasets = outside = 0
     for _, points in aside:
-        seen = _Part.of(calibration, points)
+        seen = _Part.of(calibration, points, anew=True)
         outside += int(seen.outside.sum())
         for row in np.flatnonzero(~seen.outside).tolist():
             shown = list(seen.at(row, calibration, about))

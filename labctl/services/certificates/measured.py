@@ -28,7 +28,7 @@ from labctl.recording import Recording
 from labctl.services.calibrations.surface import errors_on_grid
 from labctl.services.calibrations.uncertainty import coefficients_at, over_any_axis, places_of, uncertainty_of
 from labctl.services.criticism.measurements import Measurements
-from labctl.services.criticism.verification.of_version import applied_errors
+from labctl.services.criticism.verification.of_version import applied_errors, mounting_angles_of
 from labctl.services.schemas.documents.certificates import RoomConditions
 from labctl.store import CalibrationRecord, RoomSpan, Store
 
@@ -212,9 +212,13 @@ def uncorrected(measured: Measurements, axes: tuple[str, ...]) -> StateOfItem:
     return _state("the output converted with its nominal scale factor, without correction", errors)
 
 
-def corrected(measured: Measurements, calibration: Calibration, basis: str) -> StateOfItem:
-    """Return the errors of the rate corrected by a version; nothing is fitted. Raises BadInput, NotEnoughData."""
-    return _state(basis, applied_errors(calibration, measured.points)[0])
+def corrected(measured: Measurements, calibration: Calibration, basis: str, fitted: Calibration) -> StateOfItem:
+    """Return the errors of the rate corrected by a version; nothing is fitted.
+
+    `fitted` is the version that was fitted to these measurements, which knows the angles of their mountings. Raises
+    BadInput, NotEnoughData.
+    """
+    return _state(basis, applied_errors(calibration, measured.points, angles_rad=mounting_angles_of(fitted))[0])
 
 
 def _state(basis: str, errors: Mapping[str, Array]) -> StateOfItem:

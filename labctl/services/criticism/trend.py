@@ -17,7 +17,13 @@ from labctl.recording.info import ordered_at
 from labctl.services.cache import UNNAMED, compute
 from labctl.services.criticism.measurements import Measurements
 from labctl.services.criticism.occasions import in_time, occasions_of, occasions_text, undated_text
-from labctl.services.criticism.verification.of_version import LARGEST_RATIO, applied_errors, expected_dps, left_by
+from labctl.services.criticism.verification.of_version import (
+    LARGEST_RATIO,
+    applied_errors,
+    expected_dps,
+    left_by,
+    mounting_angles_of,
+)
 from labctl.services.criticism.versions import version_of
 from labctl.services.schemas.units import (
     AppliedVersion,
@@ -89,7 +95,8 @@ def _point(
         as_left=_applied(store, own[-1:], data), rms_dps=None, axes={},
     )  # fmt: skip
     try:
-        errors, _ = applied_errors(read_calibration(reference.document), data.points)
+        angles = mounting_angles_of(read_calibration(own[-1].document)) if own else None
+        errors, _ = applied_errors(read_calibration(reference.document), data.points, angles_rad=angles)
         channels = fit_data_of(data.points)
     except LabctlError as error:
         return found.model_copy(update={"why": str(error)})

@@ -27,7 +27,7 @@ from labctl.fitting.data.temperature.levels import level_means
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.uncertainty import BenchConditions, conditions_of
 from labctl.fitting.uncertainty.standard_lines import Sensitivities, standards_u
-from labctl.recording.positions import axis_in
+from labctl.recording.positions import Position, axis_in
 
 #: Figures at one temperature are at the level nearest to this, deg C.
 USUAL_C = 25.0
@@ -83,10 +83,23 @@ class _Columns:
 
 
 def figures_of(data: FitData) -> list[Figure]:
-    """Return all figures that the data sets of a recording give."""
-    seen = _columns(data)
+    """Return all figures that the data sets of a recording give.
+
+    Mountings that are turned about the table axis separate the angles of fixture and table in a fit. Here no angle is
+    fitted, so they are left out where there are others.
+    """
+    straight = np.array([Position.of(each).turned_deg == 0 for each in np.asarray(data.channels["position"]).tolist()])
+    straight = straight if straight.any() else ~straight
+    seen = _columns(data.take(straight))
     found = [each for axis in data.outputs for each in (*_of_rates(seen, axis), *_at_rest(seen, axis))]
-    return [*found, *_alignment(seen)]
+    return [replace(each, rows=_spread(each.rows, straight)) for each in (*found, *_alignment(seen))]
+
+
+def _spread(rows: NDArray[np.bool_], among: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return a mask of the data sets of another mask as one of all, (m,)."""
+    found = np.zeros(len(among), dtype=bool)
+    found[among] = rows
+    return found
 
 
 def _columns(data: FitData) -> _Columns:

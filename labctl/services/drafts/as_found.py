@@ -14,7 +14,7 @@ from labctl.fitting.numeric.arrays import Array
 from labctl.json_types.models import AxisCoefficients
 from labctl.services.criticism.measurements import Measurements
 from labctl.services.criticism.trend import line_left
-from labctl.services.criticism.verification.of_version import applied_errors, verify
+from labctl.services.criticism.verification.of_version import applied_errors, mounting_angles_of, verify
 from labctl.services.recordings.loading import motion_of
 from labctl.services.schemas.reports.drafts import AppliedDraft, CoefficientChange, DriftFromVersion, RemainingLine
 from labctl.store import CalibrationRecord, Store
@@ -71,8 +71,10 @@ def _difference(in_force: CalibrationRecord, draft: CalibrationRecord, measured:
             "a recording of poses has no data sets at known rates, so corrected rates cannot be compared; "
             "compare the versions with `labctl verify`"
         )
-    old, _ = applied_errors(read_calibration(in_force.document), measured.points)
-    new, _ = applied_errors(read_calibration(draft.document), measured.points)
+    fitted = read_calibration(draft.document)
+    angles = mounting_angles_of(fitted)
+    old, _ = applied_errors(read_calibration(in_force.document), measured.points, angles_rad=angles)
+    new, _ = applied_errors(fitted, measured.points, angles_rad=angles)
     return {axis: new[axis] - old[axis] for axis in new if axis in old}
 
 

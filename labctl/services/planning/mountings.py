@@ -8,7 +8,7 @@ from datetime import date
 from instruments.bench_config import BenchFile
 from instruments.positions import Position
 from labctl.fitting.data.channels import BODY_AXES
-from labctl.fitting.data.mounting_angles import ANGLE_QUANTITIES, shares_of
+from labctl.fitting.data.mounting_angles import ANGLE_QUANTITIES, angle_gains, shares_of
 from labctl.fitting.uncertainty.conditions import BenchConditions
 from labctl.fitting.uncertainty.standard_lines import Sensitivities, standards_u
 from labctl.services.schemas.plans import FurtherMountings, MisalignmentOutlook
@@ -73,7 +73,7 @@ def _expanded(bench: BenchFile, shares: dict[str, float]) -> float:
     stated = tuple(each for each in bench.standards if each.quantity in ANGLE_QUANTITIES)
     conditions = BenchConditions(ANY_DAY, standards=stated, mountings=shares)
     return max(
-        K * standards_u(conditions, Sensitivities.of_one(angle=1.0, gains=conditions.angle_gains(axis)))
+        K * standards_u(conditions, Sensitivities.of_one(angle=1.0, gains=angle_gains(shares, axis)))
         for axis in {Position.of(position).axis for position in shares}
     )
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,12 +13,20 @@ from hypothesis import strategies as st
 from labctl.fitting.criticism import criticise
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.data.fit_data import fit_data_of
-from labctl.fitting.data.mounting_angles import WAVES, angle_columns, angle_gains, angle_regressor, mountings_of
+from labctl.fitting.data.mounting_angles import (
+    WAVES,
+    AngleGains,
+    angle_columns,
+    angle_gains,
+    angle_regressor,
+    mountings_of,
+)
 from labctl.fitting.data.temperature.channel import with_temperature
 from labctl.fitting.estimation.axis_solutions import solve_axes
 from labctl.fitting.estimation.fit import fit_preset
 from labctl.fitting.models.presets import preset_for
 from labctl.recording import Recording
+from labctl.recording.columns import RECORDING
 from studies.rate_vector_coverage import CASES, MODEL, info_of
 from studies.rate_vector_simulation import AXES, Bench, Noise, Statement, Unit, campaign
 
@@ -86,6 +95,31 @@ def test_what_is_left_is_noise_and_no_effect_is_blamed(made: tuple[Recording, Un
     assert result.error.rms_dps < 1.2 * result.error.noise_floor_dps
     assert result.error.heldout_rms_dps < 1.5 * result.error.noise_floor_dps
     assert criticise(made[0], result.fitted.model, full=False).verdict.named == ()
+
+
+@pytest.mark.parametrize("seed", [5, 6])
+def test_how_a_unit_is_placed_in_more_mountings_than_needed_is_no_error_of_the_model(seed: int) -> None:
+    plan = replace(TURNED.plan, turned=tuple(f"{end}@{angle}" for end in AXES for angle in (90, 180, 270)))
+    rng, stated = np.random.default_rng(seed), Statement(mounting_deg=0.006)
+    unit, bench = Unit.of(rng, 0.0), Bench.of(rng, stated, plan.mountings)
+    columns = campaign(unit, bench, plan, Noise(), stated.turn_on_dps, rng)
+    recording = with_temperature(Recording(info_of(replace(TURNED, plan=plan), stated), columns))
+    result = fit_preset(fit_data_of(recording), preset_for(None, list(MODEL)))
+    assert result.error.rms_dps is not None
+    assert result.error.noise_floor_dps is not None
+    assert result.error.rms_dps < 1.3 * result.error.noise_floor_dps
+    verdict = criticise(recording, result.fitted.model, full=False).verdict
+    assert (verdict.form, verdict.named) == ("adequate", ())
+    u = result.fitted.axes["x"].u_of("misalignment_y")
+    assert u == pytest.approx(np.radians(stated.mounting_deg) / 2, rel=0.1)  # the mean of four mountings
+
+
+def test_of_several_recordings_no_angle_is_separated_and_all_of_it_is_in_the_budget() -> None:
+    position = np.array(["x", "x", "x@180", "x@180", "y", "y"])
+    table, of = np.array([1.0, -1.0] * 3), np.array([1, 1, 2, 2, 1, 1])
+    channels = Channels({"position": position, "table_rate_dps": table, RECORDING: of}, dict.fromkeys(AXES, table))
+    assert len(angle_columns(channels, "z")) == 0
+    assert angle_gains(mountings_of(channels), "x") == AngleGains(1.0, 1.0, 1.0)
 
 
 def channels_of(positions: Sequence[str], rates: Sequence[float]) -> Channels:

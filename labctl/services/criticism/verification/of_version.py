@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -13,6 +13,7 @@ from labctl.calibration import Calibration, read_calibration
 from labctl.compensator import Compensator
 from labctl.errors import BadInput, LabctlError
 from labctl.fitting.data.fit_data import FitData, fit_data_of
+from labctl.fitting.data.mounting_angles import PLACED, leaning_rates
 from labctl.recording import Recording
 from labctl.recording.verification import fitted_part, verification_part
 from labctl.services.criticism.measurements import Measurements
@@ -30,6 +31,8 @@ from labctl.services.recordings.loading import motion_of, newest_row, points_of,
 from labctl.services.schemas.criticism import VerificationResponse
 from labctl.store import CalibrationRecord, Store
 
+#: Output -> name -> angle of a mounting, rad.
+Angles = Mapping[str, Mapping[str, float]]
 __all__ = ["LARGEST_RATIO", "Left", "applied_errors", "expected_dps", "left_by", "verify", "verify_unit"]
 
 
@@ -118,7 +121,9 @@ def left_by(store: Store, row: CalibrationRecord, measured: Measurements) -> Lef
         return Left(pooled, errors, outside, is_part=False, groups=1)
     aside = verification_part(measured.points)
     points = measured.points if aside is None else aside
-    errors, outside = applied_errors(calibration, points)
+    own = measured.row.id in row.recordings
+    angles = mounting_angles_of(calibration, anew=aside is not None) if own else None
+    errors, outside = applied_errors(calibration, points, angles_rad=angles)
     pooled = np.concatenate(list(errors.values()))
     return Left(pooled, errors, outside, is_part=aside is not None, groups=independent_groups(points))
 
@@ -135,7 +140,8 @@ def _own_errors(store: Store, row: CalibrationRecord, measured: Measurements, le
             elif motion_of(head) == "poses":
                 _, errors, _ = errors_in_poses(calibration, source_of(store, head))
             else:
-                errors, _ = applied_errors(calibration, fitted_part(points_of(store, head)))
+                angles = mounting_angles_of(calibration)
+                errors, _ = applied_errors(calibration, fitted_part(points_of(store, head)), angles_rad=angles)
             for axis, values in errors.items():
                 parts.setdefault(axis, []).append(values)
     except LabctlError:  # a table of coefficients, say
@@ -144,14 +150,23 @@ def _own_errors(store: Store, row: CalibrationRecord, measured: Measurements, le
 
 
 def applied_errors(
-    calibration: Calibration, points: Recording, *, across_known: bool = True
+    calibration: Calibration,
+    points: Recording,
+    *,
+    across_known: bool = True,
+    angles_rad: Angles | None = None,
 ) -> tuple[dict[str, NDArray[np.float64]], NDArray[np.bool_]]:
     """Return axis -> corrected minus true rate of each data set, (m,) deg/s, and which lie outside the validity, (m,).
 
     With `across_known` the table's rates about axes without an output enter the correction; a user does not have them.
+    `angles_rad` are those of the mountings of this recording, as far as a fit separated them: the true rates are then
+    those of a unit that leans so. Without them the mountings count as nominal, and what fixture and table are off by is
+    in the errors.
     Raises BadInput where the recording lacks an axis or a channel of the model, NotEnoughData.
     """
     data = fit_data_of(points)
+    if angles_rad:
+        data = replace(data, channels=data.channels.with_rates(leaning_rates(data.channels, angles_rad)))
     missing = [axis for axis in calibration.axes if axis not in data.outputs]
     if missing:
         raise BadInput(
@@ -167,6 +182,19 @@ def applied_errors(
     )  # fmt: skip
     errors = {axis: found.rate_dps[:, i] - data.true_rate_dps(axis) for i, axis in enumerate(calibration.axes)}
     return errors, found.outside
+
+
+def mounting_angles_of(calibration: Calibration, *, anew: bool = False) -> Angles:
+    """Return output -> name -> angle of the mountings of the recording that a version was fitted to, rad.
+
+    With `anew` without what is different whenever the unit is mounted: for a part in mountings of its own.
+    """
+    stated = calibration.document.get("standards")
+    found = {} if stated is None else stated.get("angles_rad", {})
+    return {
+        axis: {name: angle for name, angle in named.items() if not (anew and name.endswith(PLACED))}
+        for axis, named in found.items()
+    }
 
 
 def _channels(compensator: Compensator, data: FitData) -> Mapping[str, NDArray[np.float64]]:

@@ -29,6 +29,7 @@ RULES = {"temperatures_c": (30.0,), "rates_dps": (400.0, -400.0)}
 INVERTED = Inverted.model_validate(RULES)
 TURNED = Indexing.model_validate({**RULES, "unit_deg": (180,)})
 CUBE = Indexing.model_validate({**RULES, "fixture_deg": (90, 180)})
+EFFECTS = ["bias", "bias_temperature", "scale_factor", "scale_factor_temperature", "misalignment"]
 SIX = ("x", "-x", "y", "-y", "z", "-z")
 
 
@@ -48,11 +49,14 @@ def test_the_budget_of_the_fit_is_what_the_plan_said(changes: dict[str, Any], tm
     recording = hidden_recording(make_plan(recipe, limits_of(BENCH)), BENCH, gyro, 3, {})
     with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
         store.recordings.add_import(to_points(recording), AT)
-        fit_unit(store, "STIM-0001", FitRequest(effects=["bias", "scale_factor", "misalignment"]), AT)
+        fit_unit(store, "STIM-0001", FitRequest(effects=EFFECTS), AT)
         calibration = read_calibration(store.calibrations.document("STIM-0001", 1)[0])
     budget = coefficients_at(calibration, 25.0)["x"]["misalignment_y"]
     of_bench = sum((line.contribution or 0.0) ** 2 for line in budget.lines if line.source in ANGLE_QUANTITIES)
-    assert 2.0 * of_bench**0.5 == pytest.approx(said.expanded, rel=2e-3)
+    placed = next((line.contribution or 0.0) for line in budget.lines if line.source == "coefficients")
+    # how a unit is placed in each of several mountings is in the coefficients, with the noise
+    of_mountings = math.hypot(of_bench**0.5, placed if changes else 0.0)
+    assert 2.0 * of_mountings == pytest.approx(said.expanded, rel=0.1 if changes else 2e-3)
     assert said.not_stated == []
 
 
