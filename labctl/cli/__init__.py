@@ -18,9 +18,10 @@ def main() -> None:
         first_of_all()
         sys.exit(stop(sys.argv[2:]))
     if sys.argv[1:2] == ["serve"]:  # the supervisor, which guards a bench
-        from labctl.stop.priority import first_of_all
+        from labctl.stop.priority import first_of_all, keep_memory
 
         first_of_all()
+        keep_memory()
     from labctl.cli.app import main as run
 
     run()

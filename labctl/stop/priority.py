@@ -3,16 +3,23 @@
 The values are niceness (setpriority(2)): lower runs first. Below zero they need a right (RLIMIT_NICE, CAP_SYS_NICE),
 so each process also steps back from those before it where it has none. Linux groups processes by session when
 `sched_autogroup_enabled` is set (sched(7)); niceness then acts inside a group only, and the group gets it as well.
+
+What drives or guards a bench also keeps its memory: where a system takes pages away that were not used for a while, and
+its disk is busy, reading them again takes seconds in which a process does nothing, not even stop.
 """
 
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import os
+import resource
 from pathlib import Path
 
 #: What stops or guards a bench, what drives it, what answers requests where the others could not be raised.
 STOP, BENCH, PAGES = -15, -10, 5
+#: Of linux/mman.h: pages that there are, pages to come, and these when they are first used.
+MCL_CURRENT, MCL_FUTURE, MCL_ONFAULT = 1, 2, 4
 
 
 def first_of_all() -> None:
@@ -21,8 +28,9 @@ def first_of_all() -> None:
 
 
 def of_the_bench() -> None:
-    """Run this process, which drives or guards a bench, before those that answer requests."""
+    """Run this process, which drives or guards a bench, before those that answer requests, and keep its memory."""
     _set(BENCH)
+    keep_memory()
 
 
 def of_the_pages() -> None:
@@ -34,6 +42,19 @@ def of_the_pages() -> None:
         _set(0)
     else:
         _set(PAGES)
+
+
+def keep_memory() -> bool:
+    """Keep every page of this process that is or will be in memory (mlockall(2)); returns whether the system does.
+
+    Only where it may be as much as the process needs: beyond a limit (RLIMIT_MEMLOCK) it would get no more memory.
+    """
+    unlimited = resource.getrlimit(resource.RLIMIT_MEMLOCK)[0] == resource.RLIM_INFINITY
+    if not (unlimited or os.geteuid() == 0):
+        return False
+    with contextlib.suppress(OSError, AttributeError):
+        return bool(ctypes.CDLL(None).mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) == 0)
+    return False
 
 
 def _set(niceness: int) -> bool:
