@@ -31,7 +31,7 @@ data_sets = sa.Table(
     sa.Column("number", sa.Integer, primary_key=True, autoincrement=False),
     sa.Column("state", sa.String(20), nullable=False),
     sa.Column("reason", sa.Text, nullable=False, default=""),
-    sa.Column("position", sa.String(10), nullable=False),
+    sa.Column("position", sa.String(10).with_variant(sa.String(2), "sqlite"), nullable=False),  # SQLite keeps no width
     sa.Column("run", sa.Integer, nullable=False),
     sa.Column("mounting", sa.Integer, nullable=False),
     sa.Column("table_rate_dps", sa.Float, nullable=False),
