@@ -11,7 +11,10 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 AXES = ("x", "y", "z")
-EXPECTED = "x, -x, y, -y, z or -z, and where the unit was turned on its face its angle in whole degrees, such as x@180"
+EXPECTED = (
+    "x, -x, y, -y, z or -z; with the unit turned on its face x@180, with the fixture turned on the table x@0/180: "
+    "whole degrees from 0 to 359"
+)
 _FORM = re.compile(r"(-?)([xyz])(?:@(\d{1,3})(?:/(\d{1,3}))?)?")
 
 

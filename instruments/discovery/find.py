@@ -156,7 +156,7 @@ def _exchange(ports: Ports, path: str, baudrate: int, asks: bytes, wait_s: float
 
 
 def _listen(port: SerialPort, wait_s: float, clock: Clock) -> bytes:
-    """Return what comes within a time: of looks, which on a busy computer take longer than their sleep."""
+    """Return what comes within a time, counted in looks: on a busy computer each of them takes longer."""
     data = b""
     for _ in range(math.ceil(wait_s / LOOK_S)):
         clock.sleep(LOOK_S)

@@ -250,6 +250,6 @@ def _positions(path: Path, position: Column) -> Column:
         except ValueError:
             row = int(np.argmax(position == word))
             raise BadRecording(
-                f"{path}: column 'position', row {row + 1}: {str(word)!r} is not a body axis (expected {EXPECTED})"
+                f"{path}: column 'position', row {row + 1}: {str(word)!r} is not a position (expected {EXPECTED})"
             ) from None
     return np.array(found, dtype=np.str_)[of]

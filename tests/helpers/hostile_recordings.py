@@ -115,7 +115,7 @@ HOSTILE: dict[str, tuple[Callable[[Path], None], str]] = {
         column("position", pa.array([b"\xff"] * 4).view(pa.string())),
         _IN + r"'position', rows 1 to 4: not UTF",
     ),
-    "no position": (column("position", ["z", None, "z", "z"]), _IN + r"'position', row 2: '' is not a body axis"),
+    "no position": (column("position", ["z", None, "z", "z"]), _IN + r"'position', row 2: '' is not a position"),
     "2^53 + 1": (
         column("dataset", [2**53, 2**53, 2**53 + 1, 2**53 + 1]),
         r"row 1: 9007199254740992 is beyond .*2\^53 - 1",

@@ -29,7 +29,7 @@ NO_TIME_BASE = (
 )
 NO_LATITUDE = "not known: latitude_deg is not stated, so the Earth's rate is part of the bias"
 SECOND = "with the second order (GUM 5.1.2, note)"
-PLACED_IN_COEFFICIENTS = "in the coefficients, where the fit takes it for each mounting"
+PLACED_IN_COEFFICIENTS = "in the coefficients, about the axes whose mountings separate angles"
 IN_COEFFICIENTS = "in the coefficients: the fit takes turn_common_u of the recipe"
 NO_SENSITIVITY = "its sensitivity is not known: the model has no supply_sensitivity"
 

@@ -102,7 +102,7 @@ def test_a_folder_that_is_not_empty_is_left_alone(tmp_path: Path) -> None:
         (lambda r: [*r[:2], '1,0.1,10,"25,0",10.2', *r[3:]], r"row 2: '25,0' is not a number .*decimal point"),
         (
             lambda r: [r[0] + ",position", *[x + ",up" for x in r[1:]]],
-            r"column 'position', row 1: 'up' is not a body axis",
+            r"column 'position', row 1: 'up' is not a position",
         ),
     ],
 )

@@ -61,11 +61,16 @@ def _number(axis: AxisCoefficients | None) -> int:
 
 
 def judged(
-    errors: Mapping[str, Array], expected_dps: float | None, own: Mapping[str, OwnError], groups: int
+    errors: Mapping[str, Array],
+    expected_dps: float | None,
+    own: Mapping[str, OwnError],
+    groups: int,
+    mounted_dps: Mapping[str, float] | None = None,
 ) -> dict[str, AxisVerification]:
     """Return the figures of each axis, (m,) deg/s, beside what is expected of it: `expected_dps` over all axes.
 
-    `groups` is the number of parts of the recording whose errors are independent of each other.
+    `groups` is the number of parts of the recording whose errors are independent of each other; `mounted_dps`, by axis,
+    what its mountings add, which are not those of the fit.
     """
     pooled = math.sqrt(sum(own[axis].rms_dps ** 2 for axis in errors) / len(errors)) if own else 0.0
     found = {}
@@ -73,6 +78,7 @@ def judged(
         size, expected, limit = rms(values), None, None
         if expected_dps is not None:
             expected = expected_dps * own[axis].rms_dps / pooled if own else expected_dps
+            expected = math.hypot(expected, (mounted_dps or {}).get(axis, 0.0))
             limit = expected * largest_ratio(len(errors), groups, own[axis].freedom if own else None)
         found[axis] = AxisVerification(
             rms_dps=size, max_dps=float(np.max(np.abs(values))), bias_dps=float(np.mean(values)),

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -13,8 +14,8 @@ from labctl.calibration import Calibration, read_calibration
 from labctl.compensator import Compensator
 from labctl.errors import BadInput, LabctlError
 from labctl.fitting.data.fit_data import FitData, fit_data_of
-from labctl.fitting.data.mounting_angles import PLACED, leaning_rates
-from labctl.recording import Recording
+from labctl.fitting.data.mounting_angles import ANGLE_QUANTITIES, PLACED, leaning_rates
+from labctl.recording import Recording, Standard
 from labctl.recording.verification import fitted_part, verification_part
 from labctl.services.criticism.measurements import Measurements
 from labctl.services.criticism.verification.expectation import (
@@ -45,6 +46,7 @@ class Left:
     outside: NDArray[np.bool_]  #: which data sets lie outside the validity, (m,)
     is_part: bool  #: whether of the data sets that were measured to verify
     groups: int  #: parts whose errors are independent of each other
+    mounted_dps: Mapping[str, float] = field(default_factory=dict)  #: axis -> what the mountings add, root mean square
 
     @property
     def part(self) -> Literal["all", "verification"]:
@@ -86,7 +88,7 @@ def verify(store: Store, row: CalibrationRecord, measured: Measurements) -> Veri
     """
     left, expected = left_by(store, row, measured), expected_dps(row)
     own = _own_errors(store, row, measured, left) if expected is not None and len(left.errors) > 1 else {}
-    axes = judged(left.errors, expected, own, left.groups)
+    axes = judged(left.errors, expected, own, left.groups, left.mounted_dps)
     return VerificationResponse(
         serial=row.serial,
         version=row.version,
@@ -125,7 +127,8 @@ def left_by(store: Store, row: CalibrationRecord, measured: Measurements) -> Lef
     angles = mounting_angles_of(calibration, anew=aside is not None) if own else None
     errors, outside = applied_errors(calibration, points, angles_rad=angles)
     pooled = np.concatenate(list(errors.values()))
-    return Left(pooled, errors, outside, is_part=aside is not None, groups=independent_groups(points))
+    mounted = _mounted_dps(calibration, fit_data_of(points), own=own) if aside is not None or not own else {}
+    return Left(pooled, errors, outside, aside is not None, independent_groups(points), mounted)
 
 
 def _own_errors(store: Store, row: CalibrationRecord, measured: Measurements, left: Left) -> dict[str, OwnError]:
@@ -182,6 +185,21 @@ def applied_errors(
     )  # fmt: skip
     errors = {axis: found.rate_dps[:, i] - data.true_rate_dps(axis) for i, axis in enumerate(calibration.axes)}
     return errors, found.outside
+
+
+def _mounted_dps(calibration: Calibration, data: FitData, *, own: bool) -> dict[str, float]:
+    """Return axis -> what mountings that are not those of the fit add to its errors, root mean square, deg/s.
+
+    The unit was placed anew. On another day the angles of fixture and table are in the errors of a version that is
+    free of them.
+    """
+    stated = calibration.document.get("standards")
+    standards = [Standard.model_validate(each) for each in stated["stated"]] if stated else []
+    of_bench = ANGLE_QUANTITIES if not own and mounting_angles_of(calibration) else ("mounting_repeatability",)
+    u_rad = math.radians(math.hypot(*(each.standard_u for each in standards if each.quantity in of_bench)))
+    table_dps = data.channels.table_rate_dps()
+    across = {axis: np.where(data.channels.up(axis) == 0, table_dps, 0.0) for axis in calibration.axes}
+    return {axis: u_rad * rms(values) for axis, values in across.items()}
 
 
 def mounting_angles_of(calibration: Calibration, *, anew: bool = False) -> Angles:

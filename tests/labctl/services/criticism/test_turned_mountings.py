@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -43,7 +44,8 @@ def test_the_version_holds_on_its_verification_part(recorded: Recording, tmp_pat
         fit_unit(store, "STIM-0001", MODEL, AT)
         found = verify_unit(store, "STIM-0001", 1, None)
     assert found.part == "verification"
-    placed_dps = 400.0 * 0.002 * 3.14159 / 180.0  # of a mounting, standard
+    assert (found.ok, found.axes_off) == (True, [])
+    placed_dps = 400.0 * math.radians(0.002)  # of a mounting, standard
     assert found.expected_dps is not None
     assert found.max_dps < 4.0 * placed_dps + 3.0 * found.expected_dps
 
