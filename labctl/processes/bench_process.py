@@ -95,8 +95,9 @@ class BenchProcess:
         self._note = DriverNoteWriter(settings, store, local)
         self._address = HeldAddress(local.request_stop, local.describe_running)
         self._supervision = Supervision(
-            settings, store, self._waker, watch.is_stuck, self._address, lambda: local.is_at_rest, self._note.write
-        )
+            settings, store, self._waker, watch.is_stuck, self._address, lambda: local.is_at_rest, self._note.write,
+            local.end_soon,
+        )  # fmt: skip
         if local.scheduler is not None:
             local.scheduler.attended = lambda: self._supervision.alone_s == 0.0
         self._calls = BenchCalls(store, local, self._supervision, self._address, WallClock(settings.ahead))

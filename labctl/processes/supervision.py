@@ -36,14 +36,16 @@ class Supervision:
         address: HeldAddress,
         is_at_rest: Callable[[], bool] = lambda: True,
         on_charge: Callable[[BenchSettings], None] = lambda _: None,
+        on_end: Callable[[], None] = lambda: None,
     ) -> None:
         """`is_stuck`: whether this process lives and its engine does not; then no beat is sent, and it is replaced.
 
         A supervisor sends its listening socket, which `address` holds. Each beat says whether the table is known to
-        stand (`is_at_rest`). `on_charge` is called with the settings of every supervisor that takes charge.
+        stand (`is_at_rest`). `on_charge` is called with the settings of every supervisor that takes charge, `on_end`
+        at once when it asks for the end: the main thread may be waiting for a disk.
         """
         self._settings, self._store, self._waker = settings, store, waker
-        self._is_stuck, self._is_at_rest, self._on_charge = is_stuck, is_at_rest, on_charge
+        self._is_stuck, self._is_at_rest, self._on_charge, self._on_end = is_stuck, is_at_rest, on_charge, on_end
         self._address = address
         self._guard = threading.Lock()
         self._line: Connection | None = None
@@ -104,6 +106,7 @@ class Supervision:
                     self.begin = True
                     self._waker.wake()
                 elif said == "end":
+                    self._on_end()
                     self._waker.end()
         self._let_go(line)
 

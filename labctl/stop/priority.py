@@ -2,7 +2,9 @@
 
 The values are niceness (setpriority(2)): lower runs first. Below zero they need a right (RLIMIT_NICE, CAP_SYS_NICE),
 so each process also steps back from those before it where it has none. Linux groups processes by session when
-`sched_autogroup_enabled` is set (sched(7)); niceness then acts inside a group only, and the group gets it as well.
+`sched_autogroup_enabled` is set (sched(7)); niceness then acts inside a group only, and the group gets it as well where
+the session is the process's own: that of a terminal holds other programs, which were raised too, and for good. A stop
+that was typed at a terminal runs in real time instead, which no group holds back.
 
 What drives or guards a bench also keeps its memory: where a system takes pages away that were not used for a while, and
 its disk is busy, reading them again takes seconds in which a process does nothing, not even stop.
@@ -18,13 +20,23 @@ from pathlib import Path
 
 #: What stops or guards a bench, what drives it, what answers requests where the others could not be raised.
 STOP, BENCH, PAGES = -15, -10, 5
+#: The lowest priority of real time, which is above every niceness (sched(7)).
+REAL_TIME = 1
 #: Of linux/mman.h: pages that there are, pages to come, and these when they are first used.
 MCL_CURRENT, MCL_FUTURE, MCL_ONFAULT = 1, 2, 4
 
 
 def first_of_all() -> None:
-    """Run this process before all others, as far as the system allows it."""
+    """Run this process, which lives long, before all others, as far as the system allows it."""
     _set(STOP)
+
+
+def at_once() -> None:
+    """Run this process, which does one thing and ends, before all others; those that it starts run as any other."""
+    try:
+        os.sched_setscheduler(0, os.SCHED_RR | os.SCHED_RESET_ON_FORK, os.sched_param(REAL_TIME))
+    except (OSError, AttributeError):
+        first_of_all()
 
 
 def of_the_bench() -> None:
@@ -65,6 +77,7 @@ def _set(niceness: int) -> bool:
         except OSError:
             continue
         with contextlib.suppress(OSError):
-            Path("/proc/self/autogroup").write_text(str(wanted), encoding="ascii")
+            if os.getsid(0) == os.getpid():
+                Path("/proc/self/autogroup").write_text(str(wanted), encoding="ascii")
         return wanted == niceness
     return False

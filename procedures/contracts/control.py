@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
+from queue import SimpleQueue
 
 
 @dataclass(frozen=True)
@@ -33,10 +34,11 @@ class Control:
         self._request = ControlRequest()
         self._end: ControlRequest | None = None  # beside the lock: an abort waits for nothing
         self._heard = threading.Event()
+        self._left_step = threading.Event()
         self._at_rest = threading.Event()
+        self._ending = SimpleQueue[None]()  # of all, only its `put` may be called by a signal handler at any moment
         self._loss = loss
         self._driver: int | None = None  # thread that drives the bench
-        self._released = False
         self.hindrance = ""  #: what keeps the bench from its safe state, in words; empty while nothing does
         self.polls = 0  #: number of polls by the thread that drives the bench: it rises while the thread runs
 
@@ -65,15 +67,16 @@ class Control:
         What waits inside a driver call asks this, so that a stop does not wait for the end of a ramp or a homing.
         """
         request = self._end
-        if request is None or self._released or threading.get_ident() != self._driver:
+        if request is None or self._left_step.is_set() or threading.get_ident() != self._driver:
             return None
         self._heard.set()
         return request
 
     def leave_step(self) -> None:
         """Note that the thread that drives the bench makes it safe from now on: no wait of it is interrupted."""
-        self._released = True
+        self._left_step.set()
         self._heard.set()
+        self._ending.put(None)
 
     def note_heard(self) -> None:
         """Note that another thread has the bench and stops its table, in place of the one that drives it."""
@@ -88,6 +91,18 @@ class Control:
     def is_at_rest(self, within_s: float) -> bool:
         """Wait until the table is confirmed to stand after a request to end, s of wall time; returns whether it is."""
         return self._at_rest.wait(within_s)
+
+    def wait_for_end(self) -> None:
+        """Wait until the end was asked for, or the campaign has come to its end by itself."""
+        self._ending.get()
+        self._ending.put(None)  # for who else waits
+
+    def has_left_step(self, within_s: float) -> bool:
+        """Wait until what drives the bench makes it safe, s of wall time; returns whether it does.
+
+        It may have heard of the end long before: what it writes down first may wait for a disk.
+        """
+        return self._left_step.wait(within_s)
 
     def is_heard(self, within_s: float) -> bool:
         """Wait until the thread that drives the bench has seen the abort, s of wall time; returns whether it has."""
@@ -112,6 +127,7 @@ class Control:
     def _final(self, request: ControlRequest) -> None:
         if self._end is None:
             self._end = request
+            self._ending.put(None)
 
     def _change(self, *, pause: bool, reason: str) -> None:
         with self._lock:

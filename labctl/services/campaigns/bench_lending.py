@@ -11,10 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, cast
 
-from instruments.clock import Clock
-from instruments.interfaces.table import RateTable
 from procedures.contracts.journal import Journal
-from procedures.execution.safe_state import stop_table
 
 
 class BenchLending:
@@ -48,18 +45,15 @@ class BenchLending:
             self._lock.acquire()
             self._driver = threading.get_ident()
 
-    def stop(self, table: RateTable, clock: Clock, within_s: float, begun: Callable[[], None]) -> str | None:
-        """Stop the table once the bench is lent; returns what could not be confirmed, None when it stands.
-
-        `begun` is called when this thread has the bench.
-        """
-        if not self._lock.acquire(timeout=within_s):
-            return "the running campaign did not release the bench in time; try again"
+    @contextmanager
+    def borrowed(self, within_s: float) -> Iterator[bool]:
+        """Have the bench in a thread that is not the engine's, once it is lent; gives False where that takes longer."""
+        has_it = self._lock.acquire(timeout=within_s)
         try:
-            begun()
-            return stop_table(table, clock)
+            yield has_it
         finally:
-            self._lock.release()
+            if has_it:
+                self._lock.release()
 
 
 class _LendingJournal:

@@ -178,14 +178,13 @@ class BenchRunner:
 
     def _begin(self, prepared: Prepared, control: Control) -> None:
         job = CampaignJob(self._store.campaigns.get(prepared.id), prepared, control, BenchLending())
-        job.thread = threading.Thread(target=self._run, args=(job, prepared), name=f"campaign-{prepared.id}")
         self._job = job
         self.used, self.stops.is_safe = True, False
         if self._stops:  # while the bench was being opened
             control.abort(STOPS)
         if stops := self.stop_latch.state.open:
             control.abort(stops[-1].reason)
-        job.thread.start()
+        job.start(lambda: self._run(job, prepared))
 
     def resume(self, campaign: int, request: ResumeRequest, *, attended: bool = True) -> CampaignResponse:
         """Continue a paused campaign, or resume one that was interrupted, failed or aborted.
@@ -281,6 +280,7 @@ class BenchRunner:
             self._recovery.expect_end(job.row.id, str(error))
             raise
         finally:
+            job.control.leave_step()
             self.stops.is_safe = job.control.is_at_rest(0.0) and not job.control.hindrance
             self._job = None
             self.stops.settle()

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from dataclasses import dataclass
 
+from instruments.clock import Clock
+from instruments.interfaces.table import RateTable
 from labctl.services.campaigns.bench_lending import BenchLending
 from labctl.services.campaigns.preparation import Prepared
 from labctl.store import CampaignRow
 from procedures.contracts.control import Control
+from procedures.execution.safe_state import stop_table
 from procedures.monitoring.progress import Progress
 
-#: An engine that does not see an abort within this, s, may be waiting for its database; another thread then takes the
-#: bench from it while it writes. Who asked for the stop waits longer, before the process is ended.
-HEARD_WITHIN_S, STUCK_S = 0.7, 60.0
+#: An engine that does not make its bench safe within this from a stop, s, may be waiting for its database; another
+#: thread then takes the bench from it while it writes. Who asked for the stop waits longer before the process is ended.
+LEAVES_WITHIN_S, STUCK_S = 0.3, 60.0
 
 
 @dataclass
@@ -27,13 +31,35 @@ class CampaignJob:
     progress: Progress | None = None
     thread: threading.Thread | None = None
 
-    def stop_if_stuck(self) -> None:
-        """Stop the table from here where the engine does not see an abort because it waits for its database."""
+    def start(self, run: Callable[[], None]) -> None:
+        """Run the campaign in a thread; another one, ready from the beginning, stops its table where it must."""
+        threading.Thread(target=self._stop_if_stuck, name="stop", daemon=True).start()
+        self.thread = threading.Thread(target=run, name=f"campaign-{self.prepared.id}")
+        self.thread.start()
+
+    def _stop_if_stuck(self) -> None:
+        """Stop the table from here where the engine does not, because what it writes down first waits for its database.
+
+        Whoever asked for the stop: a person, a signal, the lease of the bench that is lost.
+        """
+        self.control.wait_for_end()
         table = self.prepared.bench.table
-        if table is None or self.control.is_heard(HEARD_WITHIN_S):
+        if table is None or self.control.has_left_step(LEAVES_WITHIN_S):
             return
-        try:
-            complaint = self.lending.stop(table, self.prepared.clock, STUCK_S, self.control.note_heard)
-        except Exception as error:  # noqa: BLE001  the engine tries again in its safe state
-            complaint = str(error) or type(error).__name__
-        self.control.note_safe_state(complaint or "", at_rest=complaint is None)
+        with self.lending.borrowed(STUCK_S) as has_it:
+            if self.control.has_left_step(0.0):  # the engine makes the bench safe, or has done so
+                return
+            if not has_it:
+                complaint: str | None = "the running campaign did not release the bench in time; try again"
+            else:
+                self.control.note_heard()
+                complaint = _stopped(table, self.prepared.clock)
+            self.control.note_safe_state(complaint or "", at_rest=complaint is None)
+
+
+def _stopped(table: RateTable, clock: Clock) -> str | None:
+    """Stop a table; returns what could not be confirmed: the engine tries again in its safe state."""
+    try:
+        return stop_table(table, clock)
+    except Exception as error:  # noqa: BLE001  it is the answer, whatever it is
+        return str(error) or type(error).__name__

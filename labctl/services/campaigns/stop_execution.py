@@ -58,7 +58,6 @@ class StopExecution:
         job.control.abort(stop.reason)
         self._latch.remember(stop)
         log.warning("campaign.stop", campaign=job.row.id, bench=job.row.bench_name, reason=stop.reason)
-        threading.Thread(target=job.stop_if_stuck, name="stop", daemon=True).start()
         return CampaignStop.of(job)
 
     def _idle(self, stop: StopRequest) -> CampaignStop | str:

@@ -11,7 +11,7 @@ import pytest
 
 from instruments.clock import SystemClock, VirtualClock
 from labctl.errors import StoreError
-from labctl.services.campaigns import bench_lending, campaign_job
+from labctl.services.campaigns import campaign_job
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.preparation import prepare
 from labctl.services.campaigns.status import campaign_status
@@ -73,13 +73,14 @@ def test_an_engine_that_cannot_write_stops_its_table(store: Store, monkeypatch: 
     assert runner.free
 
 
-def test_an_abort_stops_the_table_while_the_engine_waits_for_the_writer(
-    store: Store, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("by_signal", [False, True])
+def test_a_stop_stops_the_table_while_the_engine_waits_for_the_writer(
+    store: Store, monkeypatch: pytest.MonkeyPatch, *, by_signal: bool
 ) -> None:
-    monkeypatch.setattr(campaign_job, "HEARD_WITHIN_S", 0.1)
+    monkeypatch.setattr(campaign_job, "LEAVES_WITHIN_S", 0.1)
     stopped = threading.Event()
     moved: list[bool] = []
-    real = bench_lending.stop_table
+    real = campaign_job.stop_table
 
     def stop_table(table: Any, clock: Any) -> str | None:
         moved.append(table.is_moving())
@@ -88,7 +89,7 @@ def test_an_abort_stops_the_table_while_the_engine_waits_for_the_writer(
         stopped.set()
         return complaint
 
-    monkeypatch.setattr(bench_lending, "stop_table", stop_table)
+    monkeypatch.setattr(campaign_job, "stop_table", stop_table)
     runner = BenchRunner(store, BENCH, VirtualClock, safe_within_s=0.0)
     turns = threading.Event()
     with held_writer(store) as hold:
@@ -105,7 +106,10 @@ def test_an_abort_stops_the_table_while_the_engine_waits_for_the_writer(
         assert turns.wait(60.0)
         job = runner._job
         assert job is not None
-        runner.abort(campaign, StopRequest.new("Ada", "key", "a hand in the bench", campaign))
+        if by_signal:
+            runner.end_soon()
+        else:
+            runner.abort(campaign, StopRequest.new("Ada", "key", "a hand in the bench", campaign))
         assert stopped.wait(15.0)  # before the writer's deadline
         assert moved == [True, False]
         assert job.thread is not None
