@@ -23,6 +23,8 @@ from labctl.services.schemas.campaigns import CampaignRequest, CampaignResponse,
 from labctl.stop.latch import StopRequest
 from labctl.store import Store, open_store
 from labctl.store.connection import writer_turn
+from labctl.store.repositories.campaign_journal import StoreJournal
+from procedures.contracts.journal import StepResult
 from procedures.execution import shutdown
 from tests.helpers.held_writer import held_writer
 
@@ -116,6 +118,43 @@ def test_a_stop_stops_the_table_while_the_engine_waits_for_the_writer(
         assert job.thread.is_alive()
         stop()
     job.thread.join()
+    assert store.campaigns.get(campaign).state == "aborted"
+
+
+def test_what_a_stopped_step_writes_down_does_not_keep_the_table_turning(
+    store: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The engine has heard the stop; the end of its step waits for a disk before it makes the bench safe."""
+    stopped, waited = threading.Event(), []
+    real_stop, real_end = campaign_job.stop_table, StoreJournal.step_ended
+
+    def stop_table(table: Any, clock: Any) -> str | None:
+        complaint = real_stop(table, clock)
+        stopped.set()
+        return complaint
+
+    def step_ended(self: StoreJournal, index: int, result: StepResult, *when: Any) -> None:
+        if result.outcome == "interrupted":
+            waited.append(stopped.wait(15.0))
+        real_end(self, index, result, *when)
+
+    monkeypatch.setattr(campaign_job, "stop_table", stop_table)
+    monkeypatch.setattr(StoreJournal, "step_ended", step_ended)
+    runner = BenchRunner(store, BENCH, VirtualClock)
+
+    def at_a_data_set_that_turns() -> None:
+        job = runner._job
+        progress = None if job is None else job.progress
+        if progress is not None and progress.step_text.startswith("data set") and progress.rate_dps:
+            runner.end_soon()
+
+    stop = runner.listen(at_a_data_set_that_turns)
+    campaign = runner.start(CampaignRequest(recipe="short")).id
+    job = runner._job
+    if job is not None and job.thread is not None:
+        job.thread.join()
+    stop()
+    assert waited == [True]
     assert store.campaigns.get(campaign).state == "aborted"
 
 
