@@ -105,6 +105,13 @@ class Calibration:
             given = self.document.get("specific_force")
             return None if given is None else ForceSensitivity.from_json(given, self.axes)
 
+    @cached_property
+    def bench(self) -> BenchConditions | None:
+        """What is known of the bench: standards, and angles of mountings. None: an older version of labctl made it."""
+        with _reading("standards"):
+            given = self.document.get("standards")
+            return None if given is None else BenchConditions.from_json(given)
+
     @property
     def output(self) -> dict[str, OutputUnit]:
         """How each axis's output becomes a rate before it is corrected."""

@@ -52,6 +52,12 @@ DATABASE = "lab.sqlite"
 EXAMPLE = Path(__file__).parents[1] / "labctl" / "examples" / "osu-fog"
 
 
+#: So many processes that never rest.
+LOAD = (
+    "import os, signal, sys; [os.fork() or exec('while True: pass') for _ in range(int(sys.argv[1]))]; signal.pause()"
+)
+
+
 @dataclass(frozen=True)
 class Fault:
     """A signal to one process, so long after the one before."""
@@ -207,14 +213,18 @@ def _suffered(service: Service, table: Table, faults: tuple[Fault, ...], way: st
 
 @contextlib.contextmanager
 def _load(service: Service) -> Iterator[None]:
-    """Keep the computer busy beside a service, and the service with criticisms."""
-    busy = [subprocess.Popen([sys.executable, "-c", "while True: pass"]) for _ in range(BUSY)]
+    """Keep the computer busy beside a service, and the service with criticisms.
+
+    The busy processes have a session of their own: the system shares its processors between sessions (sched(7),
+    autogroup), and this one, which reads the log of the table and looks at the clock, is not to be late.
+    """
+    busy = [subprocess.Popen([sys.executable, "-c", LOAD, str(BUSY)], start_new_session=True)] if BUSY else []
     try:
         with criticisms_of(service.url) if CRITICISMS else contextlib.nullcontext():
             yield
     finally:
         for each in busy:
-            each.kill()
+            os.killpg(each.pid, signal.SIGKILL)
             each.wait()
 
 

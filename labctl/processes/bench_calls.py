@@ -51,7 +51,13 @@ class BenchCalls:
         """`clock` has the date of the service."""
         self._store, self._local, self._supervision, self._address = store, local, supervision, address
         self._under_way = UnderWay()
+        self._watchers: set[Connection] = set()
         self._context = CommandContext(lambda: store, clock, local.control)
+
+    @property
+    def is_watched(self) -> bool:
+        """Whether a web process is connected, which answers at the service's address."""
+        return bool(self._watchers)
 
     def answer(self, call: Call, connection: Connection) -> Answer | None:
         """Answer a call; None where the connection is kept for a watcher or a supervisor."""
@@ -101,6 +107,7 @@ class BenchCalls:
         """Tell a watcher what happens, until it goes; this thread is the watcher's."""
         changed, never = threading.Event(), threading.Event()
         remove = self._local.listen(changed.set)
+        self._watchers.add(connection)
         try:
             with contextlib.suppress(OSError):
                 while True:
@@ -110,5 +117,6 @@ class BenchCalls:
                     changed.clear()
                     never.wait(LEAST_BEAT_S)
         finally:
+            self._watchers.discard(connection)
             remove()
             connection.close()

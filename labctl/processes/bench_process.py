@@ -133,12 +133,15 @@ class BenchProcess:
     def _look_for_supervisor(self) -> None:
         """While there is no supervisor, go on or end by the recipe's rule, and answer at the service's address.
 
-        One that stands still guards nothing either; its web process still answers.
+        One that stands still guards nothing either, and starts no web process again; while one is there, it answers.
         """
-        if self._supervision.is_unguarded:
+        unguarded = self._supervision.is_unguarded
+        if unguarded:
             self._local.note_unsupervised()
-        if self._supervision.alone_s > 0.0:
+        if self._supervision.alone_s > 0.0 or (unguarded and not self._calls.is_watched):
             self._address.open_page(self._supervision.settings.page_access)
+        else:
+            self._address.close_page()
 
     def _hear_for_supervisor(self) -> None:
         """End where the supervisor was asked to end and stands still, so that it cannot hear it."""

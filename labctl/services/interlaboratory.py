@@ -10,7 +10,7 @@ from instruments.bench_config import BenchFile
 from instruments.standards import Standard
 from labctl.calibration import Calibration, read_calibration
 from labctl.errors import BadInput, Conflict
-from labctl.fitting.uncertainty import BenchConditions, Budget
+from labctl.fitting.uncertainty import Budget
 from labctl.metrology.interlaboratory import Result, en_number, en_performance, zeta_performance, zeta_score
 from labctl.services.cache import UNNAMED, compute
 from labctl.services.calibrations.uncertainty import coefficients_at
@@ -71,14 +71,11 @@ def _side(store: Store, serial: str, version: int) -> _Side:
     campaign = None if newest.campaign is None else store.campaigns.get(newest.campaign)
     laboratory = None if campaign is None else BenchFile.model_validate(campaign.bench).laboratory
     calibration = read_calibration(row.document)
-    stated = calibration.document.get("standards")
     described = ComparedCalibration(
         serial=row.serial, version=version, bench="" if campaign is None else campaign.bench_name,
         laboratory="" if laboratory is None else laboratory.name, measured_on=performed(store, newest)[0],
     )  # fmt: skip
-    return _Side(
-        row, calibration, described, () if stated is None else BenchConditions.from_json(stated).standards
-    )  # fmt: skip
+    return _Side(row, calibration, described, () if calibration.bench is None else calibration.bench.standards)
 
 
 def _temperature(sides: tuple[_Side, _Side], given: float | None) -> float:

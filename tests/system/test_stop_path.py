@@ -171,6 +171,24 @@ def test_a_frozen_web_process_keeps_no_stop_from_the_table(service: ServiceProce
     assert ended(service.url, campaign)["state"] == "aborted"
 
 
+def test_with_a_supervisor_that_stands_still_and_no_web_process_the_bench_process_answers(
+    service: ServiceProcess, simulator: Simulator
+) -> None:
+    """The supervisor would start a web process again; until it does, somebody has to take a stop at the address."""
+    campaign = turning(service, simulator)
+    os.kill(service.process.pid, signal.SIGSTOP)
+    os.kill(service.web_pid, signal.SIGKILL)
+    while True:
+        with contextlib.suppress(httpx.TransportError):
+            stopped = httpx.post(f"{service.url}/api/campaigns/{campaign}/abort", json={}, timeout=WAIT_S)
+            break
+        before_next_request()
+    assert (stopped.status_code, stopped.json()["stands"]) == (200, True)
+    wait_until(simulator, lambda lines: any(ABORT in line["heard"] for line in lines))
+    os.kill(service.process.pid, signal.SIGCONT)
+    assert ended(service.url, campaign)["state"] == "aborted"  # of a web process again
+
+
 def test_a_signal_to_a_supervisor_that_stands_still_is_carried_out_by_the_others(
     service: ServiceProcess, simulator: Simulator
 ) -> None:

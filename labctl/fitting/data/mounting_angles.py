@@ -19,7 +19,7 @@ between mountings (`shifts`) have the angles.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cache
 
@@ -129,8 +129,12 @@ def angle_columns(channels: Channels, axis: str, placed_rad: float = 0.0) -> Ang
 
 def placed_rad(standards: Iterable[Standard]) -> float:
     """Return the standard deviation by which a mounting differs from the same another time, rad; 0 where not stated."""
-    stated = [each.standard_u for each in standards if each.quantity == "mounting_repeatability"]
-    return math.radians(math.hypot(*stated))
+    return stated_rad(standards, ("mounting_repeatability",))
+
+
+def stated_rad(standards: Iterable[Standard], quantities: Collection[str]) -> float:
+    """Return the standard deviation of angles that are stated, deg, taken together, rad; 0 where none is stated."""
+    return math.radians(math.hypot(*(each.standard_u for each in standards if each.quantity in quantities)))
 
 
 def leaning_rates(channels: Channels, angles_rad: Mapping[str, Mapping[str, float]]) -> dict[str, Array]:

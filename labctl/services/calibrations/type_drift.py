@@ -106,7 +106,7 @@ def _chosen(versions: Sequence[CertifiedVersion]) -> Iterator[list[CertifiedVers
 
 def _is_simulated(version: CertifiedVersion, calibration: Calibration, simulated: Mapping[int, bool]) -> bool:
     """Return whether a version was measured on a simulated bench: by its campaigns, or by its standards."""
-    stated = calibration.document.get("standards")
+    standards = () if calibration.bench is None else calibration.bench.standards
     return any(simulated.get(number, False) for number in version.campaigns) or (
-        stated is not None and any(each.get("traceability") == SIMULATED for each in stated["stated"])
+        any(each.traceability == SIMULATED for each in standards)
     )

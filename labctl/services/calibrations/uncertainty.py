@@ -230,11 +230,10 @@ class _Known:
 
     @staticmethod
     def of(calibration: Calibration) -> _Known:
-        stated = calibration.document.get("standards")
         return _Known(
             calibration.fitted,
             {axis: AxisEvidence.from_json(one) for axis, one in calibration.document.get("use", {}).items()},
-            None if stated is None else BenchConditions.from_json(stated),
+            calibration.bench,
             f"{calibration.serial} version {calibration.version}",
         )
 

@@ -15,7 +15,7 @@ from labctl.fitting.data.channels import BODY_AXES
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.data.mounting_angles import placed_rad
 from labctl.fitting.uncertainty.budget import Budget, BudgetLine, budget_of
-from labctl.recording import Recording, Standard
+from labctl.recording import Recording
 from labctl.recording.verification import fitted_part, verification_part
 from labctl.services.calibrations.uncertainty import budgets_at
 from labctl.services.criticism.measurements import Measurements
@@ -91,8 +91,7 @@ class _Part:
         """Return the budget of an error with how the unit was placed anew for it: across, a part of the rate."""
         channels = self.data.channels
         across = 0.0 if channels.up(axis)[row] else abs(float(channels.table_rate_dps()[row]))
-        stated = calibration.document.get("standards")
-        u_rad = placed_rad([Standard.model_validate(each) for each in stated["stated"]]) if stated else 0.0
+        u_rad = 0.0 if calibration.bench is None else placed_rad(calibration.bench.standards)
         if budget.combined is None or not across * u_rad:
             return budget
         line = BudgetLine(

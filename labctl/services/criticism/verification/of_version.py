@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal
@@ -14,8 +13,8 @@ from labctl.calibration import Calibration, read_calibration
 from labctl.compensator import Compensator
 from labctl.errors import BadInput, LabctlError
 from labctl.fitting.data.fit_data import FitData, fit_data_of
-from labctl.fitting.data.mounting_angles import ANGLE_QUANTITIES, PLACED, leaning_rates
-from labctl.recording import Recording, Standard
+from labctl.fitting.data.mounting_angles import ANGLE_QUANTITIES, PLACED, leaning_rates, placed_rad, stated_rad
+from labctl.recording import Recording
 from labctl.recording.verification import fitted_part, verification_part
 from labctl.services.criticism.measurements import Measurements
 from labctl.services.criticism.verification.expectation import (
@@ -193,10 +192,9 @@ def _mounted_dps(calibration: Calibration, data: FitData, *, own: bool) -> dict[
     The unit was placed anew. On another day the angles of fixture and table are in the errors of a version that is
     free of them.
     """
-    stated = calibration.document.get("standards")
-    standards = [Standard.model_validate(each) for each in stated["stated"]] if stated else []
-    of_bench = ANGLE_QUANTITIES if not own and mounting_angles_of(calibration) else ("mounting_repeatability",)
-    u_rad = math.radians(math.hypot(*(each.standard_u for each in standards if each.quantity in of_bench)))
+    standards = () if calibration.bench is None else calibration.bench.standards
+    of_bench = not own and bool(mounting_angles_of(calibration))
+    u_rad = stated_rad(standards, ANGLE_QUANTITIES) if of_bench else placed_rad(standards)
     table_dps = data.channels.table_rate_dps()
     across = {axis: np.where(data.channels.up(axis) == 0, table_dps, 0.0) for axis in calibration.axes}
     return {axis: u_rad * rms(values) for axis, values in across.items()}
@@ -207,8 +205,7 @@ def mounting_angles_of(calibration: Calibration, *, anew: bool = False) -> Angle
 
     With `anew` without what is different whenever the unit is mounted: for a part in mountings of its own.
     """
-    stated = calibration.document.get("standards")
-    found = {} if stated is None else stated.get("angles_rad", {})
+    found = {} if calibration.bench is None else calibration.bench.angles_rad
     return {
         axis: {name: angle for name, angle in named.items() if not (anew and name.endswith(PLACED))}
         for axis, named in found.items()
