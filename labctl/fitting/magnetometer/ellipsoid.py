@@ -53,7 +53,7 @@ def quadric(readings: NDArray[np.float64]) -> tuple[Array, NDArray[np.float64]] 
     found, _, rank, _ = np.linalg.lstsq(columns, np.ones(len(readings)), rcond=1e-8)
     if rank < PARAMETERS:
         return None
-    square = _symmetric(found[:6])
+    square = _symmetric(np.asarray(found[:6], dtype=np.float64))
     values = np.linalg.eigvalsh(square)
     if np.any(values == 0) or values[0] * values[-1] < 0:
         return None
