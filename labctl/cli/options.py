@@ -43,6 +43,18 @@ RecordingIds = Annotated[
         "the unit's newest recording that can be fitted.",
     ),
 ]
+ImporterName = Annotated[
+    str | None,
+    typer.Option(
+        "--format",
+        metavar="NAME",
+        help="Name of the importer that reads the file; default: the importer that recognises the file best.",
+    ),
+]
+ImporterOptions = Annotated[
+    list[str] | None,
+    typer.Option("--option", metavar="KEY=VALUE", help="Option of the importer, as KEY=VALUE; may be repeated."),
+]
 RecordingId = Annotated[
     int | None,
     typer.Option("--recording", metavar="ID", help="Number of the recording; default: the unit's newest recording."),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NotRequired
+
 from typing_extensions import TypedDict
 
 
@@ -16,7 +18,10 @@ class NoiseFigure(TypedDict):
 
 
 class AllanJson(TypedDict):
-    """The overlapping Allan deviation of an axis with its 95 % interval, the sum of the terms, and the figures."""
+    """The overlapping Allan deviation of an axis with its 95 % interval, the sum of the terms, and the figures.
+
+    `model_dps` is null at averaging times below `from_s`, which the figures do not rest on.
+    """
 
     tau_s: list[float | None]
     deviation_dps: list[float | None]
@@ -28,6 +33,9 @@ class AllanJson(TypedDict):
     K: NoiseFigure
     trend_dps: float | None
     replaces_datasheet: bool
+    from_s: NotRequired[float]  #: shortest averaging time that the figures rest on, where it is not the first
+    smoothing_s: NotRequired[float]  #: mean distance of two instants that the output filter weighs, where it smooths
+    step_dps: NotRequired[float]  #: step of the output, where it hides the noise
 
 
 class StaticRecordJson(TypedDict):

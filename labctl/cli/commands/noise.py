@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from labctl.cli.error_reporting import one_clear_line
-from labctl.cli.options import Database, Json, RecordingId
+from labctl.cli.import_dialogue import read_given
+from labctl.cli.options import Database, ImporterName, ImporterOptions, Json, RecordingId, recording_numbers
 from labctl.cli.output import console, format_number, print_json, stderr
 from labctl.cli.printing.noise import print_allan
 
@@ -58,6 +59,24 @@ Correction = Annotated[
     Path | None,
     typer.Option("--calibration", metavar="FILE", help="Calibration file by which a table is corrected."),
 ]
+Records = Annotated[
+    str | None,
+    typer.Option(
+        "--recording",
+        metavar="ID[,ID...]",
+        help="Number of the recording, or several numbers to compare recordings side by side, such as 1,2,3; "
+        "default: the unit's newest recording.",
+    ),
+]
+ReadByMap = Annotated[
+    Path | None,
+    typer.Option(
+        "--map",
+        metavar="FILE",
+        help="Column map (TOML) by which a log is read, as `labctl import` reads it; default: a CSV or Parquet file "
+        "is read as it is, of another log the map is proposed.",
+    ),
+]
 CorrectingVersion = Annotated[
     int | None,
     typer.Option(
@@ -83,25 +102,41 @@ def allan(
             help="Column of a file to use; default: every column whose name begins with gyro_.",
         ),
     ] = None,
-    recording: RecordingId = None,
+    recording: Records = None,
+    column_map: ReadByMap = None,
+    importer: ImporterName = None,
+    option: ImporterOptions = None,
     as_json: Json = False,
     database: Database = None,
 ) -> None:
     """Allan deviation of a record at rest, with N, B and K of IEEE Std 952; no fit, table or thermometer needed."""
+    from labctl.errors import BadInput
     from labctl.services.commands.open import open_readonly
-    from labctl.services.recordings.allan_source import allan_of_file, allan_of_unit
+    from labctl.services.recordings.allan_source import allan_of_file, allan_of_recordings
 
     path = Path(source)
     with one_clear_line():
+        numbers = recording_numbers(recording)
         if path.exists():
-            answer = allan_of_file(path, column)
+            if numbers:
+                raise BadInput(f"{source} is a file, but --recording names stored recordings; leave --recording out")
+            answers = [
+                allan_of_file(
+                    path, column, column_map=read_given(column_map), importer=importer, options=option or []
+                )
+            ]  # fmt: skip
+        elif column_map is not None or importer is not None or option:
+            raise BadInput(
+                f"{source}: there is no such file; leave out --map, --format and --option, which need a file, if "
+                f"{source} is the serial number of a unit"
+            )
         else:
             with open_readonly(database) as store:
-                answer = allan_of_unit(store, source, recording, column)
+                answers = allan_of_recordings(store, source, numbers, column)
     if as_json:
-        print_json(answer)
+        print_json(answers[0] if len(answers) == 1 else answers)
     else:
-        print_allan(answer)
+        print_allan(answers)
 
 
 def orientation(

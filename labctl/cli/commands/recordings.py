@@ -9,7 +9,7 @@ import typer
 
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.import_dialogue import Acceptance, named, print_template, read_given
-from labctl.cli.options import Database, Json
+from labctl.cli.options import Database, ImporterName, ImporterOptions, Json
 from labctl.cli.output import console, print_json, print_warnings
 
 export_app = typer.Typer(no_args_is_help=True, help="Export recordings from the database to files.")
@@ -22,18 +22,6 @@ PathToImport = Annotated[
         help="Folder with recording.toml and its data file; a CSV, Parquet or ULog file; a ROS bag; or a file that "
         "another installed importer reads.",
     ),
-]
-ImporterName = Annotated[
-    str | None,
-    typer.Option(
-        "--format",
-        metavar="NAME",
-        help="Name of the importer that reads the file; default: the importer that recognises the file best.",
-    ),
-]
-ImporterOptions = Annotated[
-    list[str] | None,
-    typer.Option("--option", metavar="KEY=VALUE", help="Option of the importer, as KEY=VALUE; may be repeated."),
 ]
 MapFile = Annotated[
     Path | None,

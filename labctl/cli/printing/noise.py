@@ -2,29 +2,66 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from labctl.cli.output import console, format_number, table
 
 if TYPE_CHECKING:
-    from labctl.json_types.noise import NoiseFigure
+    from labctl.json_types.noise import AllanJson, NoiseFigure
     from labctl.services.schemas.recordings import AllanResponse
 
+#: Averaging times closer than this share of each other stand in one row.
+SAME_TIME = 1e-3
 
-def print_allan(answer: AllanResponse) -> None:
+
+def print_allan(answers: Sequence[AllanResponse]) -> None:
     """Print deviation against averaging time, one column per axis, then the figures and what the data sheet says."""
-    first = next(iter(answer.axes.values()))
-    rows = table(f"{answer.duration_s or 0.0:.0f} s at rest", "tau s", *answer.axes, numbers=1 + len(answer.axes))
-    for k, tau in enumerate(first["tau_s"]):
-        rows.add_row(format_number(tau), *(format_number(axis["deviation_dps"][k]) for axis in answer.axes.values()))
+    lines = [
+        (axis if len(answers) == 1 else f"{answer.recording} {axis}", noise)
+        for answer in answers
+        for axis, noise in answer.axes.items()
+    ]
+    lengths = ", ".join(f"{answer.duration_s or 0.0:.0f} s" for answer in answers)
+    rows = table(f"{lengths} at rest", "tau s", *(name for name, _ in lines), numbers=1 + len(lines))
+    for tau in _times([noise for _, noise in lines]):
+        rows.add_row(format_number(tau), *(_deviation(noise, tau) for _, noise in lines))
     console.print(rows)
-    for name, axis in answer.axes.items():
-        said = ", ".join(
-            f"{letter} {_shown(figure)}" for letter, figure in (("N", axis["N"]), ("B", axis["B"]), ("K", axis["K"]))
-        )
+    for name, noise in lines:
+        figures = (("N", noise["N"]), ("B", noise["B"]), ("K", noise["K"]))
+        said = ", ".join(f"{letter} {_shown(figure)}" for letter, figure in figures)
         console.print(f"{name}: {said}", soft_wrap=True)
-    for name, value in answer.datasheet.items():
-        console.print(f"data sheet: {name} = {value:g}")
+        for remark in _remarks(noise):
+            console.print(f"  {remark}", soft_wrap=True, style="dim")
+    for answer in answers:
+        of = "" if len(answers) == 1 else f" of recording {answer.recording}"
+        for name, value in answer.datasheet.items():
+            console.print(f"data sheet{of}: {name} = {value:g}")
+
+
+def _times(noises: Sequence[AllanJson]) -> list[float]:
+    """Return the averaging times of all axes, rising, those that are alike once."""
+    found: list[float] = []
+    for tau in sorted(tau for noise in noises for tau in noise["tau_s"] if tau is not None):
+        if not found or tau > found[-1] * (1 + SAME_TIME):
+            found.append(tau)
+    return found
+
+
+def _deviation(noise: AllanJson, tau: float) -> str:
+    near = (k for k, own in enumerate(noise["tau_s"]) if own is not None and abs(own - tau) <= SAME_TIME * tau)
+    k = next(near, None)
+    return "" if k is None else format_number(noise["deviation_dps"][k])
+
+
+def _remarks(noise: AllanJson) -> Iterator[str]:
+    """Yield what keeps the figures from resting on every averaging time."""
+    if (from_s := noise.get("from_s")) is not None:
+        yield f"N, B and K are of averaging times from {from_s:.3g} s on; shorter ones do not follow the terms"
+    if (smoothing_s := noise.get("smoothing_s")) is not None:
+        yield f"an output filter smooths over {smoothing_s:.2g} s; N is that of averaging times well above"
+    if (step_dps := noise.get("step_dps")) is not None:
+        yield f"the output has steps of {step_dps:.3g} deg/s, larger than its noise; bounds allow for half a step"
 
 
 def _shown(figure: NoiseFigure) -> str:

@@ -14,6 +14,7 @@ from labctl.fitting.numeric.json_numbers import plain, plain_list
 from labctl.json_types.noise import AllanJson, NoiseFigure, StaticRecordJson
 from labctl.recording import Recording
 from labctl.recording.points import temperature_of
+from labctl.recording.recording import Columns
 
 #: A temperature that stays within this counts as one.
 ONE_TEMPERATURE_K = 1.0
@@ -54,7 +55,7 @@ class StaticRecord:
 
 
 def _axis_json(noise: Allan, is_prior: bool) -> AllanJson:
-    return {
+    found: AllanJson = {
         "tau_s": plain_list(noise.tau_s),
         "deviation_dps": plain_list(noise.deviation_dps),
         "low_dps": plain_list(noise.low_dps),
@@ -66,6 +67,13 @@ def _axis_json(noise: Allan, is_prior: bool) -> AllanJson:
         "trend_dps": plain(noise.trend_dps),
         "replaces_datasheet": is_prior,
     }
+    if noise.from_s > noise.tau_s[0]:
+        found["from_s"] = noise.from_s
+    if noise.smoothing_s > 0:
+        found["smoothing_s"] = noise.smoothing_s
+    if noise.step_dps is not None:
+        found["step_dps"] = noise.step_dps
+    return found
 
 
 def _figure_json(figure: Figure) -> NoiseFigure:
@@ -95,8 +103,14 @@ def static_record(recording: Recording, least_s: float = 0.0) -> StaticRecord | 
 
 def longest_stretch(recording: Recording) -> slice | None:
     """Return the rows of the longest static stretch; None where none has readings enough."""
-    columns = recording.columns
-    if recording.info.kind != "samples" or len(recording) < LEAST_READINGS or "t_s" not in columns:
+    if recording.info.kind != "samples":
+        return None
+    return stretch_of(recording.columns)
+
+
+def stretch_of(columns: Columns) -> slice | None:
+    """Return the rows of the longest static stretch of columns with `t_s`; at rest all along where no rate is given."""
+    if "t_s" not in columns or len(columns["t_s"]) < LEAST_READINGS:
         return None
     t_s = np.asarray(columns["t_s"], dtype=np.float64)
     steps = np.diff(t_s)
@@ -106,14 +120,14 @@ def longest_stretch(recording: Recording) -> slice | None:
         if name in columns:
             values = np.asarray(columns[name])
             together &= values[1:] == values[:-1]
-    still = np.asarray(columns["table_rate_dps"], dtype=np.float64) == 0
+    still = np.asarray(columns.get("table_rate_dps", np.zeros(len(t_s))), dtype=np.float64) == 0
     if "valid" in columns:
         still &= np.asarray(columns["valid"]) != 0
     begins = np.flatnonzero(still & np.concatenate([[True], ~(together & still[:-1])]))
     ends = np.flatnonzero(still & np.concatenate([~(together & still[1:]), [True]])) + 1
     warm = temperature_of(columns)
     if warm is None:  # the noise does not depend on a known temperature
-        warm = np.zeros(len(recording))
+        warm = np.zeros(len(t_s))
     best = slice(0, 0)
     for begin, end in sorted(zip(begins, ends, strict=True), key=lambda pair: pair[0] - pair[1]):
         if end - begin <= best.stop - best.start:

@@ -2,10 +2,12 @@
 
 Allan variances at octaves of averaging time are compared with the sum of the standard's terms. Each of them is close to
 a chi-square with equivalent degrees of freedom (NIST SP 1065, table 5) that depend on which term prevails there.
+The figures rest on the octaves at which an output filter and the steps of the output leave the noise as it is.
 """
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -13,16 +15,23 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
+from labctl.fitting.numeric.allan_bounds import is_filtered_white, largest_coefficients
 from labctl.fitting.numeric.allan_terms import (
-    BESIDE,
     DEG_PER_HOUR,
     KINDS,
+    LEAST_OCTAVES,
     REPORTED,
+    SMOOTHED,
+    SMOOTHED_SHARE,
+    WHITE,
     design_of,
     fit_terms,
     freedom_of,
+    kept_beside,
+    likeliest_correlation,
 )
 from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.numeric.coarse_output import hiding_step
 from labctl.fitting.numeric.slow_trend import slow_trend
 
 #: Fewer readings than this say nothing about noise.
@@ -34,14 +43,15 @@ CONFIDENCE = 0.95
 SHOWN_SHARE = 0.3
 #: The same share of a record whose trend was subtracted: the trend has absorbed some of the noise at longer times.
 LONGEST_SHARE_TRENDLESS = 0.125
-#: A random walk counts where it prevails over this many octaves and more: it is read beyond the record.
+#: A random walk counts where it prevails over this many octaves and more: it is read beyond the record. So does white
+#: noise where the shortest averaging times were left out.
 PREVAILING_OCTAVES = 3
 #: A figure has a value when it is this many of its standard uncertainties; of what is less sure there is a bound.
 KNOWN = 3.0
 #: Where a term shows, the fitted curve lies within intervals that hold such noise at all octaves with this chance.
 FAMILY_CONFIDENCE = 0.99
-#: Chance that a bound on a term which has no value is above the truth; smaller alternatives at several octaves compete.
-BOUND_CONFIDENCE = 0.995
+#: Least part of white noise at which a filter's law holds beside the part that the law lowers as far as it can.
+LEAST_UNSMOOTHED = 0.1
 #: Variances at neighbouring octaves of one record share readings; found by simulation, it makes u cover as it should.
 NEIGHBOURS = 1.6
 
@@ -65,10 +75,13 @@ class Allan:
     deviation_dps: Array
     low_dps: Array
     high_dps: Array
-    model_dps: Array  #: the fitted sum of terms
+    model_dps: Array  #: the fitted sum of terms; NaN at shorter averaging times than `from_s`
     figures: Mapping[str, Figure]  #: N, B, K
     duration_s: float
+    from_s: float  #: shortest averaging time of those that the figures rest on
     trend_dps: float = 0.0  #: size of the slow trend (warm-up) that is no noise, from its lowest to its highest
+    smoothing_s: float = 0.0  #: mean distance of two readings' instants that an output filter weighs together, at least
+    step_dps: float | None = None  #: step of an output whose steps hide the noise
 
     @property
     def instability_dps(self) -> float | None:
@@ -100,42 +113,73 @@ def allan(rate_dps: Array, period_s: float) -> Allan | None:
         return None
     trend = slow_trend(rate_dps)
     still = variance if trend is None else _variances(rate_dps - trend, m)
-    kept = slice(None) if trend is None else slice(int(np.sum(m <= n * LONGEST_SHARE_TRENDLESS)))
-    terms, shows, seen = fit_terms(still[kept], tau[kept], m[kept], n + 1.0)
-    freedom = freedom_of(terms, tau, m, n + 1.0)
-    model = design_of(tau) @ terms + (0.0 if trend is None else _variances(trend, m))
+    octaves = len(m) if trend is None else int(np.sum(m <= n * LONGEST_SHARE_TRENDLESS))
+    step = hiding_step(rate_dps)
+    fitted = _Octaves(still[:octaves], tau[:octaves], m[:octaves], n + 1.0).followed()
+    bounds = largest_coefficients(variance, tau, m, n + 1.0, from_s=float(fitted.tau[0]), step=step or 0.0)
+    shown = np.flatnonzero(tau >= fitted.tau[0])
+    design = design_of(tau[shown], fitted.correlation_s)
+    freedom = np.empty(len(m))
+    freedom[shown] = freedom_of(design, fitted.terms, m[shown], n + 1.0)
+    freedom[: shown[0]] = np.maximum(KINDS[WHITE].freedom(n + 1.0, m[: shown[0]]), 1.0)
+    model = np.full(len(m), np.nan)
+    model[shown] = design @ fitted.terms + (0.0 if trend is None else _variances(trend, m[shown]))
     tail = (1 - CONFIDENCE) / 2
-    fitted = _Fitted(terms, shows, tau[kept], still[kept], seen, _bounds(variance, tau, m, n + 1.0))
     return Allan(
         tau,
         np.sqrt(variance),
         np.sqrt(variance * freedom / chdtri(freedom, tail)),
         np.sqrt(variance * freedom / chdtri(freedom, 1 - tail)),
         np.sqrt(model),
-        {k.letter: _figure(j, fitted) for j, k in enumerate(KINDS) if k.letter in REPORTED},
+        {k.letter: _figure(j, fitted, bounds, step) for j, k in enumerate(KINDS) if k.letter in REPORTED},
         n * period_s,
+        float(fitted.tau[0]),
         0.0 if trend is None else float(np.ptp(trend)),
+        fitted.smoothing_s,
+        step,
     )
 
 
 @dataclass(frozen=True)
 class _Fitted:
-    """Squared coefficients (5,), and the averaging times, variances and degrees of freedom that they were fitted to."""
+    """Squared coefficients (6,), and the averaging times, variances and degrees of freedom that they were fitted to."""
 
     terms: Array
-    shows: NDArray[np.bool_]  #: (5,) whether the record cannot be explained without the term
+    shows: NDArray[np.bool_]  #: (6,) whether the record cannot be explained without the term
     tau: Array
     variance: Array
     freedom: Array
-    bounds: Array  #: (5,) largest coefficient that each term may have by the record as it is
+    quantized: bool  #: whether the shortest averaging time is among them, where quantization shows
+    correlation_s: float | None = None  #: of the correlated noise that the terms include
 
     @property
     def model(self) -> Array:
-        return design_of(self.tau) @ self.terms
+        return design_of(self.tau, self.correlation_s) @ self.terms
+
+    @property
+    def smoothing_s(self) -> float:
+        """Mean distance of two instants that the output filter weighs, s."""
+        white = self.terms[WHITE] + self.terms[SMOOTHED]
+        share = self.terms[SMOOTHED] / white if self.shows[SMOOTHED] and white > 0 else 0.0
+        return float(share * SMOOTHED_SHARE * self.tau[0] / 1.5)
+
+    @property
+    def is_smoothed_beyond(self) -> bool:
+        """Whether white noise is lowered by more than the terms can follow: by a filter longer than these octaves."""
+        return bool(self.shows[SMOOTHED] and self.terms[WHITE] < LEAST_UNSMOOTHED * self.terms[SMOOTHED])
+
+    def columns(self, j: int) -> list[int]:
+        """Return the columns of the design whose coefficients together are a term's."""
+        return [WHITE, SMOOTHED] if j == WHITE else [j]
 
     def share(self, j: int) -> Array:
         """Return the share of a term in the fitted variance, (k,)."""
-        return design_of(self.tau)[:, j] * self.terms[j] / self.model
+        columns = self.columns(j)
+        return design_of(self.tau, self.correlation_s)[:, columns] @ self.terms[columns] / self.model
+
+    def is_shown(self, j: int) -> bool:
+        """Return whether the record cannot be explained without a term."""
+        return bool(self.shows[self.columns(j)].any())
 
     def is_followed(self, shown: NDArray[np.bool_]) -> bool:
         """Return whether the fitted curve lies within the data's intervals at the octaves where a term shows."""
@@ -145,54 +189,98 @@ class _Fitted:
         return bool(np.all(inside[shown]))
 
 
+@dataclass(frozen=True)
+class _Octaves:
+    """Variances (k,), (deg/s)^2, at averaging times in s and in readings; and the number of readings and one."""
+
+    variance: Array
+    tau: Array
+    m: Array
+    phases: float
+
+    def fit(self, first: int = 0, correlation_s: float | None = None) -> _Fitted:
+        """Return the fit from an octave on; quantization shows at the shortest of all averaging times or nowhere."""
+        variance, tau, m = self.variance[first:], self.tau[first:], self.m[first:]
+        terms, shows, freedom = fit_terms(variance, tau, m, self.phases, correlation_s, quantized=first == 0)
+        return _Fitted(terms, shows, tau, variance, freedom, first == 0, correlation_s)
+
+    def followed(self) -> _Fitted:
+        """Return the fit to the most octaves, from one on, at which white noise shows and the variances follow it.
+
+        What shorter times have beside it, the exact form of a filter or a vibration, is no noise of the standard.
+        Without white noise that is followed from any octave on it is the fit to all.
+        """
+        whole = self.fit()
+        everywhere = np.ones(len(self.tau), dtype=bool)
+        if (whole.is_followed(everywhere) and not whole.is_smoothed_beyond) or _shows_white(whole, 1):
+            return whole
+        likeliest = likeliest_correlation(self.variance, self.tau, self.m, self.phases)
+        later = (self.fit(k) for k in range(1, len(self.m) - LEAST_OCTAVES + 1))
+        rivals = itertools.chain([self.fit(0, likeliest)], later)
+        found = (fit for fit in rivals if _shows_white(fit, PREVAILING_OCTAVES) and self._explained_before(fit))
+        return next(found, whole)
+
+    def _explained_before(self, fit: _Fitted) -> bool:
+        before = slice(len(self.tau) - len(fit.tau) + 1)
+        white = float(fit.terms[fit.columns(WHITE)].sum())
+        return is_filtered_white(self.variance[before], self.tau[before], white)
+
+
+def _shows_white(fitted: _Fitted, octaves: int) -> bool:
+    share = fitted.share(WHITE)
+    shown = share >= SHOWN_SHARE
+    prevails = int(np.sum(share >= 0.5)) >= octaves and share[0] >= 0.5
+    is_white = fitted.is_shown(WHITE) and not fitted.is_smoothed_beyond
+    return is_white and prevails and fitted.is_followed(shown)
+
+
 def _variances(rate_dps: Array, m: Array) -> Array:
     return np.array([overlapping_variance(rate_dps, int(k)) for k in m])
 
 
-def _bounds(variance: Array, tau: Array, m: Array, phases: float) -> Array:
-    """Return the largest coefficient of each term, (5,), that alone would not exceed the record at any octave."""
-    found = []
-    for kind in KINDS:
-        freedom = np.maximum(kind.freedom(phases, m), 1.0)
-        highest = variance * freedom / chdtri(freedom, BOUND_CONFIDENCE)
-        found.append(float(np.sqrt(np.min(highest / kind.shape(tau)))))
-    return np.array(found)
-
-
-def _figure(j: int, fitted: _Fitted) -> Figure:
-    kind, design, model = KINDS[j], design_of(fitted.tau), fitted.model
-    value, bound = float(np.sqrt(fitted.terms[j])), kind.scale * float(fitted.bounds[j])
-    span = f"averaging times of {fitted.tau[0]:.3g} to {fitted.tau[-1]:.3g} s"
-    share = fitted.share(j)
-    shown = share >= SHOWN_SHARE
-    if not (fitted.shows[j] and shown.any()):
-        return Figure(None, None, kind.unit, bound, f"no {kind.region} {span}: masked by other noise")
-    if kind.letter == "K" and int(np.sum(share >= 0.5)) < PREVAILING_OCTAVES:
-        why = (
-            f"slope +1/2 at fewer than {PREVAILING_OCTAVES} octaves of {span}: the record is too short to detect a "
-            "random walk"
-        )
-        return Figure(None, None, kind.unit, bound, why)
-    if not fitted.is_followed(shown):
-        return Figure(
-            None, None, kind.unit, bound, f"no {kind.region} {span}: the deviation does not follow that slope"
-        )
-    # beside those that the record does not show and that may be there nevertheless
-    beside = np.union1d(np.flatnonzero(fitted.terms), BESIDE)
-    u_squared = _u_squared(j, beside, design, model, fitted.freedom)
-    u = u_squared / (2 * value)
-    if value < KNOWN * u:
-        why = (
-            f"no clear {kind.region} {span}: {kind.scale * value:.3g} {kind.unit}, uncertain by {100 * u / value:.0f} %"
-        )
+def _figure(j: int, fitted: _Fitted, bounds: Array, step: float | None) -> Figure:
+    kind = KINDS[j]
+    value = float(np.sqrt(fitted.terms[fitted.columns(j)].sum()))
+    bound = kind.scale * float(bounds[j])
+    u = 0.0 if value == 0 else _u_squared(j, fitted) / (2 * value)
+    why = _why_unknown(j, fitted, step, value, u)
+    if why:
         return Figure(None, None, kind.unit, bound, why)
     return Figure(kind.scale * value, kind.scale * u, kind.unit)
 
 
-def _u_squared(j: int, kept: NDArray[np.int64], design: NDArray[np.float64], model: Array, freedom: Array) -> float:
-    """Return the standard uncertainty of a squared coefficient beside the others that are kept."""
-    weighted = design[:, kept] * (np.sqrt(freedom / 2) / model)[:, None]
+def _why_unknown(j: int, fitted: _Fitted, step: float | None, value: float, u: float) -> str:
+    """Return why a term has no value; empty where it has one."""
+    kind = KINDS[j]
+    span = f"averaging times of {fitted.tau[0]:.3g} to {fitted.tau[-1]:.3g} s"
+    share = fitted.share(j)
+    shown = share >= SHOWN_SHARE
+    octaves = int(np.sum(share >= 0.5))
+    slope = f"no {kind.region} {span}"
+    short = f"slope +1/2 at fewer than {PREVAILING_OCTAVES} octaves of {span}: the record is too short to detect a"
+    uncertain = f"{kind.scale * value:.3g} {kind.unit}, uncertain by {100 * u / max(value, 1e-300):.0f} %"
+    hidden = step is not None and bool(np.any(fitted.variance[shown] < step**2))
+    reasons = (
+        (not (fitted.is_shown(j) and shown.any()), f"{slope}: masked by other noise"),
+        (hidden, f"the output has steps of {step or 0.0:.3g} deg/s, which hide noise smaller than that"),
+        (j == WHITE and fitted.is_smoothed_beyond, f"{slope}: an output filter smooths the noise for longer"),
+        (kind.letter == "K" and octaves < PREVAILING_OCTAVES, f"{short} random walk"),
+        (not fitted.is_followed(shown), f"{slope}: the deviation does not follow that slope"),
+        (value < KNOWN * u, f"no clear {kind.region} {span}: {uncertain}"),
+    )
+    return next((why for holds, why in reasons if holds), "")
+
+
+def _u_squared(j: int, fitted: _Fitted) -> float:
+    """Return the standard uncertainty of a term's squared coefficient.
+
+    It is that beside the terms that are kept, and those that the record does not show and that may be there
+    nevertheless.
+    """
+    kept = kept_beside(fitted.terms, quantized=fitted.quantized)
+    columns = design_of(fitted.tau, fitted.correlation_s)[:, kept]
+    weighted = columns * (np.sqrt(fitted.freedom / 2) / fitted.model)[:, None]
     size = np.linalg.norm(weighted, axis=0)
     covariance = np.linalg.pinv(weighted.T @ weighted / np.outer(size, size)) / np.outer(size, size)
-    here = int(np.flatnonzero(kept == j)[0])
-    return NEIGHBOURS * float(np.sqrt(covariance[here, here]))
+    of_term = np.isin(kept, fitted.columns(j)).astype(np.float64)
+    return NEIGHBOURS * float(np.sqrt(of_term @ covariance @ of_term))

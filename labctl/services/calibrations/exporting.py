@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from labctl.calibration import read_calibration
-from labctl.errors import BadInput, NotEnoughData
+from labctl.errors import BadInput, NotFound
 from labctl.exports import Loss, format_named, written_calibration
 from labctl.exports.noise.figures import DPS_RTHZ_PER_DEG_RTH, DPS_S_RTHZ_PER_DEG_H_RTH, RATE, WALK, WHITE
 from labctl.json_types.noise import AllanJson
-from labctl.services.recordings.allan import allan_unit
+from labctl.services.recordings.allan import MOST_RECORDINGS, noise_of_recordings
 from labctl.store import Store
 
 
@@ -51,19 +51,18 @@ def read_options(lines: Sequence[str], format_name: str) -> dict[str, str]:
 
 
 def _noise(store: Store, document: bytes, wanted: Mapping[str, str]) -> dict[str, str]:
-    """Return the noise of the unit as options, from the recordings of the calibration; none where they say nothing."""
+    """Return the noise of the unit as options, from the recording that its data sheet takes it from."""
     calibration = read_calibration(document)
-    provenance = calibration.document["provenance"]
-    several = provenance.get("recordings")
-    numbers = several if isinstance(several, list) else [provenance.get("recording")]
-    for number in [each for each in numbers if isinstance(each, int)][::-1]:
-        try:
-            axes = allan_unit(store, number, None).axes
-        except (BadInput, NotEnoughData):
-            continue
-        found = noise_options([axes[axis] for axis in calibration.axes if axis in axes])
-        return {key: value for key, value in found.items() if key in wanted}
-    return {}
+    try:
+        rows = store.recordings.of_unit(calibration.serial)
+    except NotFound:  # a file of a unit that is not in this database
+        return {}
+    newest = sorted(rows, key=lambda row: row.id, reverse=True)[:MOST_RECORDINGS]
+    answer = noise_of_recordings(store, newest)
+    if answer is None:
+        return {}
+    found = noise_options([answer.axes[axis] for axis in calibration.axes if axis in answer.axes])
+    return {key: value for key, value in found.items() if key in wanted}
 
 
 def noise_options(axes: Sequence[AllanJson]) -> dict[str, str]:

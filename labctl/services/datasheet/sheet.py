@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from labctl.errors import BadInput, LabctlError, NotEnoughData
+from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.data.rate_profile import TIME_CONSTANT
 from labctl.json_types.noise import NoiseFigure
@@ -17,13 +17,11 @@ from labctl.services.cache import UNNAMED, compute
 from labctl.services.datasheet.catalogue import LINES, OF_THREE_AXES, Line
 from labctl.services.datasheet.decision import RULE, decided
 from labctl.services.datasheet.measured import Figure, figures_of
-from labctl.services.recordings.allan import allan_unit
+from labctl.services.recordings.allan import MOST_RECORDINGS, noise_of_recordings
 from labctl.services.recordings.loading import points_of
 from labctl.services.schemas.reports.datasheet import Characteristic, DatasheetResponse, MeasuredUnder
 from labctl.store import RecordingRow, Store, Unit
 
-#: Of many recordings the newest are used.
-MOST_RECORDINGS = 32
 #: Figure of the Allan deviation, and its unit there over that of the data sheet.
 NOISE = {"angle_random_walk": ("N", 60.0), "bias_instability": ("B", 3600.0), "rate_random_walk": ("K", 216_000.0)}
 Key = tuple[str, str, str]  #: id, axis, axis of the force
@@ -78,21 +76,13 @@ def _characteristic(line: Line, figure: Figure, conditions: MeasuredUnder) -> Ch
 
 def _noise(store: Store, rows: Sequence[RecordingRow]) -> Iterator[Characteristic]:
     """Yield N, B and K of the recording with the longest section at rest, by the readings of one data set."""
-    longest = max(
-        ((_longest_rest(store, row), row) for row in rows if row.kind == "samples"),
-        key=lambda each: each[0], default=None,
-    )  # fmt: skip
-    if longest is None or not longest[0]:
-        return
-    report_stage(f"noise of recording {longest[1].id}")
-    try:
-        answer = allan_unit(store, longest[1].id, None)
-    except LabctlError:
+    answer = noise_of_recordings(store, rows)
+    if answer is None or answer.recording is None:
         return
     lines = {line.id: line for line in LINES}
     warm = answer.temperature_c
     under = MeasuredUnder(
-        recording=longest[1].id, temperature_c=None if warm is None else (warm, warm), rate_dps=(0.0, 0.0), runs=1,
+        recording=answer.recording, temperature_c=None if warm is None else (warm, warm), rate_dps=(0.0, 0.0), runs=1,
         datasets=answer.datasets[-1] - answer.datasets[0] + 1,
     )  # fmt: skip
     for axis, noise in answer.axes.items():
@@ -107,12 +97,6 @@ def _noise(store: Store, rows: Sequence[RecordingRow]) -> Iterator[Characteristi
 
 def _over(value: float | None, units: float) -> float | None:
     return None if value is None else value / units
-
-
-def _longest_rest(store: Store, row: RecordingRow) -> int:
-    sets = store.recordings.data_sets(row.id)
-    still = [each for each in sets if each.state == "complete" and each.table_rate_dps == 0 and not each.verification]
-    return max((each.n for each in still), default=0)
 
 
 def _bandwidth(store: Store, serial: str) -> Iterator[Characteristic]:

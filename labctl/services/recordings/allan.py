@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting.data.static_record import StaticRecord, static_record
 from labctl.fitting.numeric.allan import LEAST_READINGS, allan
+from labctl.progress import report_stage
 from labctl.recording import Recording, RecordingInfo
 from labctl.recording.points import temperature_of
 from labctl.services.cache import cached
 from labctl.services.schemas.recordings import AllanResponse
-from labctl.store import Store
+from labctl.store import RecordingRow, Store
 
+#: Of a unit with many recordings the newest are used.
+MOST_RECORDINGS = 32
 #: What a static record is looked for in, beside the outputs.
 NEEDED = ("dataset", "t_s", "run", "mounting", "position", "table_rate_dps", "temperature_c", "chamber_c", "valid")
 
@@ -47,6 +52,29 @@ def allan_unit(store: Store, recording: int, dataset: int | None) -> AllanRespon
 
     question = {"recording": recording, "readings": store.recordings.fingerprint(recording), "dataset": dataset}
     return cached(AllanResponse, question, work)
+
+
+def noise_of_recordings(store: Store, rows: Sequence[RecordingRow]) -> AllanResponse | None:
+    """Return the Allan deviation of the recording with the longest data set at rest; None where none has one.
+
+    Data sheets and exports take their N, B and K from here, so that both state the same.
+    """
+    at_rest = [(_longest_rest(store, row), row) for row in rows if row.kind == "samples"]
+    for readings, row in sorted(at_rest, key=lambda each: each[0], reverse=True):
+        if not readings:
+            break
+        report_stage(f"noise of recording {row.id}")
+        try:
+            return allan_unit(store, row.id, None)
+        except (BadInput, NotEnoughData):
+            continue
+    return None
+
+
+def _longest_rest(store: Store, row: RecordingRow) -> int:
+    sets = store.recordings.data_sets(row.id)
+    still = [each for each in sets if each.state == "complete" and each.table_rate_dps == 0 and not each.verification]
+    return max((each.n for each in still), default=0)
 
 
 def _response(recording: int, found: StaticRecord, info: RecordingInfo) -> AllanResponse:

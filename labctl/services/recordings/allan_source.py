@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from labctl.errors import BadInput, BadRecording, NotEnoughData
-from labctl.fitting.data.static_record import GAP, StaticRecord, static_record
+from labctl.fitting.data.static_record import ONE_TEMPERATURE_K, StaticRecord, static_record, stretch_of
 from labctl.fitting.numeric.allan import LEAST_READINGS, Allan, allan
 from labctl.recording import Recording, RecordingInfo, read_recording
+from labctl.recording.column_map import ColumnMap
 from labctl.recording.data_files import read_table
+from labctl.recording.points import temperature_of
 from labctl.recording.recording import Columns
 from labctl.recording.verification import fitted_part
 from labctl.services.recordings.allan import allan_unit
@@ -39,14 +42,33 @@ def allan_of_unit(store: Store, serial: str, recording: int | None, column: str 
     return _of_recording(Recording(info, whole), column, row.id)
 
 
-def allan_of_file(path: Path, column: str | None) -> AllanResponse:
+def allan_of_recordings(
+    store: Store, serial: str, recordings: Sequence[int], column: str | None
+) -> list[AllanResponse]:
+    """Return the Allan deviations of several recordings of a unit, or of its newest, to lay them over each other.
+
+    Raises NotFound, BadInput, NotEnoughData, each naming the recording.
+    """
+    return [allan_of_unit(store, serial, number, column) for number in dict.fromkeys(recordings) or (None,)]
+
+
+def allan_of_file(
+    path: Path,
+    column: str | None,
+    *,
+    column_map: ColumnMap | None = None,
+    importer: str | None = None,
+    options: Sequence[str] = (),
+) -> AllanResponse:
     """Return the Allan deviation of a file: a folder or file that can be imported, or a table with a column `t_s`.
 
-    Raises BadRecording, BadInput, NotEnoughData.
+    With a map, or an importer by name with its options, it is read as an import would read it. Raises BadRecording,
+    BadInput, NotEnoughData.
     """
-    if path.is_file() and path.suffix in TABLES:
+    as_it_is = column_map is None and importer is None and not options
+    if as_it_is and path.is_file() and path.suffix in TABLES:
         return _of_table(path, read_table(path), column)
-    with as_interchange(path) as folder:
+    with as_interchange(path, importer, options, column_map) as folder:
         return _of_recording(read_recording(folder), column, None)
 
 
@@ -68,7 +90,7 @@ def _of_recording(recording: Recording, column: str | None, number: int | None) 
     _refuse_unknown(recording.info.serial, column, recording.columns)
     axis = column.removeprefix("gyro_")
     values = recording.gyro_dps(axis) if f"gyro_{axis}" == column else _floats(recording.columns[column])
-    found = _of_course(recording.info.serial, {column: values}, _floats(recording.columns["t_s"]))
+    found = _of_course(recording.info.serial, {column: values}, recording.columns)
     return _answer(found, number, dict(recording.info.datasheet))
 
 
@@ -77,7 +99,7 @@ def _of_table(path: Path, columns: Columns, column: str | None) -> AllanResponse
         raise BadRecording(
             f"{path}: column 't_s' (time, s) is missing (the columns are {', '.join(list(columns)[:12])}); "
             "rename the column "
-            "of times, or import the file with a column map"
+            "of times, or name a column map with --map"
         )
     names = [column] if column is not None else [name for name in columns if name.startswith("gyro_")]
     if not names:
@@ -86,27 +108,25 @@ def _of_table(path: Path, columns: Columns, column: str | None) -> AllanResponse
         )
     for name in names:
         _refuse_unknown(str(path), name, columns)
-    found = _of_course(str(path), {name: _floats(columns[name]) for name in names}, _floats(columns["t_s"]))
+    found = _of_course(str(path), {name: _floats(columns[name]) for name in names}, columns)
     return _answer(found, None, {})
 
 
-def _of_course(what: str, courses: dict[str, NDArray[np.float64]], t_s: NDArray[np.float64]) -> StaticRecord:
-    """Return the noise of columns by their longest stretch without a gap, wherever it is and whatever moved there."""
-    steps = np.diff(t_s)
-    spacing = float(np.median(steps)) if len(steps) else 0.0
+def _of_course(what: str, courses: dict[str, NDArray[np.float64]], columns: Columns) -> StaticRecord:
+    """Return the noise of courses (n,) by the longest section at rest, at one temperature and without a gap."""
+    t_s = _floats(columns["t_s"])
+    spacing = float(np.median(np.diff(t_s))) if len(t_s) > 1 else 0.0
     if not spacing > 0:
         raise BadRecording(
             f"{what}: the times in column 't_s' do not increase (the median step is {spacing:g} s); check the column"
         )
-    edges = np.concatenate([[0], np.flatnonzero((steps <= 0) | (steps > GAP * spacing)) + 1, [len(t_s)]])
-    longest = int(np.argmax(np.diff(edges)))
-    rows = slice(int(edges[longest]), int(edges[longest + 1]))
-    n = rows.stop - rows.start
-    if n < LEAST_READINGS:
+    rows = stretch_of(columns)
+    if rows is None:
         raise NotEnoughData(
-            f"{what}: its longest stretch without a gap has {n} readings; an Allan deviation needs {LEAST_READINGS}; "
-            "record for longer"
+            f"{what}: no section at rest, at one temperature (within {ONE_TEMPERATURE_K:g} K) and without a gap has "
+            f"{LEAST_READINGS} readings (it has {len(t_s)} readings in all); record the unit at rest for longer"
         )
+    n = rows.stop - rows.start
     period_s = float((t_s[rows][-1] - t_s[rows][0]) / (n - 1))
     axes: dict[str, Allan] = {}
     for name, values in courses.items():
@@ -119,7 +139,12 @@ def _of_course(what: str, courses: dict[str, NDArray[np.float64]], t_s: NDArray[
             axes[name] = noise
     if not axes:
         raise NotEnoughData(f"{what}: its readings are all equal, so the noise cannot be estimated; check the column")
-    return StaticRecord(1, 1, float("nan"), n * period_s, axes)
+    warm = temperature_of(columns)
+    mean_c = float("nan") if warm is None else float(warm[rows].mean())
+    first, last = (
+        int(np.asarray(columns["dataset"])[k]) if "dataset" in columns else 1 for k in (rows.start, rows.stop - 1)
+    )
+    return StaticRecord(first, last, mean_c, n * period_s, axes)
 
 
 def _refuse_unknown(what: str, column: str, columns: Columns) -> None:

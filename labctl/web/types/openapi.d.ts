@@ -1864,6 +1864,8 @@ export interface components {
         /**
          * AllanJson
          * @description The overlapping Allan deviation of an axis with its 95 % interval, the sum of the terms, and the figures.
+         *
+         *     `model_dps` is null at averaging times below `from_s`, which the figures do not rest on.
          */
         AllanJson: {
             /** Tau S */
@@ -1883,6 +1885,12 @@ export interface components {
             trend_dps: number | null;
             /** Replaces Datasheet */
             replaces_datasheet: boolean;
+            /** From S */
+            from_s?: number;
+            /** Smoothing S */
+            smoothing_s?: number;
+            /** Step Dps */
+            step_dps?: number;
         };
         /**
          * AllanResponse

@@ -9,7 +9,7 @@ import { duration, number, withUnit } from "../core/format.js";
 import { cardWithHeader, loadInto, notice, table } from "../core/components.js";
 import { toggleGroup } from "../core/fields.js";
 
-/** @import { Allan, NoiseFigure } from "../../../types/api.js" */
+/** @import { Allan, AllanAxis, NoiseFigure } from "../../../types/api.js" */
 /** @import { RecordingState } from "../../../types/pages.js" */
 
 /** @type {["N" | "B" | "K", string][]} */
@@ -128,6 +128,9 @@ function allanFigure(found) {
   ];
   return [
     h("p", { class: "muted" }, where),
+    ...axes.flatMap(([axis, noise]) =>
+      remarks(noise).map((text) => h("p", { class: "muted small" }, `${axis}: ${text}`)),
+    ),
     figure(
       `Recording ${found.recording} Allan deviation`,
       "Band: 95 % interval. Dotted: the fit that gives angle random walk N, bias instability B and rate random walk K.",
@@ -150,6 +153,27 @@ function allanFigure(found) {
       { label: "Figures of IEEE Std 952", first: "11rem" },
     ),
   ];
+}
+
+/**
+ * What keeps the figures of an axis from resting on every averaging time.
+ * @param {AllanAxis} noise
+ */
+function remarks(noise) {
+  const said = [];
+  if (noise.from_s !== undefined)
+    said.push(
+      `N, B and K are of averaging times from ${duration(noise.from_s)} on; shorter ones do not follow the terms.`,
+    );
+  if (noise.smoothing_s !== undefined)
+    said.push(
+      `An output filter smooths over ${withUnit(noise.smoothing_s, "s")}; N is that of averaging times well above.`,
+    );
+  if (noise.step_dps !== undefined)
+    said.push(
+      `The output has steps of ${withUnit(noise.step_dps, "deg/s")}, larger than its noise; bounds allow for half a step.`,
+    );
+  return said;
 }
 
 /**

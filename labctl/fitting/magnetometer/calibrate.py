@@ -1,0 +1,215 @@
+"""Hard and soft iron of a magnetometer with their covariance, and whether the field was constant."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.errors import NotEnoughData
+from labctl.fitting.magnetometer.ellipsoid import PARAMETERS, PLACES, Ellipsoid, at, nearest_ellipsoid, quadric
+from labctl.fitting.numeric.arrays import Array
+
+AXES = ("x", "y", "z")
+LEAST_READINGS = 60
+#: An offset relative to the field, or an element of the matrix, that is less certain than this is not determined.
+LARGEST_U = 0.02
+#: A reading further from the ellipsoid than this many robust standard deviations is left out.
+WRONG = 5.0
+ROUNDS = 8
+#: More than this share of readings left out is a disturbed field.
+MOST_LEFT_OUT = 0.05
+#: Left-out readings are predicted from the others in this many blocks of time.
+BLOCKS = 10
+#: Error of left-out readings over their noise from which on the model leaves more than noise.
+UNEXPLAINED = 1.5
+#: That is more than a filter in the sensor where the distances stay alike over this share of the record and more.
+ALIKE_SHARE = 1 / 40
+#: Directions of the sphere that are searched for the largest gap.
+DIRECTIONS = 1000
+Verdict = Literal["adequate", "unexplained"]
+
+
+@dataclass(frozen=True)
+class Magnetometer:
+    """A calibrated magnetometer: field = soft iron (reading - hard iron), in the axes of the sensor."""
+
+    hard_iron_ut: Array  #: (3,)
+    soft_iron: NDArray[np.float64]  #: (3, 3), symmetric
+    field_ut: (
+        float  #: size of the field in the unit of the readings, where it was not given: soft iron of determinant 1
+    )
+    covariance: NDArray[np.float64]  #: (10, 10) of hard iron, soft iron in the order of PLACES, and field
+    used: NDArray[np.bool_]  #: (n,)
+    noise_ut: float  #: of a reading from one to the next
+    residual_ut: float  #: root mean square of the distances from the ellipsoid
+    heldout_ut: float  #: the same of readings predicted from those of other times
+    before_ut: float  #: root mean square by which the size of the raw readings scatters
+    repetition: float  #: readings that tell as much as one independent one
+    largest_gap_deg: float  #: from any direction to the next that was measured
+    gap: Array  #: (3,) the middle of the largest gap
+
+    @property
+    def u(self) -> Array:
+        """Standard uncertainties of hard iron, soft iron and field, (10,)."""
+        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+
+    @property
+    def heading_error_deg(self) -> float:
+        """Angle to which the held-out error turns a field that is square to it, deg."""
+        return float(np.degrees(self.heldout_ut / self.field_ut))
+
+    @property
+    def left_out_share(self) -> float:
+        return float(1 - self.used.mean())
+
+    @property
+    def verdict(self) -> Verdict:
+        alike = self.repetition > ALIKE_SHARE * np.count_nonzero(self.used)
+        more = alike and self.heldout_ut > UNEXPLAINED * self.noise_ut
+        return "unexplained" if more or self.left_out_share > MOST_LEFT_OUT else "adequate"
+
+
+def calibrate_magnetometer(what: str, readings_ut: NDArray[np.float64], field_ut: float | None = None) -> Magnetometer:
+    """Fit hard and soft iron to readings (n, 3), uT, in order of time, of turns in a constant field.
+
+    `field_ut` is its size; without it the matrix has the determinant 1. Raises NotEnoughData, naming what to do.
+    """
+    if len(readings_ut) < LEAST_READINGS:
+        raise NotEnoughData(
+            f"{what}: {len(readings_ut)} readings of a magnetometer; nine parameters need {LEAST_READINGS} and more: "
+            "turn it slowly through all directions"
+        )
+    found, used = _robust(what, readings_ut)
+    n, repetition = len(found.distance), _repetition(found.distance)
+    # as few independent readings as there are have given nine of them to the parameters, and so look quieter
+    fewer = max(n - PARAMETERS, 1) / max(n - PARAMETERS * repetition, n / 10)
+    normal = np.linalg.inv(found.jacobian.T @ found.jacobian)
+    covariance = found.noise**2 * repetition * fewer * normal
+    values, by_parameter = _values(found.parameters, field_ut)
+    total = by_parameter @ covariance @ by_parameter.T
+    soft = np.zeros((3, 3))
+    for value, (i, j) in zip(values[3:9], PLACES, strict=True):
+        soft[i, j] = soft[j, i] = value
+    field = (readings_ut[used] - found.centre) @ found.matrix
+    gap, angle = largest_gap(field)
+    size = np.linalg.norm(readings_ut[used], axis=1)
+    result = Magnetometer(
+        values[:3], soft, float(values[9]), total, used,
+        float(np.sqrt(np.mean(np.diff(found.distance) ** 2) / 2)), float(np.sqrt(np.mean(found.distance**2))),
+        _held_out(readings_ut[used], found), float(size.std()), repetition, angle, gap,
+    )  # fmt: skip
+    _require_determined(what, result)
+    return result
+
+
+def _robust(what: str, readings: NDArray[np.float64]) -> tuple[Ellipsoid, NDArray[np.bool_]]:
+    used = np.ones(len(readings), dtype=np.bool_)
+    found: Ellipsoid | None = None
+    for _ in range(ROUNDS):
+        start = quadric(readings[used]) if found is None else (found.centre, found.matrix)
+        found = None if start is None else nearest_ellipsoid(readings[used], *start)
+        if found is None:
+            raise NotEnoughData(
+                f"{what}: the readings lie on no ellipsoid that they determine; turn the unit slowly through all "
+                "directions (each axis up and down, and turned in each), away from iron and currents"
+            )
+        every = at(readings, found.centre, found.matrix, found.noise).distance
+        usual = 1.4826 * float(np.median(np.abs(every[used])))
+        right = np.abs(every) <= WRONG * max(usual, 1e-12)
+        if np.array_equal(right, used) or np.count_nonzero(right) < LEAST_READINGS:
+            break
+        used = right
+    assert found is not None
+    last = nearest_ellipsoid(readings[used], found.centre, found.matrix)
+    return (found if last is None else last), used
+
+
+def _repetition(distance: Array) -> float:
+    """Return the sum of the autocorrelation of distances (n,), 1 and more: pairs of lags as long as they add something.
+
+    Geyer 1992, initial positive sequence.
+    """
+    n = len(distance)
+    padded = np.fft.rfft(distance - distance.mean(), 2 * n)
+    correlation = np.fft.irfft(np.abs(padded) ** 2)[: n // 2]
+    if not correlation[0] > 0:
+        return 1.0
+    correlation = correlation / correlation[0]
+    pairs = correlation[1 : len(correlation) // 2 * 2 - 1].reshape(-1, 2).sum(axis=1)
+    ends = np.flatnonzero(pairs <= 0)
+    return float(max(1 + 2 * pairs[: ends[0] if len(ends) else len(pairs)].sum(), 1.0))
+
+
+def _values(parameters: Array, field_ut: float | None) -> tuple[Array, NDArray[np.float64]]:
+    """Return hard iron, soft iron and field, (10,), of centre and matrix, and their derivative (10, 9)."""
+
+    def of(given: Array) -> Array:
+        a, b, c, d, e, f = given[3:]
+        determinant = a * (b * c - f * f) - d * (d * c - f * e) + e * (d * f - b * e)
+        field = float(np.cbrt(1 / determinant)) if field_ut is None else field_ut
+        return np.concatenate([given[:3], given[3:] * field, [field]])
+
+    return of(parameters), _derivative(of, parameters)
+
+
+def _derivative(of: Callable[[Array], Array], at_parameters: Array) -> NDArray[np.float64]:
+    columns = []
+    for k, value in enumerate(at_parameters):
+        step = np.zeros(len(at_parameters))
+        step[k] = 1e-6 * max(abs(float(value)), float(np.abs(at_parameters[3:6]).max()) if k >= 3 else 1.0)
+        columns.append((of(at_parameters + step) - of(at_parameters - step)) / (2 * step[k]))
+    return np.column_stack(columns)
+
+
+def _held_out(readings: NDArray[np.float64], found: Ellipsoid) -> float:
+    """Return the root mean square distance of each block of time from the ellipsoid of all others, uT."""
+    squares = []
+    for block in np.array_split(np.arange(len(readings)), BLOCKS):
+        others = np.delete(readings, block, axis=0)
+        without = nearest_ellipsoid(others, found.centre, found.matrix)
+        if without is None:  # what only this block shows is not held out
+            without = found
+        squares.append(at(readings[block], without.centre, without.matrix, without.noise).distance ** 2)
+    return float(np.sqrt(np.mean(np.concatenate(squares))))
+
+
+def largest_gap(field: NDArray[np.float64]) -> tuple[Array, float]:
+    """Return the direction (3,) furthest from all of fields (n, 3), and how far the nearest is from it, deg."""
+    k = np.arange(DIRECTIONS) + 0.5
+    z, turn = 1 - 2 * k / DIRECTIONS, np.pi * (1 + np.sqrt(5)) * k
+    wide = np.sqrt(1 - z**2)
+    sphere = np.column_stack([wide * np.cos(turn), wide * np.sin(turn), z])
+    unit = field / np.linalg.norm(field, axis=1)[:, None]
+    nearest = np.full(DIRECTIONS, -1.0)
+    for part in np.array_split(unit, max(len(unit) // 2000, 1)):
+        nearest = np.maximum(nearest, (sphere @ part.T).max(axis=1))
+    worst = int(np.argmin(nearest))
+    return sphere[worst], float(np.degrees(np.arccos(np.clip(nearest[worst], -1, 1))))
+
+
+def in_words(direction: Array) -> str:
+    """Return the axes of the sensor that a direction is along, such as '+x -z'."""
+    named = [f"{'+' if value > 0 else '-'}{axis}" for axis, value in zip(AXES, direction, strict=True)
+             if abs(value) > 0.4]  # fmt: skip
+    return " ".join(named)
+
+
+def _require_determined(what: str, result: Magnetometer) -> None:
+    # by the noise alone: what a disturbed field makes uncertain is no want of directions
+    alone = min(result.noise_ut / max(result.residual_ut, 1e-300), 1.0) / np.sqrt(result.repetition)
+    u = alone * np.concatenate([result.u[:3] / result.field_ut, result.u[3:9]])
+    worst = int(np.argmax(u))
+    if np.isfinite(u[worst]) and u[worst] <= LARGEST_U:
+        return
+    names = [f"hard iron {axis} (over the field)" for axis in AXES]
+    names += [f"soft iron {AXES[i]}{AXES[j]}" for i, j in PLACES]
+    raise NotEnoughData(
+        f"{what}: the readings do not determine {names[worst]} (u = {u[worst]:.2g}, limit {LARGEST_U:g}); the field "
+        f"was never nearer than {result.largest_gap_deg:.0f} deg to {in_words(result.gap)} of the sensor: turn that "
+        "side "
+        "into the field too"
+    )
