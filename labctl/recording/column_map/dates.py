@@ -47,7 +47,8 @@ def instants(words: Sequence[str], unit: str) -> Instants:
         return _times_of_day(words)
     if _YEAR_FIRST.fullmatch(first):
         return _since_first([_parts(word, _YEAR_FIRST, day_first=False) for word in words])
-    day_first = ORDERS[unit] if ORDERS.get(unit) is not None else _day_first(words)
+    stated = ORDERS.get(unit)
+    day_first = _day_first(words) if stated is None else stated
     return _since_first([_parts(word, _YEAR_LAST, day_first=day_first) for word in words])
 
 

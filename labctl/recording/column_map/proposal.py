@@ -22,7 +22,7 @@ from labctl.recording.column_map.model import (
     UnitKeys,
 )
 from labctl.recording.column_map.movement import Movement, movement
-from labctl.recording.column_map.names import COUNTERS, PARTS, NameSays, folded, name_says
+from labctl.recording.column_map.names import COUNTERS, PARTS, NameSays, folded, in_unit, name_says
 from labctl.recording.column_map.units import find_unit, is_lsb, unit_of_target
 from labctl.recording.columns import holds_flags
 from labctl.recording.raw_table import RawColumn, RawTable
@@ -127,10 +127,11 @@ def _by_names(table: RawTable, guesses: list[str], stated: Units) -> dict[str, M
 
 def _name_says(table: RawTable, name: str) -> NameSays:
     """Return what a name says: a `T` beside a column of time is a temperature."""
-    says = name_says(name)
+    unit = table.columns[name].unit
+    says = in_unit(name, unit) if unit else name_says(name)
     others = (name_says(other).target for other in table.columns if other != name)
     if says.target == "t_s" and name.strip() == "T" and "t_s" in others:
-        return NameSays("temperature_c", table.columns[name].unit)
+        return NameSays("temperature_c", unit)
     return says
 
 
