@@ -5,7 +5,6 @@ What "right" is comes from the numbers that the files were made of: times, rates
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -25,8 +24,7 @@ ALL_MAP = UNIT_MAP + 'time = { unit = "s" }\ntemperature = { unit = "deg C" }\n'
 DATED = "2024-01-25T08:00:00"
 ARRAYS = {"time": ROWS[:, 0], "gyro": ROWS[:, 1:4], "temp": ROWS[:, 4]}
 FORCE = np.tile([0.0, 0.0, 9.80665], (len(ROWS), 1))
-WITH_ARRAYS = {"time": ROWS[:, 0], "gyro": ROWS[:, 1:4], "temp": ROWS[:, 4]}
-FORCE = lines(
+WITH_FORCE = lines(
     [[*names(), "ax", "ay", "az"]],
     [[*row, *force] for row, force in zip(numbers(), FORCE.round(5).tolist(), strict=True)],
 )
