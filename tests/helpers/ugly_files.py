@@ -169,6 +169,22 @@ def npy(array: np.ndarray) -> Maker:
     return make
 
 
+def parquet(names: Sequence[str], rows: np.ndarray, zeroed: tuple[int, slice] | None = None) -> Maker:
+    """A Parquet file; with exact zeros in some rows of one column, as an erased page without a checksum leaves them."""
+
+    def make(folder: Path) -> Path:
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        columns = dict(zip(names, rows.copy().T, strict=True))
+        if zeroed is not None:
+            columns[names[zeroed[0]]][zeroed[1]] = 0.0
+        pq.write_table(pa.table(columns), folder / "log.parquet")
+        return folder / "log.parquet"
+
+    return make
+
+
 def mat5(variables: dict[str, object]) -> Maker:
     def make(folder: Path) -> Path:
         from scipy.io import savemat

@@ -38,7 +38,7 @@ def is_date(word: str) -> bool:
 def instants(words: Sequence[str], unit: str) -> Instants:
     """Return the times that words are by a unit of `ORDERS`.
 
-    Raises ValueError, in words, for one that is no date, and for dates of which day and month cannot be told apart.
+    Raises ValueError, in words, for one that is no date, and for dates of which day and month cannot be distinguished.
     """
     first = words[0] if words else ""
     if _ISO.match(first):

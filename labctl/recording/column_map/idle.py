@@ -1,4 +1,4 @@
-"""Entries of a map that would change nothing: each is a mistake, since whoever wrote it expected that it does."""
+"""Entries of a map that would change nothing: each is a mistake of the map."""
 
 from __future__ import annotations
 

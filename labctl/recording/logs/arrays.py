@@ -1,6 +1,6 @@
 """Files of named arrays as a table: NumPy (.npy, .npz), MATLAB (.mat of version 5 and 7.3) and HDF5.
 
-Arrays of one length are the columns; `gyro` of shape (n, 3) is gyro[0], gyro[1] and gyro[2]. HDF5, and MATLAB files of
+_Arrays of one length are the columns; `gyro` of shape (n, 3) is gyro[0], gyro[1] and gyro[2]. HDF5, and MATLAB files of
 version 7.3, which are HDF5, need the package h5py.
 """
 
@@ -26,11 +26,11 @@ from labctl.recording.raw_table import RawColumn, RawTable
 
 #: Columns that one array may have; the longer side of an array is its rows.
 MOST_WIDE = 32
-#: Arrays that a message lists.
+#: _Arrays that a message lists.
 _SHOWN = 10
 INSTALL = "pip install h5py"
 #: Array of a file, by name, and the unit that the file states for it.
-Arrays = dict[str, tuple[NDArray[Any], str]]
+_Arrays = dict[str, tuple[NDArray[Any], str]]
 
 
 def probe(path: Path) -> float:
@@ -105,7 +105,7 @@ def _column(name: str, values: NDArray[Any], unit: str) -> RawColumn:
     return RawColumn(name, np.asarray(values, dtype=np.float64), unit=stated, is_boolean=values.dtype.kind == "b")
 
 
-def _reader(path: Path) -> tuple[str, Callable[[Path], Arrays]] | None:
+def _reader(path: Path) -> tuple[str, Callable[[Path], _Arrays]] | None:
     head = head_of(path)
     if head.startswith(b"\x93NUMPY"):
         return "NumPy file", _npy
@@ -127,14 +127,14 @@ def _is_npz(path: Path) -> bool:
         return False
 
 
-def _npy(path: Path) -> Arrays:
+def _npy(path: Path) -> _Arrays:
     return {"": (np.load(path, mmap_mode="r", allow_pickle=False), "")}
 
 
-def _npz(path: Path) -> Arrays:
+def _npz(path: Path) -> _Arrays:
     with zipfile.ZipFile(path) as archive:
         refuse_too_large(path, sum(each.file_size for each in archive.infolist()))
-    found: Arrays = {}
+    found: _Arrays = {}
     with np.load(path, allow_pickle=False) as archive:
         for name in archive.files:
             try:
@@ -144,13 +144,13 @@ def _npz(path: Path) -> Arrays:
     return found
 
 
-def _mat5(path: Path) -> Arrays:
+def _mat5(path: Path) -> _Arrays:
     from scipy.io import loadmat, whosmat  # noqa: PLC0415  0.2 s that only such files need
 
     shapes = whosmat(str(path))
     refuse_too_large(path, sum(8 * int(np.prod(shape)) for _, shape, _ in shapes))
     opaque = [name for name, _, kind in shapes if kind in {"opaque", "unknown", "object"}]
-    found: Arrays = {}
+    found: _Arrays = {}
     variables = [name for name, _, kind in shapes if kind not in {"opaque", "unknown", "object", "function"}]
     for name, value in loadmat(str(path), squeeze_me=True, struct_as_record=False, variable_names=variables).items():
         if not name.startswith("__"):
@@ -163,7 +163,7 @@ def _mat5(path: Path) -> Arrays:
     return found
 
 
-def _flatten(name: str, value: Any, found: Arrays) -> None:
+def _flatten(name: str, value: Any, found: _Arrays) -> None:
     """Add the arrays of a variable, those of a struct as NAME.FIELD."""
     if isinstance(value, np.ndarray):
         found[name] = (value, "")
@@ -172,15 +172,15 @@ def _flatten(name: str, value: Any, found: Arrays) -> None:
             _flatten(f"{name}.{field}", getattr(value, field), found)
 
 
-def _hdf5(path: Path) -> Arrays:
+def _hdf5(path: Path) -> _Arrays:
     try:
         import h5py  # noqa: PLC0415  an optional package
     except ImportError as error:
         raise BadRecording(
-            f"{path}: this is an HDF5 or MATLAB 7.3 file, and the package that reads it is not installed: {INSTALL}; "
-            "in MATLAB, save FILE.mat -v7 writes a file that needs no package"
+            f"{path}: this is an HDF5 or MATLAB 7.3 file, and the package that reads it is not installed; install it with "
+            f"`{INSTALL}`; in MATLAB, save FILE.mat -v7 writes a file that needs no package"
         ) from error
-    found: Arrays = {}
+    found: _Arrays = {}
     with h5py.File(path, "r") as file:
         sets: list[tuple[str, Any]] = []
         file.visititems(lambda name, each: sets.append((name, each)) if isinstance(each, h5py.Dataset) else None)

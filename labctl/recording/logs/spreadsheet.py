@@ -49,8 +49,8 @@ def read(path: Path, options: SheetOptions) -> RawTable:
         from python_calamine import CalamineWorkbook  # noqa: PLC0415  an optional package
     except ImportError as error:
         raise BadRecording(
-            f"{path}: this is a spreadsheet, and the package that reads it is not installed: {INSTALL}; or save the "
-            "sheet as CSV"
+            f"{path}: this is a spreadsheet, and the package that reads it is not installed; install it with `{INSTALL}`, "
+            "or save the sheet as CSV"
         ) from error
     with parsed_by_library(path, "workbook", "save it again, or save the sheet as CSV"):
         book = CalamineWorkbook.from_path(str(path))
@@ -71,7 +71,7 @@ def read(path: Path, options: SheetOptions) -> RawTable:
 
 def _chosen(path: Path, sheets: dict[str, Any], wanted: str | None) -> str:
     if wanted is not None and wanted not in sheets:
-        raise BadRecording(f"{path}: there is no sheet {wanted!r}; it has {', '.join(map(repr, sheets))}")
+        raise BadRecording(f"{path}: there is no sheet {wanted!r}; choose one of {', '.join(map(repr, sheets))}")
     filled = [name for name, sheet in sheets.items() if sheet.total_height > 1]
     if wanted is None and len(filled) > 1:
         listed = ", ".join(map(repr, filled[:10]))
