@@ -177,8 +177,8 @@ def _hdf5(path: Path) -> _Arrays:
         import h5py  # noqa: PLC0415  an optional package
     except ImportError as error:
         raise BadRecording(
-            f"{path}: this is an HDF5 or MATLAB 7.3 file, and the package that reads it is not installed; install it with "
-            f"`{INSTALL}`; in MATLAB, save FILE.mat -v7 writes a file that needs no package"
+            f"{path}: this is an HDF5 or MATLAB 7.3 file, and h5py, which reads it, is not installed; install it "
+            f"with `{INSTALL}`; in MATLAB, save FILE.mat -v7 writes a file that needs no package"
         ) from error
     found: _Arrays = {}
     with h5py.File(path, "r") as file:

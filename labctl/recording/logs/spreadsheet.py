@@ -49,8 +49,8 @@ def read(path: Path, options: SheetOptions) -> RawTable:
         from python_calamine import CalamineWorkbook  # noqa: PLC0415  an optional package
     except ImportError as error:
         raise BadRecording(
-            f"{path}: this is a spreadsheet, and the package that reads it is not installed; install it with `{INSTALL}`, "
-            "or save the sheet as CSV"
+            f"{path}: this is a spreadsheet, and python-calamine, which reads it, is not installed; install it "
+            f"with `{INSTALL}`, or save the sheet as CSV"
         ) from error
     with parsed_by_library(path, "workbook", "save it again, or save the sheet as CSV"):
         book = CalamineWorkbook.from_path(str(path))
