@@ -20,7 +20,7 @@ from labctl.recording.raw_table import RawTable
 
 #: Unpacked size of a workbook that is read: a sheet has at most 1,048,576 rows.
 MOST_BYTES = 500_000_000
-#: Bytes of a cell that are counted against it, of the size that a sheet states.
+#: First bytes of an .xls file.
 _OLD = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
 _PARTS = ("xl/workbook.xml", "xl/workbook.bin", "content.xml")
 INSTALL = "pip install python-calamine"
