@@ -12,6 +12,7 @@ from labctl.fitting.criticism.candidate_shape import CandidateShape
 from labctl.fitting.criticism.channel_functions import channel_options
 from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.data.earth import turning_size_dps
+from labctl.fitting.data.joined import trend_t_s
 from labctl.fitting.effects import CATALOGUE, Column, Effect, Reference, Span, Term
 from labctl.fitting.models.error_model import ErrorModel, expand
 from labctl.fitting.models.linearity import is_linear_in_rate
@@ -166,7 +167,7 @@ def thermometer_options(data: ReducedRecording, model: ErrorModel, axis: str) ->
     """Return what a thermometer that drifts in time would do: the base's own slope over temperature, times time."""
     if "t_s" not in data.nodes or (slope := temperature_slope(data, model, axis)) is None:
         return []
-    t_s = data.at_sets(np.asarray(data.nodes["t_s"], dtype=np.float64))
+    t_s = data.at_sets(trend_t_s(data.info, data.nodes.columns))
     if not np.ptp(t_s) > 0:
         return []
     elapsed = (t_s - t_s.min()) / np.ptp(t_s)

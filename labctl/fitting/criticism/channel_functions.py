@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from labctl.fitting.criticism.candidate_shape import CandidateShape
 from labctl.fitting.criticism.reduction import ReducedRecording
+from labctl.fitting.data.joined import trend_t_s
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording.columns import OWN_DATASET, RECORDING, WITHIN_S
 
@@ -51,6 +52,8 @@ def smooth_channels(data: ReducedRecording, axis: str) -> dict[str, Array]:
         if name not in NO_CHANNELS and values.dtype.kind in "fiu" and not name.startswith("gyro_")
     }
     channels["table_rate_dps"] = data.nodes.rate_dps(axis)
+    if "t_s" in channels:
+        channels["t_s"] = trend_t_s(data.info, data.nodes.columns)
     if data.info.motion == "turns":  # no function of the rate can be found from its mean
         del channels["table_rate_dps"]
     return {name: v for name, v in channels.items() if np.all(np.isfinite(v)) and np.ptp(v) > 1e-9 * (1 + abs(v[0]))}

@@ -1,13 +1,16 @@
 """Several recordings of one unit as one: columns one below the other, and the column `recording` with their numbers.
 
 What counts up in each recording (data sets, runs, mountings) goes on counting, so that nothing of two recordings has
-one number; `t_s` runs from the start of the first, and `recording_t_s` is the time within each.
+one number; `t_s` runs from the start of the first, and `recording_t_s` is the time within each. A recording whose date
+of measurement is not known has no place in that order: it comes behind the dated ones, and no time between recordings
+may then be taken from `t_s` (`trend_t_s`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +20,7 @@ from labctl.fitting.data.covered import Covered
 from labctl.fitting.data.temperature.channel import with_temperature
 from labctl.recording import Recording, RecordingInfo, Standard, to_points
 from labctl.recording.columns import OWN_DATASET, RECORDING, WITHIN_S
+from labctl.recording.info import NO_DATE
 from labctl.recording.verification import fitted_part
 
 #: Numbers that go on counting from recording to recording.
@@ -42,6 +46,8 @@ class _Counts:
 def joined_recording(parts: Mapping[int, Recording]) -> Recording:
     """Return recordings, number -> recording, as one, in order of their starts; a single one as it is.
 
+    Those without a date of measurement follow by their numbers, and the head of the whole then has no date either.
+
     Readings stay readings where all of them have readings, else they become means. A channel that one of them lacks is
     left out, and so is what was measured to verify a calibration.
 
@@ -49,7 +55,7 @@ def joined_recording(parts: Mapping[int, Recording]) -> Recording:
     """
     if len(parts) == 1:
         return next(iter(parts.values()))
-    order = sorted(parts, key=lambda number: (parts[number].info.started_at, number))
+    order = sorted(parts, key=lambda number: _place(number, parts[number].info))
     _require_alike(order, parts)
     whole = {number: with_temperature(fitted_part(parts[number])) for number in order}
     if any(recording.info.kind != "samples" for recording in whole.values()):
@@ -65,6 +71,7 @@ def joined_recording(parts: Mapping[int, Recording]) -> Recording:
     info = first.model_copy(
         update={
             "max_rate_dps": max((r.info.max_rate_dps or 0.0) for r in whole.values()) or None,
+            "date_known": all(recording.info.measured_at is not None for recording in whole.values()),
             "standards": _least_known([whole[number].info for number in order]),
         }
     )
@@ -72,10 +79,25 @@ def joined_recording(parts: Mapping[int, Recording]) -> Recording:
     return Recording(info, _below_one_another(tables), around)
 
 
+def _place(number: int, info: RecordingInfo) -> tuple[bool, datetime, int]:
+    """Return where a recording comes: the time of an import orders nothing."""
+    measured = info.measured_at
+    return measured is None, measured or NO_DATE, number
+
+
+def trend_t_s(info: RecordingInfo, columns: Mapping[str, NDArray[np.generic]]) -> NDArray[np.float64]:
+    """Return the times, (n,) s, along which a trend may be looked for.
+
+    Through all recordings where each has a date, else within each of them.
+    """
+    name = WITHIN_S if WITHIN_S in columns and info.measured_at is None else "t_s"
+    return np.asarray(columns[name], dtype=np.float64)
+
+
 def recordings_in(columns: Mapping[str, NDArray[np.generic]]) -> list[int]:
     """Return the numbers of the recordings that rows are of, in the order in which they were made; [] of a single one.
 
-    The order is that of time, because it is the order of their rows.
+    The order is that of time, because it is the order of their rows; those without a date come last.
     """
     if RECORDING not in columns:
         return []
@@ -153,7 +175,8 @@ def _renumbered(number: int, recording: Recording, first: RecordingInfo, counts:
     shift_s = 0.0
     if "t_s" in columns:
         t_s = np.asarray(columns["t_s"], dtype=np.float64)
-        shift_s = (recording.info.started_at - first.started_at).total_seconds()
+        dated = recording.info.measured_at is not None
+        shift_s = (recording.info.started_at - first.started_at).total_seconds() if dated else 0.0
         if counts.end_s and shift_s + t_s.min(initial=np.inf) < counts.end_s:
             shift_s = counts.end_s + APART_S - float(t_s.min())
         columns |= {"t_s": t_s + shift_s, WITHIN_S: t_s}

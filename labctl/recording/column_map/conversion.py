@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.recording.column_map.guesses import temperature_unit
 from labctl.recording.column_map.model import MappedColumn
 from labctl.recording.column_map.problems import Problems, rows_text
 from labctl.recording.column_map.units import QUANTITIES, find_unit, is_lsb, names_of, unit_of_target
@@ -48,7 +49,8 @@ def converted(target: str, mapped: MappedColumn, column: RawColumn, problems: Pr
         return mapped.at_zero + mapped.sign * (values - mapped.offset) / mapped.scale
     unit = find_unit(quantity, name) if name else None
     if unit is None:
-        given = f"unit {name!r} is not known" if name else "no unit is given"
+        implied = temperature_unit(column.values).why if quantity == "deg C" and not name else ""
+        given = f"unit {name!r} is not known" if name else "no unit is given" + (f" ({implied})" if implied else "")
         problems.add(_unknown_unit(target, column, quantity, given))
         return None
     found = mapped.sign * (unit.factor * values + unit.zero)

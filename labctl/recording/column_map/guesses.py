@@ -1,61 +1,104 @@
-"""Units that the values of a column show where its name does not say them."""
+"""Units that the values of a column show where its name does not say them: each is tested by what it implies."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.recording.column_map.units import STANDARD_GRAVITY
+from labctl.recording.column_map.implied import EPOCH_S, too_steep
+from labctl.recording.column_map.units import STANDARD_GRAVITY, find_unit
 
 Array = NDArray[np.float64]
 #: Words per g of common accelerometers: powers of two, by the range that is set.
 _WORDS_PER_G = (256.0, 512.0, 1024.0, 2048.0, 4096.0, 8192.0, 16384.0)
 #: A size at rest counts as gravity within this share.
 _GRAVITY_WITHIN = 0.06
-#: Instants since 1970 that logs can be of: 2001 to 2100.
-_EPOCH = (1e9, 4.2e9)
 #: Degrees Celsius, and kelvin, that a thermometer of a gyro may show.
 _CELSIUS, _KELVIN = (-80.0, 180.0), (193.0, 453.0)
-#: Usual steps of time, s, at which only one unit makes sense.
-_STEPS = (1e-5, 0.6)
-#: Whole numbers as time: least and largest step, their unit, and how many of it are a second.
-_WHOLE_STEPS = ((2, 200, "ms", 1e3), (201, 200_000, "us", 1e6), (200_001, 1e12, "ns", 1e9))
+#: A room, deg C, deg F and K: a log begins or stays there, or nearly so.
+_ROOM_C, _ROOM_F, _ROOM_K = (10.0, 50.0), (59.0, 95.0), (280.0, 325.0)
+#: Numbers that never exceed this are no degrees Fahrenheit: all of a log would be colder than any room.
+_NO_FAHRENHEIT = 55.0
+#: Readings per second that a log has where its unit of time is not stated.
+SLOWEST_HZ, FASTEST_HZ = 0.5, 8192.0
+#: Units that the numbers of a clock may be in; a date comes first, since a clock since power-on is seldom as large.
+_CLOCKS = ("epoch s", "epoch ms", "epoch us", "epoch ns", "s", "ms", "us", "ns")
 
 
-def time_unit(values: Array) -> tuple[str, str]:
-    """Return the unit of a column of time and why, both empty where the values leave it open."""
+@dataclass(frozen=True)
+class Guess:
+    """A unit by the values of a column: empty where they leave it open; `why` says what speaks for it, or is open."""
+
+    unit: str = ""
+    why: str = ""
+
+
+def time_unit(values: Array, temperature_c: Array | None = None) -> Guess:
+    """Return the unit of a column of time, (n,): the only one by which nothing impossible follows.
+
+    `temperature_c` are the readings of a thermometer in the same rows: no gyro warms by tens of kelvin in a second.
+    """
     steps = np.diff(values)
     if not len(steps):
-        return "", ""
-    step, first = float(np.median(steps)), float(values[0])
-    for factor, unit in ((1.0, "s"), (1e3, "ms"), (1e6, "us"), (1e9, "ns")):
-        if _EPOCH[0] * factor <= first <= _EPOCH[1] * factor and step / factor <= 86_400:
-            return f"epoch {unit}", f"{first:.0f} {unit} since 1970 is a date"
-    whole = bool(np.all(values == np.round(values)))
-    return _unit_of_step(step, whole=whole)
+        return Guess()
+    step = float(np.median(steps))
+    possible = [name for name in _CLOCKS if _is_possible(name, values, step, temperature_c)]
+    dates = [name for name in possible if name.startswith("epoch")]
+    if dates:
+        unit = find_unit("s", dates[0])
+        assert unit is not None
+        at = np.datetime64(0, "s") + np.timedelta64(int(float(values[0]) * unit.factor), "s")
+        return Guess(dates[0], f"{values[0]:.0f} is {at} UTC, and {_rate(step, dates[0])}")
+    if len(possible) == 1:
+        return Guess(possible[0], f"steps of {step:.6g} are {_rate(step, possible[0])}")
+    return Guess("", "; or ".join(f"in {name} it is {_rate(step, name)}" for name in possible))
 
 
-def _unit_of_step(step: float, *, whole: bool) -> tuple[str, str]:
-    if not whole and _STEPS[0] <= step <= _STEPS[1]:
-        return "s", f"fractions, in steps of {step:.4g}"
-    for least, most, unit, factor in _WHOLE_STEPS:
-        if whole and least <= step <= most:
-            return unit, f"whole numbers in steps of {step:g}: {factor / step:.4g} readings a second"
-    return "", ""
+def _is_possible(name: str, values: Array, step: float, temperature_c: Array | None) -> bool:
+    factor = _factor(name)
+    if not SLOWEST_HZ <= 1.0 / max(step * factor, 1e-12) <= FASTEST_HZ:
+        return False
+    is_date = EPOCH_S[0] <= float(values[0]) * factor <= EPOCH_S[1]
+    if name.startswith("epoch") != is_date:
+        return False
+    return temperature_c is None or not too_steep(values * factor, temperature_c)
 
 
-def temperature_unit(values: Array) -> tuple[str, str]:
-    """Return the unit of a column of temperature and why, both empty where the values leave it open."""
+def _factor(name: str) -> float:
+    unit = find_unit("s", name)
+    assert unit is not None  # of _CLOCKS
+    return unit.factor
+
+
+def _rate(step: float, name: str) -> str:
+    return f"{1.0 / (step * _factor(name)):.4g} readings a second"
+
+
+def temperature_unit(values: Array) -> Guess:
+    """Return the unit of a column of temperature; open where the readings make sense in two units."""
     finite = values[np.isfinite(values)]
     if not len(finite):
-        return "", ""
+        return Guess()
     low, high = float(finite.min()), float(finite.max())
+    usual = (float(finite[0]), float(np.median(finite)))
     said = f"{low:.4g} to {high:.4g}"
-    if _KELVIN[0] <= low and high <= _KELVIN[1]:
-        return "K", said
-    if _CELSIUS[0] <= low and high <= _CELSIUS[1]:
-        return "deg C", said
-    return "", ""
+    if _KELVIN[0] <= low and high <= _KELVIN[1] and _any_within(_ROOM_K, usual) and not _whole(finite):
+        return Guess("K", said)
+    if not (_CELSIUS[0] <= low and high <= 180.0 * 9 / 5 + 32):
+        return Guess()  # words of a converter, say, which a recording can do without
+    is_celsius = high <= _CELSIUS[1] and (
+        high <= _NO_FAHRENHEIT or (_any_within(_ROOM_C, usual) and not _any_within(_ROOM_F, usual))
+    )
+    if is_celsius:
+        return Guess("deg C", said)
+    low_c, high_c = ((each - 32.0) / 1.8 for each in (low, high))
+    return Guess("", f"{said} deg C and {said} degF ({low_c:.3g} to {high_c:.3g} deg C) are both possible")
+
+
+def _any_within(limits: tuple[float, float], values: tuple[float, ...]) -> bool:
+    return any(limits[0] <= value <= limits[1] for value in values)
 
 
 def force_unit(force: Array, still: NDArray[np.bool_]) -> tuple[str, float | None, str]:

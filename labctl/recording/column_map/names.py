@@ -22,7 +22,7 @@ _RAW = r"[_ ]?(?:raw[_ ]?)?"
 _GYRO = "gyroscope|gyro|gyr|angularvelocity|angular velocity|angvel|angular rate|omega|rotationrate|rotation rate"
 _ACCEL = "accelerometer|acceleration|accel|acc|specific force|linear acceleration"
 _TABLE = "table|rig|turntable|stage"
-_TIME = "time ?stamp|time|clock|datetime|date|millis|micros|epoch|stamp|t|elapsed|uptime|seconds"
+_TIME = "time ?stamp|time|clock|datetime|date|millis|micros|nanos|epoch|stamp|t|elapsed|uptime|seconds"
 
 #: Names, folded -> column of a recording; `{axis}` is the axis that the name has.
 _RULES: tuple[tuple[str, str], ...] = (
@@ -50,6 +50,8 @@ _RULES: tuple[tuple[str, str], ...] = (
     (r"(?:position|orientation|up|up axis)", "position"),
     (r"valid", "valid"),
 )
+#: Names of clocks that are names of their unit.
+_CLOCKS = {"millis": "ms", "micros": "us", "nanos": "ns", "seconds": "s"}
 _COMPILED = tuple((re.compile(pattern), target) for pattern, target in _RULES)
 #: Names of columns that number or name stretches of a log.
 PARTS = re.compile(
@@ -86,9 +88,35 @@ def name_says(name: str) -> NameSays:
     for stem, unit in _divided(stripped):
         target = _target(stem)
         if target and _is_unit_of(target, unit):
-            return NameSays(target, unit)
+            return NameSays(target, unit or (_CLOCKS.get(folded(stem), "") if target == "t_s" else ""))
     brackets = _BRACKETS.match(stripped)
-    return NameSays(_target(brackets[1] if brackets is not None else stripped), "")  # a unit that is not known is none
+    if brackets is None:
+        return NameSays(_target(stripped), "")
+    target = _target(brackets[1])
+    if is_unit(brackets[2]) and not target.startswith("gyro_"):
+        # of another quantity than the name says: T[C] is no time, and temp [V] no temperature yet
+        return _by_unit(brackets[1], brackets[2])
+    return NameSays(target, "")  # a unit that is not known is none
+
+
+def is_unit(text: str) -> bool:
+    """Whether a text names a unit of any quantity."""
+    return is_lsb(text) or any(find_unit(quantity, text) is not None for quantity in QUANTITIES)
+
+
+def _by_unit(stem: str, unit: str) -> NameSays:
+    """Return what a name means whose one letter is that of two quantities, by its unit."""
+    if folded(stem) in {"t", "t imu", "t gyro", "temp"} and find_unit("deg C", unit) is not None:
+        return NameSays("temperature_c", unit)
+    return NameSays("", "")
+
+
+def in_unit(name: str, unit: str) -> NameSays:
+    """Return what a name says whose unit the file states apart from it, as in a second row of the header."""
+    says = name_says(name)
+    if says.unit or not is_unit(unit):
+        return says
+    return name_says(f"{name.strip()} [{unit}]")
 
 
 def _divided(name: str) -> list[tuple[str, str]]:

@@ -3,16 +3,26 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.recording.column_map.guesses import force_unit, temperature_unit, time_unit
-from labctl.recording.column_map.model import QUANTITY_COLUMNS, ColumnMap, DataSets, FileKeys, MappedColumn
+from labctl.recording.column_map.dates import is_date
+from labctl.recording.column_map.guesses import Guess, force_unit, temperature_unit, time_unit
+from labctl.recording.column_map.model import (
+    QUANTITY_COLUMNS,
+    ColumnMap,
+    DataSets,
+    FileKeys,
+    MappedColumn,
+    Quantity,
+    UnitKeys,
+)
 from labctl.recording.column_map.movement import Movement, movement
-from labctl.recording.column_map.names import COUNTERS, PARTS, folded, name_says
+from labctl.recording.column_map.names import COUNTERS, PARTS, NameSays, folded, in_unit, name_says
 from labctl.recording.column_map.units import find_unit, is_lsb, unit_of_target
 from labctl.recording.columns import holds_flags
 from labctl.recording.raw_table import RawColumn, RawTable
@@ -25,6 +35,9 @@ GAP_STEPS, GAP_S = 100.0, 30.0
 _SEPARATORS = {"\t": "tab", " ": "space"}
 
 
+Units = Mapping[Quantity, UnitKeys]
+
+
 @dataclass
 class Proposal:
     """A map, and in words what was guessed by values and not read from names."""
@@ -33,12 +46,17 @@ class Proposal:
     guesses: list[str] = field(default_factory=list)
 
 
-def propose(table: RawTable, serial: str | None = None) -> Proposal:
-    """Return a map of a log, as far as the file shows it; what it cannot show stays open and is a problem later."""
+def propose(table: RawTable, serial: str | None = None, stated: Units | None = None) -> Proposal:
+    """Return a map of a log, as far as the file shows it; what it cannot show stays open and is a problem later.
+
+    What `stated` says of the units of a quantity is not guessed.
+    """
     guesses: list[str] = []
+    stated = stated or {}
     columns = {target: MappedColumn.of(name) for name, target in table.targets.items() if name in table.columns}
     if not columns:
-        columns = _by_names(table, guesses)
+        columns = _by_names(table, guesses, stated)
+    columns = {target: _in_stated(target, mapped, stated) for target, mapped in columns.items()}
     found = {target: table.columns[str(mapped.source)] for target, mapped in columns.items()}
     kind = "samples" if "t_s" in columns or "table_rate_dps" not in columns else "points"
     _guess_force(columns, found, guesses)
@@ -54,61 +72,99 @@ def propose(table: RawTable, serial: str | None = None) -> Proposal:
 
 def completed(table: RawTable, given: ColumnMap) -> Proposal:
     """Return a map that was given, with what it leaves to the file: columns where it names none, units by [units]."""
-    guesses: list[str] = []
-    changes: dict[str, Any] = {}
-    columns = given.columns
-    if not columns:
-        proposal = propose(table, given.serial)
-        guesses, columns = proposal.guesses, proposal.column_map.columns
-        left = given.model_fields_set
-        kept = {"kind": proposal.column_map.kind, "datasets": proposal.column_map.datasets}
-        changes = {key: value for key, value in kept.items() if key not in left}
-    for quantity, keys in given.units.items():
-        begins = QUANTITY_COLUMNS[quantity]
+    if given.columns:
         columns = {
-            target: mapped.model_copy(update=keys.model_dump()) if target.startswith(begins) else mapped
-            for target, mapped in columns.items()
+            target: mapped if mapped.unit else _in_stated(target, mapped, given.units)
+            for target, mapped in given.columns.items()
         }
-        guesses = [guess for guess in guesses if not guess.startswith("accelerometer" if quantity == "accel" else " ")]
-    return Proposal(given.model_copy(update={**changes, "columns": columns}), guesses)
+        return Proposal(given.model_copy(update={"columns": columns}))
+    proposal = propose(table, given.serial, given.units)
+    kept = {"kind": proposal.column_map.kind, "datasets": proposal.column_map.datasets}
+    changes: dict[str, Any] = {key: value for key, value in kept.items() if key not in given.model_fields_set}
+    columns = proposal.column_map.columns
+    if given.sample_rate_hz is not None and "t_s" in columns and _is_open(table, columns["t_s"]):
+        columns = {target: mapped for target, mapped in columns.items() if target != "t_s"}
+    return Proposal(given.model_copy(update={**changes, "columns": columns}), proposal.guesses)
 
 
-def _by_names(table: RawTable, guesses: list[str]) -> dict[str, MappedColumn]:
+def _is_open(table: RawTable, mapped: MappedColumn) -> bool:
+    """Whether the unit of a column is not known."""
+    return not (mapped.unit or table.columns[str(mapped.source)].unit)
+
+
+def stated_units(target: str, stated: Units) -> UnitKeys | None:
+    """Return what [units] of a map says of a column of a recording; None for nothing."""
+    return next((keys for name, keys in stated.items() if target.startswith(QUANTITY_COLUMNS[name])), None)
+
+
+def _in_stated(target: str, mapped: MappedColumn, stated: Units) -> MappedColumn:
+    keys = stated_units(target, stated)
+    return mapped if keys is None else mapped.model_copy(update=keys.model_dump(exclude_unset=True))
+
+
+def _by_names(table: RawTable, guesses: list[str], stated: Units) -> dict[str, MappedColumn]:
     columns: dict[str, MappedColumn] = {}
-    for name, column in table.columns.items():
-        says = name_says(name)
+    said = {name: _name_says(table, name) for name in table.columns}
+    for name in sorted(said, key=lambda each: said[each].target == "t_s"):  # a thermometer tests the unit of time
+        column, says = table.columns[name], said[name]
         if not says.target or says.target == "dataset" or _is_counter(says.target, column):
             continue
-        unit = column.unit or says.unit
-        mapped = _with_unit(name, says.target, unit, column, guesses)
-        if mapped is None:
-            continue
+        keys = stated_units(says.target, stated)
+        unit = keys.unit if keys is not None else column.unit or says.unit
         held = columns.get(says.target)
-        if held is None or (not _has_unit(says.target, held) and mapped.unit):
+        if held is not None and (_has_unit(says.target, held) or not unit):
+            continue
+        if keys is not None and column.is_number:
+            columns[says.target] = MappedColumn.of(name)  # what was stated is filled in later
+            continue
+        warm = columns.get("temperature_c")
+        mapped = _with_unit(name, says.target, unit, column, guesses, _celsius(table, warm))
+        if mapped is not None:
             columns[says.target] = mapped
-    return columns
+    order = list(table.columns)
+    return dict(sorted(columns.items(), key=lambda each: order.index(str(each[1].source))))
 
 
-def _with_unit(name: str, target: str, unit: str, column: RawColumn, guesses: list[str]) -> MappedColumn | None:
-    """Return the mapped column; None for one that cannot be used without a known unit."""
+def _name_says(table: RawTable, name: str) -> NameSays:
+    """Return what a name says: a `T` beside a column of time is a temperature."""
+    unit = table.columns[name].unit
+    says = in_unit(name, unit) if unit else name_says(name)
+    others = (name_says(other).target for other in table.columns if other != name)
+    if says.target == "t_s" and name.strip() == "T" and "t_s" in others:
+        return NameSays("temperature_c", unit)
+    return says
+
+
+def _celsius(table: RawTable, mapped: MappedColumn | None) -> Array | None:
+    """Return the readings of a thermometer, (n,) deg C; None where there is none in a known unit."""
+    if mapped is None:
+        return None
+    column = table.columns[str(mapped.source)]
+    unit = find_unit("deg C", mapped.unit or column.unit)
+    return None if unit is None else unit.factor * column.values + unit.zero
+
+
+def _with_unit(
+    name: str, target: str, unit: str, column: RawColumn, guesses: list[str], temperature_c: Array | None
+) -> MappedColumn | None:
+    """Return the mapped column; None for one that is of no use without a known unit."""
     quantity = unit_of_target(target)
     if column.is_boolean:
         return MappedColumn.of(name) if holds_flags(target) else None
     if target == "t_s" and column.is_text:
-        return MappedColumn.of(name, "date-time") if _dates(column) else None
+        return MappedColumn.of(name, unit or "date-time") if _dates(column) else None
     if column.is_text:
         return MappedColumn.of(name) if target == "position" else None
-    why = ""
-    if target == "t_s":
-        guessed, why = time_unit(column.values)
-        if unit and not (guessed.startswith("epoch") and find_unit("s", guessed.removeprefix("epoch "))):
-            why = ""
-        else:
-            unit = guessed
-    elif quantity == "deg C" and not unit:
-        unit, why = temperature_unit(column.values)
-    if why:
-        guesses.append(f"column {name!r}: unit taken for {unit} ({why})")
+    guess = Guess()
+    if not unit and target == "t_s":
+        guess = time_unit(column.values, temperature_c)
+    elif not unit and quantity == "deg C":
+        guess = temperature_unit(column.values)
+    if guess.unit:
+        guesses.append(f"column {name!r}: unit taken for {guess.unit} ({guess.why})")
+    if guess.why and quantity == "deg C":
+        return MappedColumn.of(name, guess.unit)  # where two units are possible, it is asked for
+    unit = unit or guess.unit
     if quantity in {"deg C", "V", "microtesla", "deg"} and (not unit or is_lsb(unit)):
         return None  # a recording can do without it, so its unit is not asked for
     return MappedColumn.of(name, "" if is_lsb(unit) else unit)
@@ -119,7 +175,7 @@ def _has_unit(target: str, mapped: MappedColumn) -> bool:
 
 
 def _dates(column: RawColumn) -> bool:
-    return column.words is not None and re.match(r"\d{4}-\d\d-\d\d[ T]\d\d:\d\d", str(column.words[0])) is not None
+    return column.words is not None and is_date(str(column.words[0]))
 
 
 def _is_counter(target: str, column: RawColumn) -> bool:

@@ -12,6 +12,9 @@ from pydantic import ValidationError
 
 from labctl.recording.column_map.conversion import converted, output_of
 from labctl.recording.column_map.data_sets import Division, divide
+from labctl.recording.column_map.dates import ORDERS
+from labctl.recording.column_map.idle import idle_entries
+from labctl.recording.column_map.implied import STEEPEST_K_S, steepest_k_s
 from labctl.recording.column_map.model import ColumnMap
 from labctl.recording.column_map.motion import free_motion, missing_columns, motion_of
 from labctl.recording.column_map.movement import Movement, movement
@@ -19,6 +22,7 @@ from labctl.recording.column_map.problems import Problems
 from labctl.recording.column_map.proposal import serial_of
 from labctl.recording.column_map.sources import refuse_wrong_cells, sources, unused
 from labctl.recording.column_map.time_axis import TimeAxis, time_axis
+from labctl.recording.column_map.units import find_unit
 from labctl.recording.columns import BY_NAME, holds_flags
 from labctl.recording.info import NO_DATE, Motion, OutputUnit, RecordingInfo
 from labctl.recording.raw_table import RawColumn, RawTable
@@ -52,7 +56,7 @@ class MappedLog:
 def recording_of(table: RawTable, column_map: ColumnMap) -> MappedLog:
     """Return the recording that a map makes of a log; raises BadFile with everything that is wrong."""
     problems = Problems(table.path)
-    for line in table.problems:
+    for line in (*table.problems, *idle_entries(table, column_map)):
         problems.add(line)
     found = sources(table, column_map, problems)
     if table.rows < LEAST_ROWS:
@@ -87,13 +91,8 @@ def _times(column_map: ColumnMap, column: RawColumn | None, rows: int, problems:
 
 
 def _is_date(column_map: ColumnMap, column: RawColumn) -> bool:
-    return (column_map.columns["t_s"].unit or column.unit).lower() in {
-        "date-time",
-        "iso",
-        "iso8601",
-        "iso 8601",
-        "datetime",
-    }
+    unit = find_unit("s", column_map.columns["t_s"].unit or column.unit)
+    return unit is not None and unit.name in ORDERS
 
 
 def _is_usable(target: str, column: RawColumn) -> bool:
@@ -135,6 +134,7 @@ def _assembled(
     columns["dataset"] = division.numbers
     _fill_constants(column_map, division, columns)
     _refuse_force(columns, moved, problems)
+    _refuse_steep(column_map, columns, times.t_s, problems)
     motion = column_map.motion or motion_of(columns, column_map.kind, moved, times.t_s)
     if motion is None:
         problems.add(free_motion(columns, moved, times.t_s))
@@ -187,6 +187,18 @@ def _refuse_force(columns: dict[str, Any], moved: Movement, problems: Problems) 
         )
 
 
+def _refuse_steep(column_map: ColumnMap, columns: dict[str, Any], t_s: Array, problems: Problems) -> None:
+    """Add a problem where the gyro's temperature would change faster than any does: by a wrong unit of time, mostly."""
+    if column_map.kind != "samples" or "temperature_c" not in column_map.columns or "temperature_c" not in columns:
+        return
+    steepest = steepest_k_s(t_s, np.asarray(columns["temperature_c"], dtype=np.float64))
+    if steepest > STEEPEST_K_S:
+        problems.add(
+            f"temperature_c: would change by {steepest:.3g} K/s (at most {STEEPEST_K_S:g} K/s are possible); check the "
+            "unit of the column of time, or sample_rate_hz, and that of the temperature"
+        )
+
+
 def _info(
     table: RawTable, column_map: ColumnMap, motion: Motion, output: dict[str, OutputUnit], times: TimeAxis,
     problems: Problems,
@@ -205,7 +217,9 @@ def _info(
         "motion": motion,
         "started_at": started or NO_DATE, "date_known": started is not None, "output": output,
         "sample_rate_hz": column_map.sample_rate_hz,
-        "notes": str(column_map.info.get("notes") or table.facts.get("notes") or ""),
+        "notes": "; ".join(
+            filter(None, (str(column_map.info.get("notes") or table.facts.get("notes") or ""), times.said))
+        ),
     }  # fmt: skip
     if table.unread is not None:
         head |= {"unread": table.unread.text, "unread_share": table.unread.share}

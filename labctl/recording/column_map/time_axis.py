@@ -9,24 +9,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.recording.checks import LONGEST_RECORDING_S
+from labctl.recording.column_map.dates import EXPECTED, ORDERS, instants
+from labctl.recording.column_map.guesses import time_unit
+from labctl.recording.column_map.implied import EPOCH_S, FASTEST_HZ
 from labctl.recording.column_map.model import ColumnMap
 from labctl.recording.column_map.problems import Problems, rows_text
-from labctl.recording.column_map.units import find_unit, names_of
+from labctl.recording.column_map.stamps import Spread, spread_between
+from labctl.recording.column_map.units import Unit, find_unit, names_of
 from labctl.recording.raw_table import RawColumn
 
 Array = NDArray[np.float64]
-#: Usual steps of time that a log can have, s: 1 MHz to once a day.
-SHORTEST_STEP_S, LONGEST_STEP_S = 1e-6, 86_400.0
+#: Usual steps of time that a log can have, s: 50,000 readings a second to once a day.
+SHORTEST_STEP_S, LONGEST_STEP_S = 1.0 / FASTEST_HZ, 86_400.0
+#: A rate that a map states agrees with that of the times within this share.
+RATE_WITHIN = 0.02
 #: Counters that begin again, bits.
 _COUNTERS = (16, 24, 32)
 
 
 @dataclass(frozen=True)
 class TimeAxis:
-    """Times of readings, (n,) s, and the instant of their zero where the file tells it."""
+    """Times of readings, (n,) s, the instant of their zero where the file tells it, and what was done to them."""
 
     t_s: Array
     started_at: datetime | None
+    said: str = ""
 
 
 def time_axis(column_map: ColumnMap, column: RawColumn | None, rows: int, problems: Problems) -> TimeAxis | None:
@@ -43,27 +50,50 @@ def time_axis(column_map: ColumnMap, column: RawColumn | None, rows: int, proble
     name = mapped.unit or column.unit
     unit = find_unit("s", name) if name else None
     if unit is None:
-        step = float(np.median(np.diff(column.values))) if rows > 1 and not column.is_text else float("nan")
-        problems.add(
-            f"column {column.name!r} for t_s: no unit is given (its typical step is {step:g}); write its unit in "
-            f"[units] or [columns.t_s] of the column map: one of {names_of('s').rpartition(',')[0]}"
-        )
+        problems.add(_unknown(column, rows))
         return None
-    if unit.name == "date-time":
-        return _dates(column, problems)
+    if unit.name in ORDERS:
+        return _dates(column, unit.name, column_map.sample_rate_hz, problems)
     if column.is_text:
         return None
     values = column.values
     if mapped.wrap_bits is not None:
         values = np.unwrap(values, period=2.0**mapped.wrap_bits)
-    if unit.is_epoch:
-        zero = float(values[0]) * unit.factor
-        started = _instant(column, zero, problems)
-        found = TimeAxis((values - values[0]) * unit.factor, started)
-    else:
-        found = TimeAxis(values * unit.factor, None)
+    counted = values * unit.factor
+    started = None
+    # a unit without "epoch" whose numbers count from 1970: no clock since power-on has run for 30 years
+    if unit.is_epoch or (len(values) and EPOCH_S[0] <= counted[0] <= EPOCH_S[1]):
+        started = _instant(column, float(counted[0]), problems)
+        counted = (values - values[0]) * unit.factor
+    found = _finer(column, TimeAxis(counted, started), problems)
     _refuse_backwards(column, values, found.t_s, problems, wraps=mapped.wrap_bits is None)
+    _refuse_impossible(column, unit, found.t_s, column_map.sample_rate_hz, problems)
     return found
+
+
+def _unknown(column: RawColumn, rows: int) -> str:
+    readable = rows > 1 and not column.is_text
+    step = float(np.median(np.diff(column.values))) if readable else float("nan")
+    implied = time_unit(column.values).why if readable else ""
+    shown = f"; {implied}" if implied else ""
+    where = "[units] or [columns.t_s] of the column map"
+    return (
+        f"column {column.name!r} for t_s: no unit is given (its typical step is {step:g}{shown}); write its unit in "
+        f"{where}: one of {names_of('s').rpartition(',')[0]}"
+    )
+
+
+def _finer(column: RawColumn, found: TimeAxis, problems: Problems) -> TimeAxis:
+    """Return the times with those between coarse stamps, such as whole seconds, where several readings share one."""
+    between = spread_between(found.t_s)
+    if isinstance(between, str):
+        problems.add(f"column {column.name!r} (time): {between}")
+    if not isinstance(between, Spread):
+        return found
+    zero_s = float(between.t_s[0] - found.t_s[0]) if found.started_at is not None else 0.0
+    started = None if found.started_at is None else found.started_at + timedelta(seconds=zero_s)
+    said = f"column {column.name!r}: {between.said}"
+    return TimeAxis(between.t_s - (between.t_s[0] if started is not None else 0.0), started, said)
 
 
 def _instant(column: RawColumn, epoch_s: float, problems: Problems) -> datetime | None:
@@ -74,25 +104,20 @@ def _instant(column: RawColumn, epoch_s: float, problems: Problems) -> datetime 
         return None
 
 
-def _dates(column: RawColumn, problems: Problems) -> TimeAxis | None:
+def _dates(column: RawColumn, unit: str, rate_hz: float | None, problems: Problems) -> TimeAxis | None:
     words = column.words
     if words is None:
-        problems.add(f"column {column.name!r} for t_s: unit = 'date-time' and the column holds numbers; check its unit")
+        problems.add(f"column {column.name!r} for t_s: unit = {unit!r} and the column holds numbers; check its unit")
         return None
     try:
-        naive = np.array([_utc(word) for word in words.tolist()], dtype="datetime64[us]")
+        read = instants(words.tolist(), unit)
     except ValueError as error:
-        problems.add(f"column {column.name!r} for t_s: {error}; expected dates such as 2026-01-05T08:00:00.250Z")
+        problems.add(f"column {column.name!r} for t_s: {error}; expected {EXPECTED}")
         return None
-    t_s = (naive - naive[0]) / np.timedelta64(1, "s")
-    started = naive[0].astype(datetime).replace(tzinfo=UTC)
-    _refuse_backwards(column, t_s, t_s, problems, wraps=False)
-    return TimeAxis(t_s, started)
-
-
-def _utc(word: str) -> datetime:
-    found = datetime.fromisoformat(word)
-    return found.astimezone(UTC).replace(tzinfo=None) if found.tzinfo else found
+    found = _finer(column, TimeAxis(read.t_s, read.first), problems)
+    _refuse_backwards(column, found.t_s, found.t_s, problems, wraps=False)
+    _refuse_impossible(column, None, found.t_s, rate_hz, problems)
+    return found
 
 
 def _refuse_backwards(column: RawColumn, raw: Array, t_s: Array, problems: Problems, *, wraps: bool) -> None:
@@ -118,9 +143,26 @@ def _refuse_backwards(column: RawColumn, raw: Array, t_s: Array, problems: Probl
             f"column {column.name!r} (time), row {row + 1}: {raw[row]:.12g} after {raw[row - 1]:.12g}; a recording "
             f"lasts at most {LONGEST_RECORDING_S:.9g} s; leave out rows with a damaged time, or check the column's unit"
         )
-    usual = float(np.median(steps)) if len(steps) else 1.0
-    if np.isfinite(usual) and usual > 0 and not SHORTEST_STEP_S <= usual <= LONGEST_STEP_S:
+
+
+def _refuse_impossible(
+    column: RawColumn, unit: Unit | None, t_s: Array, rate_hz: float | None, problems: Problems
+) -> None:
+    """Add a problem where the usual step is impossible, or is not that of the rate which the map states."""
+    usual = float(np.median(np.diff(t_s))) if len(t_s) > 1 else 1.0
+    if not np.isfinite(usual) or usual <= 0:
+        return
+    if rate_hz is not None:  # two statements that agree prove a rate, however fast
+        if abs(rate_hz * usual - 1) > RATE_WITHIN:
+            problems.add(
+                f"column {column.name!r} (time): {1 / usual:.6g} readings a second, where sample_rate_hz = "
+                f"{rate_hz:g}; correct the unit of the column, or leave sample_rate_hz or the column out of the map"
+            )
+    elif not SHORTEST_STEP_S < usual <= LONGEST_STEP_S:
+        said = "" if unit is None else f" in {unit.name}"
+        fits = "" if unit is None else time_unit(column.values).unit
+        hint = f"; {fits!r} would fit" if fits and unit is not None and fits != unit.name else ""
         problems.add(
-            f"column {column.name!r} (time): the usual step would be {usual:g} s ({SHORTEST_STEP_S:g} to "
-            f"{LONGEST_STEP_S:g} s are possible); check the column's unit"
+            f"column {column.name!r} (time): the usual step would be {usual:g} s{said} ({SHORTEST_STEP_S:g} to "
+            f"{LONGEST_STEP_S:g} s are possible); check the column's unit{hint}"
         )

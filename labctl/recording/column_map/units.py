@@ -43,6 +43,8 @@ _TIME = (
     Unit("epoch us", 1e-6, is_epoch=True, aliases=("epoch_us", "unix us")),
     Unit("epoch ns", 1e-9, is_epoch=True, aliases=("epoch_ns", "unix ns")),
     Unit("date-time", 1.0, is_epoch=True, aliases=("iso", "iso8601", "iso 8601", "datetime")),
+    Unit("date-time d/m/y", 1.0, is_epoch=True, aliases=("d/m/y", "dd/mm/yyyy")),
+    Unit("date-time m/d/y", 1.0, is_epoch=True, aliases=("m/d/y", "mm/dd/yyyy")),
 )
 _TEMPERATURE = (
     Unit("deg C", 1.0, aliases=("c", "°c", "degc", "celsius", "deg_c", "℃")),

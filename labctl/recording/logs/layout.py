@@ -10,6 +10,7 @@ from pathlib import Path
 
 from labctl.errors import BadRecording
 from labctl.recording.column_map.model import SEPARATORS, FileKeys
+from labctl.recording.column_map.names import is_unit
 from labctl.recording.logs.encoding import encoding_of
 from labctl.recording.raw_table import FileLayout
 
@@ -19,6 +20,8 @@ LOOKED_AT = 200
 LONGEST_LINE = 1 << 15
 _NUMBER = re.compile(r"[+-]?(\d+([.,]\d*)?|[.,]\d+)([eE][+-]?\d+)?")
 _COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?")
+#: What stands in a row of units for a column that has none.
+_NO_UNIT = frozenset({"", "-", "–", "1", "n/a", "none", "no", "#"})
 _MISSING = frozenset({"", "nan", "na", "n/a", "null", "none", "inf", "-inf"})
 
 
@@ -41,8 +44,16 @@ def lines_of(path: Path, head: bytes, encoding: str) -> list[str]:
     return whole[:LOOKED_AT]
 
 
-def layout_of(path: Path, head: bytes, given: FileKeys) -> tuple[FileLayout, list[str]]:
-    """Return how a file is divided and the names of its columns; what `given` says is not looked for."""
+@dataclass(frozen=True)
+class Header:
+    """Names of the columns, and their units where a row below the names states them, else empty."""
+
+    names: list[str]
+    units: list[str]
+
+
+def layout_of(path: Path, head: bytes, given: FileKeys) -> tuple[FileLayout, Header]:
+    """Return how a file is divided and what its header says; what `given` says is not looked for."""
     encoding = given.encoding or encoding_of(path, head)
     lines = lines_of(path, head, encoding)
     if not any(line.strip() for line in lines):
@@ -51,6 +62,9 @@ def layout_of(path: Path, head: bytes, given: FileKeys) -> tuple[FileLayout, lis
     cells = [split(line, separator) for line in lines]
     data = given.data or _first_data(path, lines, cells)
     header = _header(lines, cells, data) if given.header is None else given.header
+    stated = _units_row(cells, header, data)
+    if given.header is None and stated == header:
+        header = _header(lines, cells, stated) or header
     below = [row for line, row in zip(lines[data - 1 :], cells[data - 1 :], strict=True) if line.strip()]
     width = Counter(len(row) for row in below).most_common(1)[0][0] if below else 0
     if width == 0:
@@ -63,7 +77,9 @@ def layout_of(path: Path, head: bytes, given: FileKeys) -> tuple[FileLayout, lis
             f"{path}: header = {header} is beyond the {len(lines)} lines at the beginning of the "
             "file that labctl reads; correct header in [file]"
         )
-    return FileLayout(encoding, separator, decimal, header, data), _names(cells[header - 1] if header else [], width)
+    names = _names(cells[header - 1] if header else [], width)
+    units = [_bare(cell) for cell in cells[stated - 1][:width]] if 0 < stated != header else []
+    return FileLayout(encoding, separator, decimal, header, data), Header(names, units + [""] * (width - len(units)))
 
 
 def split(line: str, separator: str) -> list[str]:
@@ -121,6 +137,19 @@ def _header(lines: list[str], cells: list[list[str]], data: int) -> int:
         if len(cells[index]) >= max(1, width - 1) and row and words >= 0.5 * len(row):
             return index + 1
     return 0
+
+
+def _units_row(cells: list[list[str]], header: int, data: int) -> int:
+    """Return the line, from 1, between the names and the data that holds units alone; 0 where there is none."""
+    for line in range(max(header, 1), data):
+        row = [_bare(cell) for cell in cells[line - 1]]
+        if any(map(is_unit, row)) and all(is_unit(cell) or cell in _NO_UNIT for cell in row):
+            return line
+    return 0
+
+
+def _bare(cell: str) -> str:
+    return cell.strip().lstrip("#").strip().strip('"').strip("[]() \t")
 
 
 def _decimal(rows: list[list[str]], separator: str) -> str:

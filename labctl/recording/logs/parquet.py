@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.errors import BadRecording
+from labctl.recording.column_map.names import name_says
 from labctl.recording.data_files.parquet import MAGIC, is_boolean, read_parquet
 from labctl.recording.importer import TableImporter, TableOptions
 from labctl.recording.logs.recognition import head_of
@@ -17,6 +18,8 @@ from labctl.recording.unread import share_text
 
 #: No instrument gives a number above this; random bits do.
 LARGEST_NUMBER = 1e30
+#: Zeros in a row that no noise gives, among readings of which more than this share differ from each other.
+LEAST_ZEROS, MOST_EQUAL = 64, 0.5
 
 
 def probe(path: Path) -> float:
@@ -50,6 +53,35 @@ def _refuse_damaged_values(path: Path, columns: Mapping[str, NDArray[np.generic]
                 f"{path}: column {name[:80]!r}, rows {rows[0]} to {rows[-1]}: {share_text(len(rows) / len(values))} of "
                 f"the numbers are larger than {LARGEST_NUMBER:g}, which damage leaves; write or copy the file again"
             )
+        if values.dtype.kind == "f" and _varies(name) and (zeros := _zeroed(values)) is not None:
+            raise BadRecording(
+                f"{path}: column {name[:80]!r}, rows {zeros[0] + 1} to {zeros[1]}: {zeros[1] - zeros[0]} exact zeros "
+                "in a row among readings that differ from each other, as an erased page leaves them; write or copy the "
+                "file again, or leave these rows out"
+            )
+
+
+def _varies(name: str) -> bool:
+    """Whether readings under a name vary by noise, so that long runs of them are never exactly 0."""
+    return name_says(name).target.startswith(("gyro_", "accel_", "field_", "temperature_", "t_s"))
+
+
+def _zeroed(values: NDArray[np.generic]) -> tuple[int, int] | None:
+    """Return the longest run of exact zeros as (first row, row after the last), from 0; None where it is no damage.
+
+    Readings in coarse steps are 0 by chance, and a column without use is 0 everywhere: of both most values are equal.
+    """
+    is_zero = values == 0
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], is_zero, [False]]).astype(np.int8)))
+    starts, ends = edges[::2], edges[1::2]
+    if not len(starts):
+        return None
+    longest = int(np.argmax(ends - starts))
+    first, after = int(starts[longest]), int(ends[longest])
+    others = np.concatenate([values[:first], values[after:]])
+    if after - first < LEAST_ZEROS or len(others) < LEAST_ZEROS:
+        return None
+    return (first, after) if len(np.unique(others)) > MOST_EQUAL * len(others) else None
 
 
 def _column(name: str, values: np.ndarray, *, is_boolean: bool) -> RawColumn:

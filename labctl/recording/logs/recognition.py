@@ -13,8 +13,18 @@ MOST_TEXT_BYTES = 1_000_000_000
 MOST_LOG_BYTES = 1_000_000_000
 HEAD_BYTES = 1 << 16
 
+#: R's own command, which any installation of R has.
+AS_CSV_BY_R = (
+    'write it as CSV: Rscript -e \'n <- load("FILE.rda"); write.csv(as.data.frame(get(n[1])), "FILE.csv", '
+    "row.names=FALSE)'"
+)
+RDS_AS_CSV_BY_R = (
+    'write it as CSV: Rscript -e \'write.csv(as.data.frame(readRDS("FILE.rds")), "FILE.csv", row.names=FALSE)\''
+)
 #: First bytes -> what begins so, and what to do with it.
 _SIGNATURES: tuple[tuple[bytes, str, str], ...] = (
+    *((begin, "R data", AS_CSV_BY_R) for begin in (b"RDX2\n", b"RDX3\n", b"RDA2\n", b"RDA3\n")),
+    *((begin, "an R object (.rds)", RDS_AS_CSV_BY_R) for begin in (b"X\n\x00\x00\x00", b"A\n2\n", b"A\n3\n")),
     (b"PK\x03\x04", "a zip archive or a spreadsheet", "unpack it and import the log itself, or save the sheet as CSV"),
     (b"PK\x05\x06", "an empty zip archive", "import the log itself"),
     (b"\x1f\x8b", "packed with gzip", "unpack it with gunzip and import the log itself"),

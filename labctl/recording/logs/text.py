@@ -50,7 +50,8 @@ def read_text(path: Path, options: TextOptions) -> RawTable:
     head = head_of(path)
     refuse_other(path, head)
     refuse_large(path, MOST_TEXT_BYTES)
-    layout, names = layout_of(path, head, options.file)
+    layout, header = layout_of(path, head, options.file)
+    names = header.names
     _refuse_names(path, names)
     blocks, ragged = _blocks(path, layout, names)
     cut = cut_last_line(path, layout.encoding, layout.separator)
@@ -60,9 +61,9 @@ def read_text(path: Path, options: TextOptions) -> RawTable:
     if rows == 0:
         raise BadRecording(f"{path}: no row of {len(names)} columns below the header; expected at least one")
     columns = {}
-    for name in names:
+    for name, unit in zip(names, header.units, strict=True):
         pieces = [block.column(name) for block in blocks]
-        columns[name] = column_of(name, pieces, layout.decimal)
+        columns[name] = column_of(name, pieces, layout.decimal, unit)
         blocks = [block.drop_columns([name]) for block in blocks]
     return RawTable(
         path,

@@ -30,6 +30,8 @@ Array = NDArray[np.float64]
 _LINE = re.compile(r"^(?:\d+[\t ]+\d+[\t ]+)?([A-Z][A-Z0-9_]*)[\t ,]+([-+.0-9eE]+)(?:[\t ,]+\d+)?\s*$", re.MULTILINE)
 _PX4 = re.compile(r"\bTC_G(\d)_X3_0\b")
 _ARDUPILOT = re.compile(r"\bINS(?:_TCAL([1-3])|([45])_TCAL)_GYR1_X\b")
+#: Names of parameters of a gyro.
+_OF_GYRO = re.compile(r"\b(?:TC_G\d_|INS\d?_\w*GYR)")
 
 
 class ParameterOptions(BaseModel):
@@ -65,6 +67,7 @@ def read(path: Path, options: ParameterOptions) -> Recording:
         ) from error
     except ValueError as error:
         raise BadRecording(f"{path}: {error}; correct the file") from error
+    _refuse_cut(path, text)
     notes = f"bias over temperature of {found[0]}, gyro {found[1]}; scale factor and misalignment are not in its file"
     info = RecordingInfo(
         serial=options.serial, axes=AXES, kind="coefficients", started_at=options.started_at,
@@ -74,6 +77,16 @@ def read(path: Path, options: ParameterOptions) -> Recording:
     biases = {f"b_{axis}": np.rad2deg(bias_rad_s[:, column]) for column, axis in enumerate(AXES)}
     columns: dict[str, Column] = {**gains, **biases, "temperature_c": warm}
     return Recording(info, columns)
+
+
+def _refuse_cut(path: Path, text: str) -> None:
+    """Raise BadRecording for a file that ends within a line of the gyro: a number that was cut off is a number too."""
+    last = text.rpartition("\n")[2].strip()
+    if _OF_GYRO.search(last):
+        raise BadRecording(
+            f"{path}: the last line has no line break and ends after {last[-20:]!r}, so the file may be cut off within "
+            "it; export the parameters again, or end the line where it is complete"
+        )
 
 
 def _text(path: Path) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -14,6 +14,7 @@ from labctl.fitting.data.fit_data import refuse_poses
 from labctl.fitting.data.joined import joined_coverage, joined_recording
 from labctl.progress import report_stage
 from labctl.recording import Recording
+from labctl.recording.info import GIVE_DATE, measured_at
 from labctl.recording.output_steps import per_reading, quantisation_of
 from labctl.services.criticism.decimated_readings import Decimated, decimated_columns_of, is_decimated
 from labctl.services.recordings.coverage import covered_of
@@ -95,7 +96,7 @@ class Measurements:
             )
             for n, found in found_in.items()
             for warning in found
-        ]
+        ] + list(undated_warnings(self.rows))
 
     @property
     def covered(self) -> Covered | None:
@@ -127,6 +128,20 @@ def measurements_of(
     """Return the measurements that were asked for, as `chosen_rows` does; says which newer ones were passed over."""
     rows = chosen_rows(store, serial, recording, recordings, other_unit=other_unit)
     return Measurements(store, rows, newer=tuple(passed_over(store, rows, recording, recordings)))
+
+
+def undated_warnings(rows: Sequence[RecordingRow]) -> Iterator[DataWarning]:
+    """Yield that the order of recordings is not known, where some of several have no date of measurement."""
+    undated = tuple(row.id for row in rows if measured_at(row.info) is None)
+    if not undated or len(rows) < 2:
+        return
+    named = recordings_text(undated)
+    said = f"{named} {'have' if len(undated) > 1 else 'has'} no date of measurement, so their order is not known"
+    yield DataWarning(
+        what="date", severity="likely", where=named, said=said, value=None, unit="",
+        expected="a date of measurement of each recording", do=GIVE_DATE,
+        text=f"{said}, and no trend over the recordings is looked for; {GIVE_DATE}",
+    )  # fmt: skip
 
 
 def recordings_text(recordings: tuple[int, ...]) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from datetime import timedelta
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from labctl.errors import BadInput
 from labctl.fitting import fit
 from labctl.fitting.criticism import criticise
 from labctl.fitting.data.fit_data import fit_data_of
-from labctl.fitting.data.joined import joined_recording
+from labctl.fitting.data.joined import joined_recording, trend_t_s
 from labctl.recording import Recording
 from tests.helpers.joint_recordings import CENTRE_C, EFFECTS, TRUTH, recording_of_day, recordings
 
@@ -39,6 +40,23 @@ def test_recordings_whose_clocks_overlap_are_put_one_behind_the_other() -> None:
     parts = recordings(1, (0.0, 0.0))
     t_s = joined_recording(parts).columns["t_s"]
     assert np.all(np.diff(t_s) > 0)
+
+
+def test_a_recording_without_a_date_is_placed_by_no_time() -> None:
+    parts = recordings(1, (0.0, 10.0))
+    first, second = parts[1], parts[2]
+    dated = joined_recording({1: first, 2: second})
+    assert trend_t_s(dated.info, dated.columns).tolist() == dated.columns["t_s"].tolist()
+    early = second.info.started_at - timedelta(days=999)
+    found = [
+        joined_recording({1: head(first, date_known=False, started_at=imported), 2: second})
+        for imported in (early, second.info.started_at, second.info.started_at + timedelta(days=999))
+    ]
+    for whole in found:
+        assert whole.columns["recording"].tolist() == [2] * 45 + [1] * 45
+        assert whole.info.measured_at is None
+        np.testing.assert_array_equal(whole.columns["t_s"], found[0].columns["t_s"])
+        np.testing.assert_array_equal(trend_t_s(whole.info, whole.columns), whole.columns["recording_t_s"])
 
 
 @pytest.mark.parametrize(

@@ -44,6 +44,18 @@ def test_the_bias_comes_back(
         assert np.abs(found - still[:, column]).max() <= (written.differs_dps or 0.0) + 1e-6
 
 
+def test_a_file_that_ends_within_a_number_is_refused(mems: Calibration, tmp_path: Path) -> None:
+    """A number without its last digits is a number too: only the missing line break shows it."""
+    text, _ = exported(mems, "ardupilot", imu="1")
+    lines = text.splitlines(keepends=True)
+    number = next(k for k, line in enumerate(lines) if "_GYR1_X" in line)
+    path = tmp_path / "gyro.param"
+    kept = [line for k, line in enumerate(lines) if k != number]
+    path.write_text("".join([*kept, lines[number].rstrip()[:-2]]), encoding="ascii")
+    with pytest.raises(BadRecording, match=r"the last line has no line break .* export the parameters again"):
+        read(path, OPTIONS)
+
+
 def test_what_a_file_lacks_is_named(mems: Calibration, tmp_path: Path) -> None:
     text, _ = exported(mems, "px4")
     path = tmp_path / "gyro.params"

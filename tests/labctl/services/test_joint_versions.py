@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -35,6 +36,19 @@ def test_a_version_keeps_all_its_recordings_and_what_they_say_together(lab: Lab)
     assert [step["version"] for step in steps["steps"]] == [3]
     assert [(step["version"], step["recordings"]) for step in steps["others"]] == [(1, [1, 2]), (2, [1, 2, 3])]
     assert lab.json("verify", "J-1", "--version", "2", "--recording", "1")["seen"]
+
+
+def test_recordings_of_which_one_has_no_date_have_no_order(lab: Lab, tmp_path: Path) -> None:
+    undated = recordings(1, (0.0,))[1]
+    head = undated.info.model_copy(update={"date_known": False})
+    write_recording(replace(undated, info=head), tmp_path / "undated")
+    number = lab.json("import", str(tmp_path / "undated"))["recording"]
+    answer = lab.json("fit", "J-1", "--recording", f"1,{number}", "--effects", ",".join(EFFECTS))
+    said = [warning["text"] for warning in answer["warnings"] if warning["what"] == "date"]
+    assert len(said) == 1
+    assert said[0].startswith(f"recording {number} has no date of measurement, so their order is not known")
+    dated = lab.json("fit", "J-1", "--recording", "1,2", "--effects", ",".join(EFFECTS))
+    assert not [w for w in dated["warnings"] if w["what"] == "date"]
 
 
 def test_a_later_recording_is_as_expected_of_a_version_of_several(lab: Lab) -> None:
