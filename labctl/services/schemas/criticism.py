@@ -7,6 +7,7 @@ from typing import Literal
 from pydantic import Field, JsonValue
 
 from labctl.json_types.criticism import (
+    Advice,
     CriticisedErrors,
     CriticisedNoise,
     Experiment,
@@ -15,6 +16,7 @@ from labctl.json_types.criticism import (
     NotTestable,
     Remainder,
     ResidualMap,
+    SlowProcess,
     Suspect,
     WorstDataSet,
 )
@@ -116,6 +118,18 @@ class CriticismResponse(ResponseModel):
     further: list[list[str]] = Field(
         default_factory=list,
         description="Effects that could be tried although the model is adequate; equivalent effects are in one group.",
+    )
+    hypothesis: Literal["temperature_not_logged"] | None = Field(
+        default=None,
+        description="temperature_not_logged: the residual of a record at rest wanders slowly, in a way that the logged "
+        "thermometer does not explain.",
+    )
+    slow_process: SlowProcess | None = Field(
+        default=None, description="Slow process in the residual of a record at rest; null: none, or not at rest."
+    )
+    advice: list[Advice] = Field(
+        default_factory=list,
+        description="For each effect that the verdict is based on: whether to add it, by what would be exported.",
     )
     not_testable: list[NotTestable]
     experiments: list[Experiment]
