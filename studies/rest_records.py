@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,7 +41,10 @@ TYPES: dict[str, MemsType] = {
 
 @dataclass(frozen=True)
 class Disturbance:
-    """What a record has beside the law of the logged temperature and the noise of its type."""
+    """What a record has beside the law of the logged temperature and the noise of its type.
+
+    Sizes in deg/s are multiples of the drift of the type.
+    """
 
     tilt_g: float = 0.002  #: how far the plate under the unit leans during a record
     walk_dps: float = 0.0  #: random walk of the bias, deg/s after an hour
@@ -51,7 +54,7 @@ class Disturbance:
     room_k: float = 3.0  #: swing of the room
 
     def of_type(self, kind: MemsType) -> Disturbance:
-        """Return this with sizes in deg/s given as multiples of a type's drift made absolute."""
+        """Return this, whose sizes in deg/s are multiples of the drift of a type, in deg/s."""
         size = kind.flicker_dps
         return Disturbance(
             self.tilt_g, self.walk_dps * size, self.unlogged_dps * size, self.hysteresis_dps * size,
@@ -115,7 +118,10 @@ def _direction(warm: Array, width_k: float) -> Array:
 
 
 def record(unit: Unit, what: Disturbance, number: int, *, seed: int, hours: float = HOURS) -> Recording:
-    """Return record `number` of a unit, as one data set at rest; `t_s` counts from 1970, as loggers write it."""
+    """Return record `number` of a unit, as one data set at rest; `t_s` counts from 1970, as loggers write it.
+
+    The plate under the unit leans with the heat around it, so that the accelerometer follows what is not logged.
+    """
     rng, sized = np.random.default_rng([32, seed, number]), what.of_type(unit.kind)
     seconds = np.arange(hours * 3600.0)
     n, hour = len(seconds), seconds / 3600.0
@@ -130,7 +136,7 @@ def record(unit: Unit, what: Disturbance, number: int, *, seed: int, hours: floa
         "t_s": began.timestamp() + at,
         "temperature_c": np.round((np.interp(at, seconds, warm) + rng.normal(size=len(at)) * 0.02) * 340) / 340,
     }
-    lean = 0.5 * (room - 24.0) / max(what.room_k / 2, 0.5) + 0.8 * inside  # the plate moves with the heat around it
+    lean = 0.5 * (room - 24.0) / max(what.room_k / 2, 0.5) + 0.8 * inside
     for k, (axis, force) in enumerate(zip(AXES, (sized.tilt_g, -0.7 * sized.tilt_g, 0.0), strict=True)):
         gravity = (1.0 if axis == "z" else 0.01) + force * np.interp(at, seconds, lean)
         columns[f"accel_{axis}_g"] = gravity + rng.normal(size=len(at)) * 2e-3
@@ -145,7 +151,7 @@ def record(unit: Unit, what: Disturbance, number: int, *, seed: int, hours: floa
         columns[f"gyro_{axis}"] = np.round(reading / step) * step if step else reading
     info = RecordingInfo(
         serial=unit.serial, axes=AXES, kind="samples", motion="rest", technology="mems",
-        started_at=began + timedelta(), sample_rate_hz=RATE_HZ,
+        started_at=began, sample_rate_hz=RATE_HZ,
     )  # fmt: skip
     one = np.ones(len(at), dtype=np.int64)
     whole = {"dataset": one, **columns, "run": one, "mounting": one, "position": np.full(len(at), "z")}

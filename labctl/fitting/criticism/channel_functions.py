@@ -34,7 +34,7 @@ NO_CHANNELS = frozenset(
         RECORDING, WITHIN_S, OWN_DATASET,
     }
 )  # fmt: skip
-FORCES = frozenset({"accel_x_g", "accel_y_g", "accel_z_g"})
+FORCES = {"x": "accel_x_g", "y": "accel_y_g", "z": "accel_z_g"}
 TIMES = frozenset({"t_s", "power_s"})
 OF_TEMPERATURE_AND_TIME = TIMES | {"temperature_c"}
 #: Channels whose straight line is an effect, or in the base.
@@ -52,8 +52,8 @@ def smooth_channels(data: ReducedRecording, axis: str) -> dict[str, Array]:
         for name, values in data.nodes.columns.items()
         if name not in NO_CHANNELS and values.dtype.kind in "fiu" and not name.startswith("gyro_")
     }
-    for name in FORCES:
-        if name in channels and change_g(channels[name]) < LEAST_CHANGE_G:  # a support that leans, and no cause
+    for body, name in FORCES.items():
+        if name in channels and change_g(data.nodes, body) < LEAST_CHANGE_G:  # a support that leans, and no cause
             del channels[name]
     channels["table_rate_dps"] = data.nodes.rate_dps(axis)
     if data.info.motion == "turns":  # no function of the rate can be found from its mean

@@ -9,10 +9,12 @@ from operator import attrgetter
 
 import numpy as np
 
-from labctl.fitting.criticism.advice import advice_for
+from labctl.fitting.criticism.advice import advice_for, is_carried
+from labctl.fitting.criticism.beneath_steps import NO_CORRECTION, QUANTIZATION, with_quantization
 from labctl.fitting.criticism.candidates import beside_held
 from labctl.fitting.criticism.diagnostics import views_of
 from labctl.fitting.criticism.model_comparison import Comparison, compare_models, with_noise_of
+from labctl.fitting.criticism.output_lattice import steps_of
 from labctl.fitting.criticism.reduction import ReducedRecording, reduce_recording
 from labctl.fitting.criticism.residuals import Residuals, residuals_of
 from labctl.fitting.criticism.search.refinement import refined_term
@@ -141,7 +143,10 @@ def criticise(
     base = fitted.base if fitted is not None else None
     report_stage("reducing the recording")
     recording = with_temperature(fitted_part(recording))
-    data = replace(reduce_recording(recording), static=static_record(recording, 0.0 if full else LONG_S))
+    data = reduce_recording(recording)
+    data = replace(
+        data, static=static_record(recording, 0.0 if full else LONG_S), steps=steps_of(recording, data.white_var)
+    )
     forward = _forward(fit_data, model, base)
     if (short := _too_little(data, forward)) is not None:
         return Criticism(Verdict("insufficient_data", reason=short), data, fit_data, base, None, None)
@@ -189,12 +194,24 @@ def _checked(found: Criticism, forward: ErrorModel, *, full: bool) -> Criticism:
     comparison, verdict = found.comparison, found.verdict
     if comparison is None:
         return found
+    verdict = with_quantization(verdict, found.data, found.residuals)
     slow = slow_process(comparison, found.residuals)
-    leaders = [verdict.terms[group[0]] for group in verdict.groups if group[0] in verdict.terms]
+    leaders = [term for group in verdict.groups if (term := _to_check(comparison, verdict, group)) is not None]
     advice = advice_for(found.fit_data, forward, leaders) if full or slow is not None else ()
     verdict = with_hypothesis(without_harm(verdict, advice, slow), comparison, slow)
+    advice = (*advice, NO_CORRECTION) if verdict.named == (QUANTIZATION,) else advice
     kept = tuple(each for each in advice if each["effect"] in verdict.named)
     return replace(found, verdict=verdict, advice=kept, slow=slow)
+
+
+def _to_check(comparison: Comparison, verdict: Verdict, group: tuple[str, ...]) -> Term | None:
+    """Return the effect of a group that could be added: the first that a calibration carries, else the leader."""
+    known = {c.id: c for c in comparison.candidates if not c.smooth and c.term is not None}
+    leader = verdict.terms.get(group[0])
+    if leader is None or is_carried(leader):
+        return leader
+    others = (refined_term(comparison, known[name]) for name in group[1:] if name in known)
+    return next((term for term in others if is_carried(term)), leader)
 
 
 def _beyond_noise(verdict: Verdict, initial: Comparison) -> Verdict:

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from labctl.fitting.criticism.channel_functions import TIMES
 from labctl.fitting.criticism.model_comparison import Comparison
@@ -46,7 +47,7 @@ def slow_process(comparison: Comparison, left: Mapping[str, Residuals]) -> SlowP
     return {"rms_dps": rms, "tau_s": float(np.median(list(taus.values()))), "common": _common(list(courses.values()))}
 
 
-def _time_constant_s(course: Array, t_s: Array, run: Array) -> float | None:
+def _time_constant_s(course: Array, t_s: Array, run: NDArray[np.int64]) -> float | None:
     """Return the time over which a course falls to 1 / e of its correlation, s; None where it is not slow."""
     same = run[1:] == run[:-1]
     size = float(np.mean(course**2))

@@ -26,11 +26,10 @@ class _Acceleration(Effect):
     shows_at_rest = True
 
     def undetermined_by(self, channels: Channels, axis: str) -> str:
-        along = [body for body in self.felt_along(axis) if f"accel_{body}_g" in channels]
-        changes = {body: change_g(force_g(channels, body)) for body in along}
-        if not along or max(changes.values()) >= LEAST_CHANGE_G:
+        changes = {body: change_g(channels, body) for body in self.felt_along(axis)}
+        if not changes or max(changes.values()) >= LEAST_CHANGE_G:
             return ""
-        seen = ", ".join(f"accel_{body}_g by {change:.2g} g" for body, change in changes.items())
+        seen = ", ".join(f"{body} by {change:.2g} g" for body, change in changes.items())
         return (
             f"no change of pose: the specific force changes less than {LEAST_CHANGE_G} g ({seen}), as a support tilts "
             "or an accelerometer drifts; measure each axis up and down"
@@ -47,9 +46,13 @@ def force_g(channels: Channels, axis: str) -> Array:
     return np.asarray(channels[name], dtype=np.float64) if name in channels else channels.up(axis)
 
 
-def change_g(force: Array) -> float:
-    """Return by how much a specific force (n,) changes, g, but for its outermost values."""
-    return float(np.diff(np.quantile(force, QUANTILES))[0]) if len(force) else 0.0
+def change_g(channels: Channels, axis: str) -> float:
+    """Return by how much the specific force along a body axis changes, g; of a logged one but for outermost values."""
+    if len(channels) == 0:
+        return 0.0
+    if f"accel_{axis}_g" in channels:
+        return float(np.diff(np.quantile(force_g(channels, axis), QUANTILES))[0])
+    return float(np.ptp(force_g(channels, axis)))
 
 
 class GSensitivity(_Acceleration):

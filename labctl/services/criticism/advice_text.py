@@ -31,14 +31,27 @@ def not_logged(found: Criticism) -> str:
     )
     return (
         "The temperature that matters was not logged, or the bias itself drifts: nothing moved, and the residual "
-        f"wanders ({sizes} RMS, correlated over {slow['tau_s'] / 60:.0f} min) in a way that the logged thermometer does not "
-        f"explain{common}."
+        f"wanders ({sizes} RMS, correlated over {slow['tau_s'] / 60:.0f} min) in a way that the logged thermometer "
+        f"does not explain{common}."
     )
 
 
 def what_to_log(found: Criticism) -> list[str]:
     """Return what to do about a temperature that was not logged; nothing without this hypothesis."""
     return [LOG_IT] if found.verdict.hypothesis is not None else []
+
+
+def coarse_steps(found: Criticism) -> list[str]:
+    """Return what is said of outputs whose steps the noise does not average out; nothing where there are none."""
+    if not found.data.steps:
+        return []
+    axes = ", ".join(f"{axis} by {step['step_dps']:.3g} deg/s" for axis, step in found.data.steps.items())
+    left = max(step["left_dps"] for step in found.data.steps.values())
+    said = (
+        f"Quantization: the output comes in steps ({axes}) that its noise does not average out. They leave "
+        f"{left:.2g} deg/s (standard deviation) in a mean, which no model corrects: record at a finer resolution."
+    )
+    return [said]
 
 
 def doubtful(found: Criticism) -> str:

@@ -19,7 +19,7 @@ from labctl.fitting.criticism import (
 from labctl.fitting.effects import CATALOGUE, kind_of
 from labctl.json_types.criticism import CriticisedNoise, Experiment, LackOfFit
 from labctl.json_types.criticism import Suspect as SuspectJson
-from labctl.services.criticism.advice_text import advice_sentences, doubtful, not_logged, what_to_log
+from labctl.services.criticism.advice_text import advice_sentences, coarse_steps, doubtful, not_logged, what_to_log
 from labctl.services.schemas.criticism import CriticismResponse
 from labctl.services.schemas.warnings import DataWarning
 
@@ -86,6 +86,7 @@ def answer_of(
         views=found.views,
         hypothesis=verdict.hypothesis,
         slow_process=found.slow,
+        output_steps=dict(found.data.steps),
         advice=list(found.advice),
     )
 
@@ -150,7 +151,7 @@ def _shape(suspect: Suspect) -> dict[str, float]:
 def sentences(found: Criticism, experiments: Sequence[Experiment] = ()) -> list[str]:
     """Return the verdict in words, one sentence each, the answer first; what to do next is the first experiment."""
     verdict = found.verdict
-    said = [not_logged(found) or doubtful(found) or _first(found), *what_to_log(found)]
+    said = [not_logged(found) or doubtful(found) or _first(found), *what_to_log(found), *coarse_steps(found)]
     if verdict.remainder is not None and verdict.groups:
         said.append(_remainder(verdict))
     if verdict.form == "unexplained" and verdict.confounded:

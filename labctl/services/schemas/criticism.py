@@ -14,6 +14,7 @@ from labctl.json_types.criticism import (
     FailingRange,
     LackOfFit,
     NotTestable,
+    OutputStep,
     Remainder,
     ResidualMap,
     SlowProcess,
@@ -126,6 +127,10 @@ class CriticismResponse(ResponseModel):
     )
     slow_process: SlowProcess | None = Field(
         default=None, description="Slow process in the residual of a record at rest; null: none, or not at rest."
+    )
+    output_steps: dict[str, OutputStep] = Field(
+        default_factory=dict,
+        description="Axis -> step of an output whose steps the noise does not average out, read from its lattice.",
     )
     advice: list[Advice] = Field(
         default_factory=list,
