@@ -96,7 +96,7 @@ def _next(result: FitResult, following: Recording) -> float:
 def lines() -> Iterator[str]:
     """Yield the table, row by row."""
     yield f"   n = {UNITS} units of each type, {RECORDS} records of 2.8 h each and the next"
-    yield f"   {'type':12} {'cell':22} right %  false name %  advised %  next worse %   next: before, after (median, deg/s)"
+    yield f"   {'type':12} {'cell':22} right %  false name %  advised %  next worse %   next before, after (median dps)"
     for kind in TYPES:
         for cell in CELLS:
             found = [outcome(kind, cell, seed) for seed in range(UNITS)]
