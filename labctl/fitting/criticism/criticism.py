@@ -198,7 +198,7 @@ def _checked(found: Criticism, forward: ErrorModel, *, full: bool) -> Criticism:
     slow = slow_process(comparison, found.residuals)
     leaders = [term for group in verdict.groups if (term := _to_check(comparison, verdict, group)) is not None]
     advice = advice_for(found.fit_data, forward, leaders) if full or slow is not None else ()
-    verdict = with_hypothesis(without_harm(verdict, advice, slow), comparison, slow)
+    verdict = with_hypothesis(without_harm(verdict, advice, slow, comparison), comparison, slow)
     advice = (*advice, NO_CORRECTION) if verdict.named == (QUANTIZATION,) else advice
     kept = tuple(each for each in advice if each["effect"] in verdict.named)
     return replace(found, verdict=verdict, advice=kept, slow=slow)

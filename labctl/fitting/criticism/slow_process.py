@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.fitting.criticism.advice import LEAST_GAIN_AT_REST
 from labctl.fitting.criticism.channel_functions import TIMES
 from labctl.fitting.criticism.model_comparison import Comparison
 from labctl.fitting.criticism.residuals import Residuals
@@ -83,25 +84,29 @@ def with_hypothesis(verdict: Verdict, comparison: Comparison, slow: SlowProcess 
     return replace(verdict, hypothesis="temperature_not_logged")
 
 
-def without_harm(verdict: Verdict, advice: tuple[Advice, ...], slow: SlowProcess | None) -> Verdict:
+def without_harm(
+    verdict: Verdict, advice: tuple[Advice, ...], slow: SlowProcess | None, comparison: Comparison
+) -> Verdict:
     """Return the verdict without names that what would be exported contradicts, in a record at rest.
 
     Nothing moved, so that an effect is only a course in time there: one with which parts left out are corrected worse
-    has followed that course by chance, and one that is nothing but time is no cause of it.
+    has followed that course by chance, and one that is nothing but time is no cause of it. Where the evidence for all
+    that was named is such that noise could have it, nothing is missing.
     """
     if slow is None or verdict.form not in {"missing", "ambiguous"}:
         return verdict
     refuted = {
         each["effect"]
         for place, each in enumerate(advice)
-        if each["effect"] in OF_TIME_ALONE or _rises(each, advice[0]["before_dps"] if place else None)
+        if each["effect"] in OF_TIME_ALONE or _fails(each, advice[0]["before_dps"] if place else None)
     }
     groups = tuple(group for group in verdict.groups if group[0] not in refuted)
     if len(groups) == len(verdict.groups):
         return verdict
-    depends = verdict.depends_on or ("t_s",)
     if not groups:
-        return Verdict("unexplained", (), depends, confounded=verdict.confounded)
+        if max((c.log_bf for c in comparison.candidates), default=0.0) < FAR:
+            return Verdict("adequate")
+        return Verdict("unexplained", (), verdict.depends_on or ("t_s",), confounded=verdict.confounded)
     return replace(
         verdict,
         groups=groups,
@@ -110,15 +115,17 @@ def without_harm(verdict: Verdict, advice: tuple[Advice, ...], slow: SlowProcess
     )
 
 
-def _rises(advice: Advice, first_dps: float | None) -> bool:
-    """Return whether what would be exported becomes worse on parts left out; not where that is unknown.
+def _fails(advice: Advice, first_dps: float | None) -> bool:
+    """Return whether what would be exported does not become clearly better on parts left out.
 
-    Beside an effect with `first_dps` before it, whether it gains too little to be a second one.
+    Not where that is unknown. Beside an effect with `first_dps` before it, whether it gains too little to be a second.
     """
     before, after = advice["before_dps"], advice["after_dps"]
     if before is None or after is None:
         return False
-    return before**2 - after**2 < NEXT_SHARE * (first_dps or 0.0) ** 2
+    if first_dps is None:
+        return after > (1.0 - LEAST_GAIN_AT_REST) * before
+    return before**2 - after**2 < NEXT_SHARE * first_dps**2
 
 
 #: Effects whose only cause is that time goes on.

@@ -36,6 +36,16 @@ def not_logged(found: Criticism) -> str:
     )
 
 
+def drifts(found: Criticism) -> str:
+    """Return what is said of a slow process beside an adequate model, after a space; "" where there is none."""
+    if found.slow is None:
+        return ""
+    return (
+        f" It is a drift (correlated over {found.slow['tau_s'] / 60:.0f} min): of the bias, or of a temperature that "
+        "was not logged."
+    )
+
+
 def what_to_log(found: Criticism) -> list[str]:
     """Return what to do about a temperature that was not logged; nothing without this hypothesis."""
     return [LOG_IT] if found.verdict.hypothesis is not None else []

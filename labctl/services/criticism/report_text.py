@@ -19,7 +19,14 @@ from labctl.fitting.criticism import (
 from labctl.fitting.effects import CATALOGUE, kind_of
 from labctl.json_types.criticism import CriticisedNoise, Experiment, LackOfFit
 from labctl.json_types.criticism import Suspect as SuspectJson
-from labctl.services.criticism.advice_text import advice_sentences, coarse_steps, doubtful, not_logged, what_to_log
+from labctl.services.criticism.advice_text import (
+    advice_sentences,
+    coarse_steps,
+    doubtful,
+    drifts,
+    not_logged,
+    what_to_log,
+)
 from labctl.services.schemas.criticism import CriticismResponse
 from labctl.services.schemas.warnings import DataWarning
 
@@ -230,7 +237,7 @@ def _adequate(found: Criticism) -> str:
         return "Adequate: no effect is missing, the residual is noise."
     return (
         f"Adequate: no effect is missing that this recording can detect; the residual is {left / floor:.1f} times the "
-        "noise floor, and depends on no recorded channel."
+        f"noise floor, and depends on no recorded channel.{drifts(found)}"
     )
 
 
