@@ -22,7 +22,7 @@ from labctl.json_types.criticism import Remainder
 from labctl.json_types.models import Coefficient
 
 Form = Literal["adequate", "missing", "ambiguous", "unexplained", "insufficient_data"]
-#: An unexplained residual that may have a name all the same, though no effect of the catalogue.
+#: What an unexplained residual may be caused by that is no effect of the catalogue.
 Hypothesis = Literal["temperature_not_logged"]
 
 #: Less evidence than this for the best candidate: nothing is missing.
