@@ -66,6 +66,37 @@ class Suspect(TypedDict):
     experiment: str
 
 
+class Advice(TypedDict):
+    """Whether to add a named effect, and why not; the errors, deg/s, are those of what would be exported.
+
+    They are of parts of the data left out of the fits, without the effect and with it; null: no part can be left out.
+    """
+
+    effect: str
+    add: bool
+    why: str
+    before_dps: float | None
+    after_dps: float | None
+
+
+class SlowProcess(TypedDict):
+    """A slow process in the residual of a record at rest: its size by axis, time constant, and how much is common.
+
+    `common` is the share of the axes' variance, each over its own size, that one common course explains.
+    """
+
+    rms_dps: dict[str, float]
+    tau_s: float
+    common: float | None
+
+
+class OutputStep(TypedDict):
+    """Step in which an output comes, and what it leaves in a mean, as a standard deviation, deg/s."""
+
+    step_dps: float
+    left_dps: float
+
+
 class NotTestable(TypedDict):
     """An effect that the recording cannot show, because a channel is missing or the schedule hides it."""
 

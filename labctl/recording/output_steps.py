@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from labctl.recording.points import dataset_starts
-from labctl.recording.quantisation import QUANTISATION, steps_columns
+from labctl.recording.quantisation import CODE_READINGS, QUANTISATION, codes_of, quantisation_std, steps_columns
 from labctl.recording.recording import Recording
+
+#: Readings of one piece of a long data set.
+PIECE = CODE_READINGS
 
 
 def with_quantisation(recording: Recording) -> Recording:
@@ -30,6 +33,44 @@ def with_quantisation(recording: Recording) -> Recording:
             for column, values in steps_columns(name, sets).items():
                 found[column] = per_reading(dataset, known[starts], values)
     return replace(recording, columns={**columns, **found}) if found else recording
+
+
+@dataclass(frozen=True)
+class OutputStep:
+    """Step in which an output comes, and what the steps leave in a mean, as a standard deviation."""
+
+    step_dps: float
+    left_dps: float  #: root mean square over the data sets
+
+
+def output_steps(recording: Recording) -> dict[str, OutputStep]:
+    """Return axis -> step of each output that comes in coarse steps, as the lattice of its readings shows it.
+
+    Of means the lattice cannot be seen: nothing is said of them.
+    """
+    columns, found = recording.columns, dict[str, OutputStep]()
+    if recording.info.kind != "samples" or len(recording) == 0:
+        return found
+    dataset = np.asarray(columns["dataset"], dtype=np.int64)
+    valid = np.asarray(columns["valid"]) != 0 if "valid" in columns else np.ones(len(recording), dtype=bool)
+    starts = dataset_starts(dataset[valid])
+    for axis in recording.info.axes:
+        values = np.asarray(columns[f"gyro_{axis}"], dtype=np.float64)[valid]
+        figures = np.array([codes_of(part) for part in _pieces(values, starts)], dtype=np.float64).reshape(-1, 4)
+        step, deviation = quantisation_std(*figures.T)
+        if step is not None:
+            output = recording.info.output.get(axis)
+            scale = abs(output.scale) if output else 1.0
+            found[axis] = OutputStep(step / scale, float(np.sqrt(np.mean(deviation**2))) / scale)
+    return found
+
+
+def _pieces(values: NDArray[np.float64], starts: NDArray[np.int64]) -> list[NDArray[np.float64]]:
+    """Return the readings of each data set, a long one in pieces: over hours an output passes many codes."""
+    found = []
+    for part in np.split(values, starts[1:]):
+        found += np.array_split(part, max(len(part) // PIECE, 1))
+    return found
 
 
 def quantisation_of(points: Recording) -> Mapping[str, NDArray[np.float64]]:

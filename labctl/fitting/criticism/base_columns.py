@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.fitting.criticism.candidates import base_rows, temperature_slope
+from labctl.fitting.criticism.output_lattice import lattice_columns
 from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.data.mounting_angles import placed_rad
 from labctl.fitting.data.shifts import shift_contrasts
@@ -24,6 +25,8 @@ def base_of(data: ReducedRecording, model: ErrorModel, axis: str) -> tuple[NDArr
     if len(largest):
         base = np.concatenate([base, data.rows_of(shifts)], axis=2)
         precision = np.concatenate([precision, largest**-2.0])
+    lattice, known = lattice_columns(data, base, precision, axis)
+    base, precision = np.concatenate([base, lattice], axis=2), np.concatenate([precision, known])
     slopes = _slope_errors(data, model, axis)
     if slopes is None:
         return base, precision

@@ -157,7 +157,7 @@ def option_of(
 ) -> CandidateShape | None:
     """Return one shape of an effect on one axis, or None where it does not touch the axis."""
     columns = [c for c in kind.columns(data.nodes, axis, term, reference) if np.any(c.values)]
-    if not columns:
+    if not columns or kind.undetermined_by(data.nodes, axis):
         return None
     rows = np.stack([data.rows(column) for column in columns], axis=2)
     return CandidateShape(kind.id, term, rows, tuple(c.name for c in columns), tuple(c.unit for c in columns))

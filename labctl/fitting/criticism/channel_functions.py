@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from labctl.fitting.criticism.candidate_shape import CandidateShape
 from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.data.joined import trend_t_s
+from labctl.fitting.effects.acceleration import LEAST_CHANGE_G, change_g
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording.columns import OWN_DATASET, RECORDING, WITHIN_S
 
@@ -34,6 +35,7 @@ NO_CHANNELS = frozenset(
         RECORDING, WITHIN_S, OWN_DATASET,
     }
 )  # fmt: skip
+FORCES = {"x": "accel_x_g", "y": "accel_y_g", "z": "accel_z_g"}
 TIMES = frozenset({"t_s", "power_s"})
 OF_TEMPERATURE_AND_TIME = TIMES | {"temperature_c"}
 #: Channels whose straight line is an effect, or in the base.
@@ -51,6 +53,9 @@ def smooth_channels(data: ReducedRecording, axis: str) -> dict[str, Array]:
         for name, values in data.nodes.columns.items()
         if name not in NO_CHANNELS and values.dtype.kind in "fiu" and not name.startswith("gyro_")
     }
+    for body, name in FORCES.items():
+        if name in channels and change_g(data.nodes, body) < LEAST_CHANGE_G:  # a support that leans, and no cause
+            del channels[name]
     channels["table_rate_dps"] = data.nodes.rate_dps(axis)
     if "t_s" in channels:
         channels["t_s"] = trend_t_s(data.info, data.nodes.columns)

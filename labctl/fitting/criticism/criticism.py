@@ -9,15 +9,19 @@ from operator import attrgetter
 
 import numpy as np
 
+from labctl.fitting.criticism.advice import advice_for, is_carried
+from labctl.fitting.criticism.beneath_steps import NO_CORRECTION, QUANTIZATION, with_quantization
 from labctl.fitting.criticism.candidates import beside_held
 from labctl.fitting.criticism.diagnostics import views_of
 from labctl.fitting.criticism.model_comparison import Comparison, compare_models, with_noise_of
+from labctl.fitting.criticism.output_lattice import steps_of
 from labctl.fitting.criticism.reduction import ReducedRecording, reduce_recording
 from labctl.fitting.criticism.residuals import Residuals, residuals_of
 from labctl.fitting.criticism.search.refinement import refined_term
 from labctl.fitting.criticism.search.stepwise import search_stepwise
+from labctl.fitting.criticism.slow_process import slow_process, with_hypothesis, without_harm
 from labctl.fitting.criticism.suspects import Suspect, suspects_of
-from labctl.fitting.criticism.verdict import Verdict
+from labctl.fitting.criticism.verdict import FAR, Verdict
 from labctl.fitting.criticism.visibility import not_testable
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.data.mounting_angles import leaning_rates
@@ -33,7 +37,7 @@ from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.presets import changed, unchanged
 from labctl.fitting.numeric.blas_threads import single_threaded
 from labctl.fitting.numeric.drift_noise import Drift
-from labctl.json_types.criticism import NotTestable
+from labctl.json_types.criticism import Advice, NotTestable, SlowProcess
 from labctl.json_types.views import Views
 from labctl.progress import report_stage
 from labctl.recording import Recording
@@ -60,6 +64,8 @@ class Criticism:
     fuller: Comparison | None = None  #: beside all that was found missing
     suspects: tuple[Suspect, ...] = ()
     not_testable: tuple[NotTestable, ...] = ()
+    advice: tuple[Advice, ...] = ()  #: for the leading effect of each group
+    slow: SlowProcess | None = None  #: of a record at rest
     explained: float | None = None
     views: Views = field(default_factory=Views)
 
@@ -137,7 +143,10 @@ def criticise(
     base = fitted.base if fitted is not None else None
     report_stage("reducing the recording")
     recording = with_temperature(fitted_part(recording))
-    data = replace(reduce_recording(recording), static=static_record(recording, 0.0 if full else LONG_S))
+    data = reduce_recording(recording)
+    data = replace(
+        data, static=static_record(recording, 0.0 if full else LONG_S), steps=steps_of(recording, data.white_var)
+    )
     forward = _forward(fit_data, model, base)
     if (short := _too_little(data, forward)) is not None:
         return Criticism(Verdict("insufficient_data", reason=short), data, fit_data, base, None, None)
@@ -145,12 +154,13 @@ def criticise(
     seen = data.through(response_of_terms(forward.terms))
     comparison = compare_models(beside_held(seen, forward), forward, catalogue)
     verdict, initial, final = search_stepwise(comparison, catalogue)
-    verdict = _without_large_residual(verdict, base)
-    found = Criticism(verdict, data, fit_data, base, None, comparison, final)
+    verdict = _without_large_residual(_beyond_noise(verdict, initial), base)
+    found = _checked(Criticism(verdict, data, fit_data, base, None, comparison, final), forward, full=full)
+    verdict = found.verdict
     if not full or found.beside_missing is None:
         return found
     report_stage("listing suspects and residuals")
-    suspects = tuple(suspects_of(comparison, found.beside_missing, fit_data, forward, refined_term))
+    suspects = tuple(suspects_of(comparison, found.beside_missing, fit_data, forward, refined_term, base))
     suspected = {*verdict.named, *(s.candidate.id for s in suspects if s.candidate.log_bf > 0)}
     return replace(
         found,
@@ -177,6 +187,45 @@ def best_shapes(
     seen = _leaning(data, fit_data, forward).through(response_of_terms(forward.terms))
     comparison = compare_models(beside_held(seen, forward), forward, catalogue)
     return {c.id: refined_term(comparison, c) for c in comparison.candidates if not c.smooth and c.term is not None}
+
+
+def _checked(found: Criticism, forward: ErrorModel, *, full: bool) -> Criticism:
+    """Return a criticism with advice on what it names, and at rest without names that this refutes."""
+    comparison, verdict = found.comparison, found.verdict
+    if comparison is None:
+        return found
+    verdict = with_quantization(verdict, found.data, found.residuals)
+    slow = slow_process(comparison, found.residuals)
+    leaders = [term for group in verdict.groups if (term := _to_check(comparison, verdict, group)) is not None]
+    advice = advice_for(found.fit_data, forward, leaders) if full or slow is not None else ()
+    verdict = with_hypothesis(without_harm(verdict, advice, slow, comparison), comparison, slow)
+    advice = (*advice, NO_CORRECTION) if verdict.named == (QUANTIZATION,) else advice
+    kept = tuple(each for each in advice if each["effect"] in verdict.named)
+    return replace(found, verdict=verdict, advice=kept, slow=slow)
+
+
+def _to_check(comparison: Comparison, verdict: Verdict, group: tuple[str, ...]) -> Term | None:
+    """Return the effect of a group that could be added: the first that a calibration carries, else the leader."""
+    known = {c.id: c for c in comparison.candidates if not c.smooth and c.term is not None}
+    leader = verdict.terms.get(group[0])
+    if leader is None or is_carried(leader):
+        return leader
+    others = (refined_term(comparison, known[name]) for name in group[1:] if name in known)
+    return next((term for term in others if is_carried(term)), leader)
+
+
+def _beyond_noise(verdict: Verdict, initial: Comparison) -> Verdict:
+    """Return the verdict, or "unexplained" in place of an adequate model beside far evidence for what is not physical.
+
+    The evidence says that more than noise is left; that the size of the nearest effect is impossible says that the
+    effect is not its cause, and not that there is none.
+    """
+    if verdict.form != "adequate":
+        return verdict
+    doubtful = [c for c in initial.candidates if not c.smooth and not c.physical and c.log_bf >= FAR]
+    if not doubtful:
+        return verdict
+    return replace(verdict, form="unexplained", further=(), not_physical=tuple(c.id for c in doubtful))
 
 
 def _without_large_residual(verdict: Verdict, base: FitResult | None) -> Verdict:

@@ -26,6 +26,8 @@ from labctl.progress import report_stage
 
 #: A formula of which the base leaves less than this share is not orthogonalised.
 LEAST_ORTHOGONAL_SHARE = 1e-5
+#: A column of which this share or less is left is constant but for rounding.
+ROUNDING = 1e-12
 #: Spacing of data sets, s, where the recording has no times.
 USUAL_SPACING_S = 75.0
 
@@ -112,7 +114,9 @@ def centred(option: CandidateShape, level: NDArray[np.float64] | None) -> Candid
     """
     if level is None:
         return option
-    return replace(option, rows=option.rows - level[:, :, None] * option.rows[0].mean(axis=0))
+    rows = option.rows - level[:, :, None] * option.rows[0].mean(axis=0)
+    size, left = (np.linalg.norm(each, axis=(0, 1)) for each in (option.rows, rows))
+    return replace(option, rows=np.where(left > ROUNDING * size, rows, 0.0))
 
 
 def orthogonalised(option: CandidateShape, base: NDArray[np.float64]) -> CandidateShape:

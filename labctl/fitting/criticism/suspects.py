@@ -34,6 +34,9 @@ SHOWN = 6
 #: At most this many more suspects have the evidence, but a size that the unit's technology cannot have.
 UNPHYSICAL_SHOWN = 2
 
+#: A fit with another effect that leaves this share more is worse, and not only weighed otherwise.
+WORSE_BY = 0.01
+
 
 @dataclass(frozen=True)
 class Suspect:
@@ -55,12 +58,13 @@ def suspects_of(
     data: FitData,
     model: ErrorModel,
     shape_of: Callable[[Comparison, Candidate], Term],
+    before: FitResult | None = None,
 ) -> list[Suspect]:
     """Return what may be missing, best first; last what is of a size that the unit's technology cannot have.
 
     The ranking is that of `comparison`. Coefficients are those of a fit with the effect in its best shape (`shape_of`),
     the one that adding the effect makes; without that fit they are those of `seen`, with the noise that remains
-    beside a fuller model.
+    beside a fuller model. An effect whose fit leaves more than `before`, the fit of the model, is not listed.
     """
     probability = probabilities(comparison.candidates)
     effects = [c for c in comparison.candidates if not c.smooth]
@@ -69,14 +73,39 @@ def suspects_of(
     found = []
     for candidate in shown:
         after = _fit_with(comparison, candidate, data, model, shape_of)
+        if after is not None and _is_worse(before, after):
+            continue  # another shape of an effect that the model has: what it would replace fits better
+        share = _share(before, after, share_removed(seen, candidate))
         fitted = _fitted_coefficients(after, candidate) if after and candidate.id not in model.effect_ids else {}
         suspect = Suspect(
             candidate, probability[candidate.id], _p_value(comparison, seen, candidate),
-            fitted or coefficients_of(seen, candidate), bool(fitted), share_removed(seen, candidate), after,
+            fitted or coefficients_of(seen, candidate), bool(fitted), share, after,
             alias_group(comparison, candidate) if candidate.log_bf >= ENOUGH else (candidate.id,),
         )  # fmt: skip
         found.append(suspect)
     return found
+
+
+def _is_worse(before: FitResult | None, after: FitResult) -> bool:
+    """Return whether a fit leaves more of the data sets than the one before it."""
+    if before is None or before.error.rms_dps is None or after.error.rms_dps is None:
+        return False
+    return after.error.rms_dps > (1.0 + WORSE_BY) * before.error.rms_dps
+
+
+def _share(before: FitResult | None, after: FitResult | None, compared: float) -> float:
+    """Return the share of the excess that a suspect removes: no more than what the fit with it leaves allows.
+
+    `compared` is that of the comparison, which alone sees what goes on within data sets; the noise of the recording is
+    no excess. 0 to 1.
+    """
+    if before is None or after is None or before.error.rms_dps is None or after.error.rms_dps is None:
+        return compared
+    floor = before.error.noise_floor_dps or 0.0
+    excess, left = (max(fit.error.rms_dps or 0.0, floor) ** 2 - floor**2 for fit in (before, after))
+    if excess <= 0.0:  # nothing between data sets
+        return compared
+    return float(np.clip(1.0 - left / excess, 0.0, 1.0))
 
 
 def _p_value(comparison: Comparison, seen: Comparison, candidate: Candidate) -> float:

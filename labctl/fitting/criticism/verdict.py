@@ -22,6 +22,8 @@ from labctl.json_types.criticism import Remainder
 from labctl.json_types.models import Coefficient
 
 Form = Literal["adequate", "missing", "ambiguous", "unexplained", "insufficient_data"]
+#: What an unexplained residual may be caused by that is no effect of the catalogue.
+Hypothesis = Literal["temperature_not_logged"]
 
 #: Less evidence than this for the best candidate: nothing is missing.
 ENOUGH = 4.5
@@ -78,6 +80,7 @@ class Verdict:
     remainder: Remainder | None = None  #: share of the excess that what is named leaves, and its channels
     further: tuple[tuple[str, ...], ...] = ()  #: of an adequate model: what would take off noise, and is not missing
     axes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  #: leading effect id -> the axes that show it
+    hypothesis: Hypothesis | None = None  #: what the likeliest cause of an unexplained residual is, if there is one
 
     @property
     def named(self) -> tuple[str, ...]:

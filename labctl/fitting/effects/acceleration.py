@@ -12,6 +12,11 @@ from labctl.fitting.numeric.arrays import Array
 from labctl.json_types.models import Origin
 
 GRAVITY = 9.80665
+#: Specific force along an axis that changes by less, g, is the tilt of a support and the drift of an accelerometer with
+#: temperature, tens of mg for a low-cost one (its data sheet), and no change of pose.
+LEAST_CHANGE_G = 0.1
+#: Between these quantiles of a logged force the change counts, so that a knock does not.
+QUANTILES = (0.01, 0.99)
 
 
 class _Acceleration(Effect):
@@ -20,11 +25,34 @@ class _Acceleration(Effect):
     rows: ClassVar[Rows] = "all"
     shows_at_rest = True
 
+    def undetermined_by(self, channels: Channels, axis: str) -> str:
+        changes = {body: change_g(channels, body) for body in self.felt_along(axis)}
+        if not changes or max(changes.values()) >= LEAST_CHANGE_G:
+            return ""
+        seen = ", ".join(f"{body} by {change:.2g} g" for body, change in changes.items())
+        return (
+            f"no change of pose: the specific force changes less than {LEAST_CHANGE_G} g ({seen}), as a support tilts "
+            "or an accelerometer drifts; measure each axis up and down"
+        )
+
+    def felt_along(self, axis: str) -> tuple[str, ...]:
+        """Return the body axes whose force this effect takes for an output axis."""
+        return (axis,)
+
 
 def force_g(channels: Channels, axis: str) -> Array:
     """Return the specific force along a body axis, (n,) g: logged, or what gravity gives in each position."""
     name = f"accel_{axis}_g"
     return np.asarray(channels[name], dtype=np.float64) if name in channels else channels.up(axis)
+
+
+def change_g(channels: Channels, axis: str) -> float:
+    """Return by how much the specific force along a body axis changes, g; of a logged one but for outermost values."""
+    if len(channels) == 0:
+        return 0.0
+    if f"accel_{axis}_g" in channels:
+        return float(np.diff(np.quantile(force_g(channels, axis), QUANTILES))[0])
+    return float(np.ptp(force_g(channels, axis)))
 
 
 class GSensitivity(_Acceleration):
@@ -50,6 +78,9 @@ class CrossGSensitivity(_Acceleration):
     ranges: ClassVar = {"fog": (0.0, 1e-3), "mems": (0.0, 0.1), "piezo": (0.0, 0.2)}
     experiment = "a tumble over six faces within the same powered run"
     draws = ("map", "time")
+
+    def felt_along(self, axis: str) -> tuple[str, ...]:
+        return tuple(other for other in BODY_AXES if other != axis)
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         return [
@@ -89,6 +120,9 @@ class CentripetalAcceleration(_Acceleration):
     parameters = (Parameter("by_position", "1", 0, 1),)
     experiment = "the same rates at another radius, or with the unit turned by 180 deg on the table"
     draws = ("table_rate_dps", "map")
+
+    def felt_along(self, axis: str) -> tuple[str, ...]:
+        return ()  # it follows from the rate
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
         """Return the centripetal acceleration at 0.1 m; its direction in the body may differ between positions."""

@@ -178,6 +178,13 @@ class Effect(ABC):
         """Return how many different (rates, temperatures) this effect's coefficients need to be determined."""
         return (1 if self.shows_at_rest else 2), 1
 
+    def undetermined_by(self, channels: Channels, axis: str) -> str:
+        """Return why rows cannot determine this effect on an output axis, whatever they are; "" where they can.
+
+        For an effect whose cause has to change by more than it does unintended: a drift of the cause is no experiment.
+        """
+        return ""
+
     def options(self, span: Span) -> list[Term]:
         """Return the shapes in which this effect competes for a recording: orders, and a grid of its parameters."""
         if self.max_order is not None:

@@ -28,7 +28,8 @@ class BiasDrift(Effect):
     draws = ("time", "repeats", "legs")
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
-        return [Column("bias_drift", "deg/s/h", channels.recording_t_s() / 3600.0)]
+        since_middle_s = channels.recording_t_s() - channels.history.middle_s
+        return [Column("bias_drift", "deg/s/h", since_middle_s / 3600.0)]
 
 
 class _Shift(Effect):

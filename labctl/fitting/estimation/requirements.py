@@ -17,6 +17,7 @@ SPAN_PER_ORDER_C = 1.0
 def require_enough_data(data: FitData, model: ErrorModel) -> None:
     """Raise NotEnoughData, saying what is missing and how much, where the data sets cannot determine the model."""
     require_channels(data, model)
+    _require_causes(data, model)
     _require_mean_rates(data, model)
     _require_rates(data, model)
     _require_temperatures(data, model)
@@ -44,6 +45,16 @@ def _estimated(data: FitData, model: ErrorModel, axes: list[str]) -> list[Term]:
         if model.held.of(axis, effect, column.name) is None
     }
     return [term for term in model.terms if term.effect in free]
+
+
+def _require_causes(data: FitData, model: ErrorModel) -> None:
+    """Raise NotEnoughData where what causes an effect does not change enough on any axis to determine it."""
+    for term in _estimated(data, model, list(data.outputs)):
+        whys = [kind_of(term).undetermined_by(data.channels, axis) for axis in data.outputs]
+        if whys and all(whys):
+            raise NotEnoughData(
+                f"{data.info.serial}: {term.effect} cannot be determined: {whys[0]}, or leave the effect out"
+            )
 
 
 def _require_mean_rates(data: FitData, model: ErrorModel) -> None:

@@ -19,6 +19,14 @@ from labctl.fitting.criticism import (
 from labctl.fitting.effects import CATALOGUE, kind_of
 from labctl.json_types.criticism import CriticisedNoise, Experiment, LackOfFit
 from labctl.json_types.criticism import Suspect as SuspectJson
+from labctl.services.criticism.advice_text import (
+    advice_sentences,
+    coarse_steps,
+    doubtful,
+    drifts,
+    not_logged,
+    what_to_log,
+)
 from labctl.services.schemas.criticism import CriticismResponse
 from labctl.services.schemas.warnings import DataWarning
 
@@ -83,6 +91,10 @@ def answer_of(
         maps=residual_maps(found.data, found.residuals) if found.comparison else [],
         readings_left_out=found.data.left_out,
         views=found.views,
+        hypothesis=verdict.hypothesis,
+        slow_process=found.slow,
+        output_steps=dict(found.data.steps),
+        advice=list(found.advice),
     )
 
 
@@ -146,7 +158,7 @@ def _shape(suspect: Suspect) -> dict[str, float]:
 def sentences(found: Criticism, experiments: Sequence[Experiment] = ()) -> list[str]:
     """Return the verdict in words, one sentence each, the answer first; what to do next is the first experiment."""
     verdict = found.verdict
-    said = [_first(found)]
+    said = [not_logged(found) or doubtful(found) or _first(found), *what_to_log(found), *coarse_steps(found)]
     if verdict.remainder is not None and verdict.groups:
         said.append(_remainder(verdict))
     if verdict.form == "unexplained" and verdict.confounded:
@@ -165,7 +177,8 @@ def sentences(found: Criticism, experiments: Sequence[Experiment] = ()) -> list[
                 dict.fromkeys(CATALOGUE[e].experiment for e in verdict.indistinguishable[:3] if e in CATALOGUE)
             )
         said += [f"To tell: {experiment}." for experiment in wanted]
-    if verdict.not_physical:
+    said += advice_sentences(found.advice)
+    if verdict.not_physical and verdict.groups:
         technology = found.data.info.technology or "this technology"
         said.append(f"Equivalent in these data, but not physical for {technology}: {_list(verdict.not_physical)}.")
     said += _further(found)
@@ -224,7 +237,7 @@ def _adequate(found: Criticism) -> str:
         return "Adequate: no effect is missing, the residual is noise."
     return (
         f"Adequate: no effect is missing that this recording can detect; the residual is {left / floor:.1f} times the "
-        "noise floor, and depends on no recorded channel."
+        f"noise floor, and depends on no recorded channel.{drifts(found)}"
     )
 
 

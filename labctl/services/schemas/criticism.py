@@ -7,14 +7,17 @@ from typing import Literal
 from pydantic import Field, JsonValue
 
 from labctl.json_types.criticism import (
+    Advice,
     CriticisedErrors,
     CriticisedNoise,
     Experiment,
     FailingRange,
     LackOfFit,
     NotTestable,
+    OutputStep,
     Remainder,
     ResidualMap,
+    SlowProcess,
     Suspect,
     WorstDataSet,
 )
@@ -116,6 +119,22 @@ class CriticismResponse(ResponseModel):
     further: list[list[str]] = Field(
         default_factory=list,
         description="Effects that could be tried although the model is adequate; equivalent effects are in one group.",
+    )
+    hypothesis: Literal["temperature_not_logged"] | None = Field(
+        default=None,
+        description="temperature_not_logged: the residual of a record at rest wanders slowly, in a way that the logged "
+        "thermometer does not explain.",
+    )
+    slow_process: SlowProcess | None = Field(
+        default=None, description="Slow process in the residual of a record at rest; null: none, or not at rest."
+    )
+    output_steps: dict[str, OutputStep] = Field(
+        default_factory=dict,
+        description="Axis -> step of an output whose steps the noise does not average out, read from its lattice.",
+    )
+    advice: list[Advice] = Field(
+        default_factory=list,
+        description="For each effect that the verdict is based on: whether to add it, by what would be exported.",
     )
     not_testable: list[NotTestable]
     experiments: list[Experiment]

@@ -1786,6 +1786,24 @@ export interface components {
             frame: string;
         };
         /**
+         * Advice
+         * @description Whether to add a named effect, and why not; the errors, deg/s, are those of what would be exported.
+         *
+         *     They are of parts of the data left out of the fits, without the effect and with it; null: no part can be left out.
+         */
+        Advice: {
+            /** Effect */
+            effect: string;
+            /** Add */
+            add: boolean;
+            /** Why */
+            why: string;
+            /** Before Dps */
+            before_dps: number | null;
+            /** After Dps */
+            after_dps: number | null;
+        };
+        /**
          * AdviceResponse
          * @description A failed campaign in words: three short sentences.
          */
@@ -4213,6 +4231,25 @@ export interface components {
              * @description Effects that could be tried although the model is adequate; equivalent effects are in one group.
              */
             further: string[][];
+            /**
+             * Hypothesis
+             * @description temperature_not_logged: the residual of a record at rest wanders slowly, in a way that the logged thermometer does not explain.
+             */
+            hypothesis: "temperature_not_logged" | null;
+            /** @description Slow process in the residual of a record at rest; null: none, or not at rest. */
+            slow_process: components["schemas"]["SlowProcess"] | null;
+            /**
+             * Output Steps
+             * @description Axis -> step of an output whose steps the noise does not average out, read from its lattice.
+             */
+            output_steps: {
+                [key: string]: components["schemas"]["OutputStep"];
+            };
+            /**
+             * Advice
+             * @description For each effect that the verdict is based on: whether to add it, by what would be exported.
+             */
+            advice: components["schemas"]["Advice"][];
             /** Not Testable */
             not_testable: components["schemas"]["NotTestable"][];
             /** Experiments */
@@ -6637,6 +6674,16 @@ export interface components {
             t_s: number;
         };
         /**
+         * OutputStep
+         * @description Step in which an output comes, and what it leaves in a mean, as a standard deviation, deg/s.
+         */
+        OutputStep: {
+            /** Step Dps */
+            step_dps: number;
+            /** Left Dps */
+            left_dps: number;
+        };
+        /**
          * OutputUnit
          * @description How a gyro column becomes a rate: rate_dps = (column - offset) / scale.
          *
@@ -7968,6 +8015,22 @@ export interface components {
              * @default false
              */
             clip?: boolean;
+        };
+        /**
+         * SlowProcess
+         * @description A slow process in the residual of a record at rest: its size by axis, time constant, and how much is common.
+         *
+         *     `common` is the share of the axes' variance, each over its own size, that one common course explains.
+         */
+        SlowProcess: {
+            /** Rms Dps */
+            rms_dps: {
+                [key: string]: number;
+            };
+            /** Tau S */
+            tau_s: number;
+            /** Common */
+            common: number | null;
         };
         /**
          * StageResponse

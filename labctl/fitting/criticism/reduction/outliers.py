@@ -13,14 +13,22 @@ BEYOND = 3.0
 #: ... unless such readings are more than this share: then they belong to the data set.
 FEW = 0.05
 
+#: The next code is one step away.
+NEXT_CODE = 1.5
 
-def inlier_mask(values: NDArray[np.float64], there: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return 1 where a reading is no outlier of its data set, (m, n)."""
+
+def inlier_mask(values: NDArray[np.float64], there: NDArray[np.float64], step: float = 0.0) -> NDArray[np.float64]:
+    """Return 1 where a reading is no outlier of its data set, (m, n).
+
+    `step` is the step in which the readings come, in their unit: the next code is no outlier where most have one code.
+    """
     count = (there > 0).sum(axis=1)
     middle = _quantile(np.sort(np.where(there > 0, values, np.inf), axis=1), count, 0.5)
     distance = np.sort(np.where(there > 0, np.abs(values - middle), np.inf), axis=1)
     spread, most = 1.4826 * _quantile(distance, count, 0.5), _quantile(distance, count, 1.0 - 2 * FEW)
-    far = (np.abs(values - middle) > np.maximum(OUTLIER * spread, BEYOND * most)) & (there > 0)
+    far = (np.abs(values - middle) > np.maximum(np.maximum(OUTLIER * spread, BEYOND * most), NEXT_CODE * step)) & (
+        there > 0
+    )
     few = far.sum(axis=1, keepdims=True) <= FEW * there.sum(axis=1, keepdims=True)
     return np.where(far & few, 0.0, 1.0)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from labctl.fitting.data.rate_profile import Response
 from labctl.fitting.data.static_record import StaticRecord
 from labctl.fitting.effects import Column
 from labctl.fitting.numeric.arrays import Array
+from labctl.json_types.criticism import OutputStep
 from labctl.recording import RecordingInfo
 
 
@@ -29,6 +30,7 @@ class ReducedRecording:
     white_var: Mapping[str, Array] | None  #: axis -> (m,) of the mean, white noise, (deg/s)^2
     dataset: NDArray[np.int64]  #: (m,) numbers
     left_out: int = 0  #: number of readings left out as outliers
+    steps: Mapping[str, OutputStep] = field(default_factory=dict)  #: axis -> step, where steps matter in the means
     static: StaticRecord | None = None  #: the longest section at rest, where criticism uses one
 
     def __len__(self) -> int:

@@ -14,7 +14,7 @@ from labctl.fitting.criticism.reduction.reduced_recording import ReducedRecordin
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording
 from labctl.recording.decimation import FASTEST_HZ, decimated_columns
-from labctl.recording.output_steps import with_quantisation
+from labctl.recording.output_steps import output_steps, with_quantisation
 from labctl.recording.quantisation import QUANTISATION
 
 
@@ -29,9 +29,9 @@ def reduce_samples(recording: Recording, *, outliers: bool) -> ReducedRecording:
     angle = np.deg2rad(padded.of(numbers["table_angle_deg"])) if "table_angle_deg" in numbers else None
     axes: tuple[str, ...] = recording.info.axes
     outputs = {axis: padded.of(numbers[f"gyro_{axis}"]) for axis in axes}
-    there = padded.there
+    there, steps = padded.there, output_steps(recording)
     for axis in axes if outliers else ():
-        there = there * inlier_mask(outputs[axis], padded.there)
+        there = there * inlier_mask(outputs[axis], padded.there, steps[axis].step_dps if axis in steps else 0.0)
     # the lines of the steps need the angle turned, from any origin: both of their waves are removed
     turned = angle if angle is not None else np.deg2rad(padded.of(numbers["table_rate_dps"])) * since
     basis, present = orthonormal_basis(there, since, turned, angle)

@@ -65,12 +65,17 @@ def search_stepwise(first: Comparison, catalogue: Mapping[str, Effect]) -> tuple
     Where nothing is found over all axes together, each axis is searched by itself: they may have different causes.
     """
     verdict, initial, final = _searched(first, catalogue)
-    if verdict.form in {"missing", "ambiguous"} and is_within_noise(first):
+    if verdict.form in {"missing", "ambiguous"} and _is_weak(initial, verdict) and is_within_noise(first):
         return Verdict("adequate", further=verdict.groups), initial, initial
     if verdict.form == "unexplained" and len(first.axes) > 1:
         apart = {axis: _searched(on_axis(first, axis), catalogue)[0] for axis in first.axes}
         return merged(apart, verdict), initial, final
     return verdict, initial, final
+
+
+def _is_weak(initial: Comparison, verdict: Verdict) -> bool:
+    """Return whether the evidence for what is named could still be noise, should the noise be other than estimated."""
+    return all(c.log_bf < FAR for c in initial.candidates if c.id in verdict.named and not c.smooth)
 
 
 def _searched(first: Comparison, catalogue: Mapping[str, Effect]) -> tuple[Verdict, Comparison, Comparison]:

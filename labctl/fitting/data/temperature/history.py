@@ -18,6 +18,7 @@ from scipy.special import roots_genlaguerre
 
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording
+from labctl.recording.columns import WITHIN_S
 
 #: Logged columns by name, (n,) each.
 LoggedColumns = Mapping[str, NDArray[np.generic]]
@@ -57,6 +58,7 @@ class TemperatureHistory:
     rate_dps: float = 1.0  #: largest table rate, deg/s, without sign
     span_c: tuple[float, float] = (0.0, 1.0)  #: lowest and highest temperature, deg C
     thermometer: bool = True  #: whether anything says how warm the unit was
+    middle_s: float = 0.0  #: middle of the times within a recording, s: a clock may count from 1970
     #: What was computed of the courses, by function and its parameter: every axis asks for the same.
     _known: dict[tuple[CourseFunction, float], dict[int, Array]] = field(default_factory=dict, repr=False)
 
@@ -174,12 +176,19 @@ def history_of(recording: Recording) -> TemperatureHistory:
     }
     rate = float(np.max(np.abs(np.asarray(columns["table_rate_dps"], dtype=np.float64)), initial=0.0)) or 1.0
     if "temperature_c" not in columns:
-        return TemperatureHistory({}, counted, rate, thermometer=False)
+        return TemperatureHistory({}, counted, rate, thermometer=False, middle_s=_middle_s(columns))
     warm = np.asarray(columns["temperature_c"], dtype=np.float64)
     span = (float(warm.min()), float(warm.max())) if len(warm) else (0.0, 1.0)
     if "t_s" not in columns:
         return TemperatureHistory({}, counted, rate, span)
-    return TemperatureHistory(_courses(source, columns), counted, rate, span)
+    return TemperatureHistory(_courses(source, columns), counted, rate, span, middle_s=_middle_s(columns))
+
+
+def _middle_s(columns: LoggedColumns) -> float:
+    """Return the middle of the times within a recording, of several of the longest, s; 0 without times."""
+    t_s = np.asarray(columns.get(WITHIN_S, columns.get("t_s", np.zeros(0))), dtype=np.float64)
+    t_s = t_s[np.isfinite(t_s)]
+    return float((t_s.min() + t_s.max()) / 2) if len(t_s) else 0.0
 
 
 def _courses(source: Mapping[str, Any], columns: Mapping[str, Any]) -> dict[int, TemperatureCourse]:

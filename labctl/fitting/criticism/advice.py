@@ -1,0 +1,157 @@
+"""Advice: whether adding an effect that was named makes what is exported better where the fit has not seen the data.
+
+A name is about the cause; advice is about the calibration. An effect that no calibration carries may be the cause, and
+adding it still corrects nothing: what is exported is then the rest of the model, which the effect has moved.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.errors import LabctlError
+from labctl.fitting.data.fit_data import FitData
+from labctl.fitting.data.joined import recordings_in
+from labctl.fitting.effects import Term, kind_of
+from labctl.fitting.estimation.axis_solutions import residuals, solve_axes
+from labctl.fitting.estimation.error_metrics import rms
+from labctl.fitting.estimation.requirements import require_enough_data
+from labctl.fitting.models.error_model import ErrorModel, is_exported
+from labctl.fitting.models.fitted_model import FittedModel, without
+from labctl.fitting.models.force_sensitivity import EFFECTS as OF_FORCE
+from labctl.fitting.models.presets import Preset, changed
+from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.numeric.least_squares import Solution
+from labctl.json_types.criticism import Advice
+from labctl.progress import report_stage
+from labctl.recording.columns import RECORDING
+
+#: A record at rest is left out in this many parts of time, one after the other.
+PARTS = 4
+#: A part is tested within the temperatures that the others were fitted at, and so far beyond, K.
+BEYOND_K = 1.0
+#: What is exported has to become better by this share: less is chance. A record at rest has few independent errors: a
+#: drift that is correlated over half an hour has a dozen in three hours of three axes.
+LEAST_GAIN, LEAST_GAIN_AT_REST = 0.01, 0.15
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True)
+class Exported:
+    """Errors of what would be exported on parts of the data that the fit had not seen, deg/s."""
+
+    before_dps: float | None
+    after_dps: float | None
+    least_gain: float = LEAST_GAIN
+
+    @property
+    def is_better(self) -> bool:
+        """Whether the export with the effect is better; not where one of the two cannot be had."""
+        if self.before_dps is None or self.after_dps is None:
+            return False
+        return self.after_dps < (1.0 - self.least_gain) * self.before_dps
+
+
+def advice_for(data: FitData, model: ErrorModel, terms: Sequence[Term]) -> tuple[Advice, ...]:
+    """Return for each effect, in its shape, whether to add it to a model, and why; each beside those before it."""
+    found: list[Advice] = []
+    beside: list[Term] = []
+    for term in terms:
+        report_stage(f"checking what a calibration with {term.effect} would do")
+        checked = exported_errors(data, model, tuple(beside), term)
+        why = _why_not_carried(term) or _why_not_better(checked)
+        found.append(
+            Advice(effect=term.effect, add=not why, why=why, before_dps=checked.before_dps, after_dps=checked.after_dps)
+        )
+        beside += [] if why else [term]
+    return tuple(found)
+
+
+def is_carried(term: Term) -> bool:
+    """Return whether a calibration corrects an effect: in its model, or as the answer to specific force."""
+    return is_exported(term) or term.effect in OF_FORCE
+
+
+def _why_not_carried(term: Term) -> str:
+    if is_carried(term):
+        return ""
+    kind = kind_of(term)
+    if kind.origin in {"sensor", "package"}:
+        return "a calibration cannot carry it: what it depends on is not known where the unit is used"
+    return f"a calibration does not carry it: it belongs to the {kind.origin}, and not to the unit"
+
+
+def _why_not_better(found: Exported) -> str:
+    if found.is_better:
+        return ""
+    if found.before_dps is None or found.after_dps is None:
+        return "no part of these data can be left out to check it"
+    return (
+        f"what would be exported does not become clearly better on parts left out of the fit: {found.after_dps:.3g} "
+        f"deg/s in place of {found.before_dps:.3g} deg/s"
+    )
+
+
+def exported_errors(data: FitData, model: ErrorModel, beside: tuple[Term, ...], term: Term) -> Exported:
+    """Return the errors of the exported part of a model, without and with a term, on parts left out in turn.
+
+    The terms `beside` are in both.
+
+    Left out are whole recordings of several, parts of the time of a record at rest, else temperatures.
+    """
+    presets = (changed(model, beside), changed(model, (*beside, term)))
+    try:
+        whole = [solve_axes(data, preset.build(data)[0]).solutions for preset in presets]
+    except LabctlError:
+        return Exported(None, None)
+    errors: tuple[list[dict[str, Array]], list[dict[str, Array]]] = ([], [])
+    for seen, left_out in parts_of(data, inner_only=presets[0].inner_only):
+        try:
+            both = [_left(seen, left_out, p, found) for p, found in zip(presets, whole, strict=True)]
+        except LabctlError:  # a part that the others do not determine says nothing
+            continue
+        for parts, values in zip(errors, both, strict=True):
+            parts.append(values)
+    before, after = (_pooled(parts) for parts in errors)
+    return Exported(before, after, LEAST_GAIN if np.any(data.channels.table_rate_dps()) else LEAST_GAIN_AT_REST)
+
+
+def _pooled(parts: Sequence[dict[str, Array]]) -> float | None:
+    return rms({axis: np.concatenate([part[axis] for part in parts]) for axis in parts[0]}) if parts else None
+
+
+def _left(seen: FitData, left_out: FitData, preset: Preset, whole: Mapping[str, Solution]) -> dict[str, Array]:
+    """Return axis -> errors of data sets left out, corrected by what would be exported of a fit to the others."""
+    model, rows = preset.build(seen)
+    used = seen.take(rows)
+    require_enough_data(used, model)
+    found = solve_axes(used, model, whole)
+    fitted = FittedModel(model, found.fits)
+    for term in model.terms:
+        fitted = fitted if is_carried(term) else without(fitted, term.effect)
+    return dict(residuals(fitted, left_out, found.nuisance))
+
+
+def parts_of(data: FitData, *, inner_only: bool) -> Iterator[tuple[FitData, FitData]]:
+    """Yield (the others, the part left out) of data sets; a part within the temperatures of the others."""
+    if len(recordings_in(data.channels.columns)) > 1:
+        of = np.asarray(data.channels[RECORDING])
+        masks: list[Mask] = [of == number for number in np.unique(of)]
+    elif "t_s" in data.channels and not np.any(data.channels.table_rate_dps()):
+        order = np.argsort(np.asarray(data.channels["t_s"], dtype=np.float64), kind="stable")
+        masks = [np.isin(np.arange(len(data)), part) for part in np.array_split(order, PARTS)]
+    else:
+        pairs = data.held_out_pairs
+        yield from pairs[1:-1] if inner_only else pairs
+        return
+    for mask in masks:
+        seen = data.take(~mask)
+        if len(seen) == 0:
+            continue
+        low, high = float(seen.temperature_c.min()) - BEYOND_K, float(seen.temperature_c.max()) + BEYOND_K
+        left_out = data.take(mask & (data.temperature_c >= low) & (data.temperature_c <= high))
+        if len(left_out):
+            yield seen, left_out

@@ -1,0 +1,102 @@
+"""What a criticism says of causes that have no effect in the catalogue, and of what to add and what not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from labctl.fitting.criticism import Criticism, Suspect
+from labctl.fitting.effects import CATALOGUE
+from labctl.json_types.criticism import Advice
+
+#: From this share of the variance of several axes on, their slow courses are one.
+COMMON = 0.8
+#: What to do about a temperature that was not logged.
+LOG_IT = (
+    "Log a second thermometer, near the sensing element or the electronics, or shield the unit from draught, sun and "
+    "hands; then record again. An effect added for this residual would follow this record only."
+)
+
+
+def not_logged(found: Criticism) -> str:
+    """Return the verdict on a residual at rest that wanders slowly; "" where there is no such hypothesis."""
+    slow = found.slow
+    if found.verdict.hypothesis != "temperature_not_logged" or slow is None:
+        return ""
+    sizes = ", ".join(f"{axis} {size:.2g} deg/s" for axis, size in slow["rms_dps"].items())
+    together = slow["common"]
+    common = (
+        f"; one course explains {100 * together:.0f} % of it on all axes"
+        if together is not None and together >= COMMON
+        else ""
+    )
+    return (
+        "The temperature that matters was not logged, or the bias itself drifts: nothing moved, and the residual "
+        f"wanders ({sizes} RMS, correlated over {slow['tau_s'] / 60:.0f} min) in a way that the logged thermometer "
+        f"does not explain{common}."
+    )
+
+
+def drifts(found: Criticism) -> str:
+    """Return what is said of a slow process beside an adequate model, after a space; "" where there is none."""
+    if found.slow is None:
+        return ""
+    return (
+        f" It is a drift (correlated over {found.slow['tau_s'] / 60:.0f} min): of the bias, or of a temperature that "
+        "was not logged."
+    )
+
+
+def what_to_log(found: Criticism) -> list[str]:
+    """Return what to do about a temperature that was not logged; nothing without this hypothesis."""
+    return [LOG_IT] if found.verdict.hypothesis is not None else []
+
+
+def coarse_steps(found: Criticism) -> list[str]:
+    """Return what is said of outputs whose steps the noise does not average out; nothing where there are none."""
+    if not found.data.steps:
+        return []
+    axes = ", ".join(f"{axis} by {step['step_dps']:.3g} deg/s" for axis, step in found.data.steps.items())
+    left = max(step["left_dps"] for step in found.data.steps.values())
+    said = (
+        f"Quantization: the output comes in steps ({axes}) that its noise does not average out. They leave "
+        f"{left:.2g} deg/s (standard deviation) in a mean, which no model corrects: record at a finer resolution."
+    )
+    return [said]
+
+
+def doubtful(found: Criticism) -> str:
+    """Return what to say of evidence that is far beyond noise for an effect of an impossible size; "" without it."""
+    verdict = found.verdict
+    if verdict.form != "unexplained" or not verdict.not_physical:
+        return ""
+    technology = found.data.info.technology or "any technology"
+    suspects = {suspect.candidate.id: suspect for suspect in found.suspects}
+    parts = [_doubt(name, suspects.get(name), found, technology) for name in verdict.not_physical]
+    return f"More than noise is left, but what resembles it is physically doubtful: {'; '.join(parts)}."
+
+
+def _doubt(name: str, suspect: Suspect | None, found: Criticism, technology: str) -> str:
+    if suspect is None:
+        return f"{name} would have a size that is not physical for {technology}"
+    values = next(iter(next(iter(suspect.coefficients.values())).values()))
+    usual = CATALOGUE[name].ranges.get(technology) if name in CATALOGUE else None
+    size = f"its size would be {values['value']:.2g} {values['unit']}"
+    limit = f", where {usual[0]:g} to {usual[1]:g} is usual for {technology}" if usual else ""
+    before = found.base.error.rms_dps if found.base is not None else None
+    after = suspect.after.error.rms_dps if suspect.after is not None else None
+    change = ""
+    if before is not None and after is not None:
+        change = f" would lower the error from {before:.3g} to {after:.3g} deg/s, but"
+    return f"{name}{change} {size}{limit}"
+
+
+def advice_sentences(advice: Sequence[Advice]) -> list[str]:
+    """Return what to add and what not, one sentence for each effect that was named."""
+    return [_advised(each) if each["add"] else f"Do not add {each['effect']}: {each['why']}." for each in advice]
+
+
+def _advised(advice: Advice) -> str:
+    return (
+        f"Adding {advice['effect']} is advised: on parts left out of the fit, what would be exported then leaves "
+        f"{advice['after_dps']:.3g} deg/s in place of {advice['before_dps']:.3g} deg/s."
+    )
