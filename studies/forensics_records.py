@@ -1,4 +1,4 @@
-"""Records of readings with one fault each, and clean ones, made with numpy alone: nothing of labctl makes or checks them.
+"""Records of readings with one fault each, and clean ones, made with numpy alone.
 
 The sizes are those at which a fault does harm; they were written down before the checks that look for them.
 """
@@ -31,6 +31,7 @@ class Record:
     temperature_c: Array
     noise_dps: float  #: of one reading
     step_s: float
+    axis: str  #: along the axis of the table
 
     def __len__(self) -> int:
         return len(self.t_s)
@@ -61,8 +62,7 @@ def clean(rng: np.random.Generator) -> Record:
     jitter = float(rng.choice([0.0, 0.02, 0.2]))
     t_s = t_s + jitter / rate_hz * rng.uniform(-0.5, 0.5, n)
     t_s -= t_s[0]
-    order = np.roll(np.arange(3), -axis)  # the turned axis comes first, so that every axis is turned in some record
-    return Record(motion, t_s, dataset, rate, gyro[:, order], temperature, noise, 1.0 / rate_hz)
+    return Record(motion, t_s, dataset, rate, gyro, temperature, noise, 1.0 / rate_hz, AXES[axis])
 
 
 def _schedule(rng: np.random.Generator, motion: str, rate_hz: float) -> tuple[Array, NDArray[np.int64], Array]:
@@ -164,7 +164,7 @@ def spikes(rng: np.random.Generator, record: Record) -> Record:
 
 
 def dead_thermometer(rng: np.random.Generator, record: Record) -> Record:
-    """The thermometer answers -127, 85 or 0 deg C, the words of a sensor that is not there: at times, or from a row on."""
+    """The thermometer answers -127, 85 or 0 deg C, as if it were not there: at times, or from a row on."""
     temperature = record.temperature_c + 5.0 * (np.abs(record.temperature_c) < 3.0)
     word = float(rng.choice([-127.0, 85.0, 0.0]))
     if rng.random() < 0.5:
@@ -276,7 +276,6 @@ def clock_step(rng: np.random.Generator, record: Record) -> Record:
 
 
 Fault = Callable[[np.random.Generator, Record], Record]
-#: Each fault with its motions, where not every record can have it.
 FAULTS: dict[str, Fault] = {
     fault.__name__: fault
     for fault in (

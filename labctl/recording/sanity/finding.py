@@ -21,6 +21,9 @@ class Finding:
     expected: str
     do: str
     part: Part = "fitted"  #: of the recording: what a fit takes in, or what was measured to verify a calibration
+    channel: str = ""  #: the column that it is about; empty: the recording, or data sets
+    n: int | None = None  #: readings that it is about; None: it is not about single readings
+    may_leave_out: bool = False  #: whether those readings can be left out, and the rest be used
 
     @property
     def text(self) -> str:

@@ -1,0 +1,179 @@
+"""The readings of a recording as plain series, and what the checks of readings have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.recording.points import dataset_starts
+from labctl.recording.recording import Recording
+from labctl.recording.sanity.finding import Finding
+
+Array = NDArray[np.float64]
+Rows = NDArray[np.bool_]
+ROBUST = 1.4826
+#: Steps between codes that are this close, as a share of the largest value, are rounding.
+SAME_CODE = 1e-9
+#: Readings that show the steps between the codes of a channel.
+CODE_READINGS = 20_000
+
+
+@dataclass(frozen=True)
+class Series:
+    """n readings in the order of their rows.
+
+    `outputs` are the gyro's, in deg/s, and `thermometers` temperatures, in deg C, by the name of their column; `others`
+    are further measured columns, such as an accelerometer's. `rate_dps` is the table's, (n,), None where it is not
+    known; `still` says of each row whether the unit is said to rest, (n,).
+    """
+
+    t_s: Array
+    dataset: NDArray[np.int64]
+    rate_dps: Array | None
+    still: Rows
+    outputs: Mapping[str, Array]
+    thermometers: Mapping[str, Array]
+    others: Mapping[str, Array]
+    motion: str
+
+    def __len__(self) -> int:
+        return len(self.t_s)
+
+    @cached_property
+    def parts(self) -> list[slice]:
+        """The rows of each data set."""
+        starts = dataset_starts(self.dataset)
+        ends = np.append(starts[1:], len(self.dataset))
+        return [slice(int(begin), int(end)) for begin, end in zip(starts, ends, strict=True)]
+
+    @cached_property
+    def step_s(self) -> float:
+        """Usual time between readings of a data set."""
+        same = self.dataset[1:] == self.dataset[:-1]
+        steps = np.diff(self.t_s)[same]
+        steps = steps[steps > 0]
+        return float(np.median(steps)) if len(steps) else 1.0
+
+    @cached_property
+    def residuals(self) -> Mapping[str, Array]:
+        """Each output less what follows the table's rate, where that is known, (n,) deg/s."""
+        return {name: _less_rate(values, self.rate_dps) for name, values in self.outputs.items()}
+
+    @cached_property
+    def noises(self) -> Mapping[str, float]:
+        """Standard deviation of one reading of each output, deg/s."""
+        return {name: noise_of(values, self.dataset) for name, values in self.outputs.items()}
+
+    @cached_property
+    def code_steps(self) -> Mapping[str, float]:
+        """Smallest step between two codes of each output, deg/s; 0 where hardly a value comes twice."""
+        return {name: code_step(values) for name, values in self.outputs.items()}
+
+
+@dataclass(frozen=True)
+class Marked:
+    """A finding with the rows that it is about, (n,); with more than one channel, of any."""
+
+    finding: Finding
+    rows: Rows
+
+
+def series_of(recording: Recording) -> Series | None:
+    """Return the readings of a recording that are not marked as bad; None for means and tables."""
+    columns, info = recording.columns, recording.info
+    if info.kind != "samples" or "t_s" not in columns or len(recording) < 2:
+        return None
+    numbers = {name: np.asarray(values, dtype=np.float64) for name, values in columns.items() if name in _measured(columns)}
+    n = len(recording)
+    known = {"rates", "profile", "rest"}
+    rate = None
+    if info.motion == "rest":
+        rate = np.zeros(n)
+    elif info.motion in known and "table_rate_dps" in columns:
+        rate = np.asarray(columns["table_rate_dps"], dtype=np.float64)
+    if info.motion == "turns" and "turn_deg" in columns:
+        still = np.asarray(columns["turn_deg"], dtype=np.float64) == 0
+    else:
+        still = np.zeros(n, dtype=bool) if rate is None else rate == 0
+    if info.motion == "profile":
+        still = np.zeros(n, dtype=bool)  # between two rates the unit is said to stand for an instant only
+    return Series(
+        np.asarray(columns["t_s"], dtype=np.float64), np.asarray(columns["dataset"], dtype=np.int64), rate, still,
+        {f"gyro_{axis}": recording.gyro_dps(axis) for axis in info.axes},
+        {name: values for name, values in numbers.items() if name.endswith("_c")},
+        {name: values for name, values in numbers.items() if not name.endswith("_c")},
+        info.motion,
+    )  # fmt: skip
+
+
+def _measured(columns: Mapping[str, NDArray[np.generic]]) -> list[str]:
+    names = {"temperature_c", "own_temperature_c", "reference_c", "chamber_c", "supply_v"}
+    names |= {f"temperature_{axis}_c" for axis in "xyz"} | {f"accel_{axis}_g" for axis in "xyz"}
+    return [name for name in columns if name in names]
+
+
+def _less_rate(values: Array, rate: Array | None) -> Array:
+    centred = values - float(np.median(values))
+    if rate is None or not np.ptp(rate):
+        return centred
+    columns = np.column_stack([np.ones(len(rate)), rate, np.gradient(rate)])
+    solution = np.linalg.lstsq(columns, centred, rcond=None)[0]
+    return np.asarray(centred - columns @ solution)
+
+
+def noise_of(values: Array, dataset: NDArray[np.int64] | None = None) -> float:
+    """Return the standard deviation of one reading of (n,) by third differences: smooth motion does not count."""
+    third = np.diff(values, 3)
+    if dataset is not None:
+        third = third[dataset[3:] == dataset[:-3]]
+    if not len(third):
+        return 0.0
+    robust = ROBUST * float(np.median(np.abs(third)))
+    if robust == 0:  # more than half of the readings repeat the code before
+        size = np.sort(np.abs(third))
+        robust = float(np.sqrt(np.mean(size[: max(int(0.99 * len(size)), 1)] ** 2)))
+    return robust / np.sqrt(20.0)
+
+
+def code_step(values: Array) -> float:
+    """Return the smallest step between two codes of readings (n,); 0 where hardly a value comes twice."""
+    some = values[:: max(len(values) // CODE_READINGS, 1)]
+    codes = np.unique(some)
+    if len(codes) < 2 or len(codes) > 0.9 * len(some):
+        return 0.0
+    apart = np.diff(codes)
+    apart = apart[apart > SAME_CODE * float(np.abs(codes).max())]
+    return float(apart.min()) if len(apart) else 0.0
+
+
+def runs(same: Rows) -> Iterator[tuple[int, int]]:
+    """Yield the stretches of rows that hold, as (first row, row after the last)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(np.int8), [0]])))
+    for begin, end in edges.reshape(-1, 2):
+        yield int(begin), int(end)
+
+
+def medians_around(values: Array, readings: int) -> Array:
+    """Return the median of the `readings` (odd) values around each of (n,); the ends are repeated."""
+    half = readings // 2
+    padded = np.pad(values, half, mode="edge")
+    found = np.empty(len(values))
+    for begin in range(0, len(values), 50_000):  # a window of every row at once would take too much memory
+        end = min(begin + 50_000, len(values))
+        window = np.lib.stride_tricks.sliding_window_view(padded[begin : end + 2 * half], readings)
+        found[begin:end] = np.median(window, axis=1)
+    return found
+
+
+def rows_in_words(rows: Rows) -> str:
+    """Return "row 7" or "rows 7 to 20 and 3 more places"; rows count from 1."""
+    found = list(runs(rows))
+    if not found:
+        return "no row"
+    begin, end = found[0]
+    first = f"row {begin + 1}" if end == begin + 1 else f"rows {begin + 1} to {end}"
+    return first + (f" and {len(found) - 1} more places" if len(found) > 1 else "")

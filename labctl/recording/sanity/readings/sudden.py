@@ -1,0 +1,115 @@
+"""Single readings far from those beside them, and stretches in which a unit that is said to rest moves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from labctl.recording.sanity.finding import Finding
+from labctl.recording.sanity.readings.series import ROBUST, Array, Marked, Rows, Series, medians_around, rows_in_words
+
+#: A reading is compared with the median of so many around it, and its distance with the usual one of so many readings.
+AROUND, USUAL_OVER = 7, 201
+#: A spike is so many usual distances off, and so many steps of its code; of a temperature so many K.
+SPIKE_NOISES, SPIKE_CODES, SPIKE_K = 8.0, 3.0, 3.0
+#: More readings than this share of all are no spikes.
+MOST_SPIKES = 0.02
+#: A rest is examined in blocks of this long, s, and at least so many readings, against the median of so many blocks.
+BLOCK_S, BLOCK_READINGS, LEVEL_BLOCKS = 0.5, 8, 601
+#: A unit moves where a block's median is off by so many usual distances, and by this much, deg/s.
+MOVED_NOISES, MOVED_DPS = 12.0, 0.3
+
+
+def check_spikes(series: Series) -> Iterator[Marked]:
+    """Yield single readings of the outputs and thermometers that are far from those beside them."""
+    for name, values in {**series.outputs, **series.thermometers}.items():
+        is_output = name in series.outputs
+        least = SPIKE_CODES * series.code_steps[name] if is_output else SPIKE_K
+        size = np.zeros(len(values))
+        rows = np.zeros(len(values), dtype=bool)
+        for part in series.parts:
+            size[part], rows[part] = _spikes(values[part], least, steady=series.motion in ("rest", "rates"))
+        n = int(rows.sum())
+        if not n or n > max(MOST_SPIKES * len(values), 1):
+            continue
+        worst = int(np.argmax(np.where(rows, np.abs(size), 0.0)))
+        unit = "deg/s" if is_output else "deg C"
+        yield Marked(
+            Finding(
+                "spikes", "likely", f"{name}, {rows_in_words(rows)}",
+                f"{n} single readings are far from those beside them, row {worst + 1} by {size[worst]:.3g} {unit}",
+                float(size[worst]), unit, "neighbours that differ by their noise", "leave these readings out",
+                channel=name, n=n, may_leave_out=True,
+            ),
+            rows,
+        )  # fmt: skip
+
+
+def _spikes(values: Array, least: float, *, steady: bool) -> tuple[Array, Rows]:
+    """Return how far each reading of a data set, (n,), is from those around, and which of them are spikes."""
+    if len(values) < 3 * AROUND:
+        return np.zeros(len(values)), np.zeros(len(values), dtype=bool)
+    off = values - medians_around(values, AROUND)
+    size = np.abs(off)
+    usual: Array | float = ROBUST * float(np.median(size))
+    if usual == 0:
+        usual = float(np.mean(np.minimum(size, least))) if least else 0.0
+    if not steady:  # where a unit is turned by hand the usual distance changes with the motion
+        usual = np.maximum(usual, ROBUST * medians_around(size, min(USUAL_OVER, len(values) // 2 * 2 - 1)))
+    far = (size > SPIKE_NOISES * np.maximum(usual, 1e-300)) & (size > least)
+    return off, far
+
+
+def check_moved(series: Series) -> Iterator[Marked]:
+    """Yield the outputs that leave their level while the unit is said to rest."""
+    if not series.still.any():
+        return
+    block = max(round(BLOCK_S / series.step_s), BLOCK_READINGS)
+    for name, values in series.outputs.items():
+        rows = np.zeros(len(values), dtype=bool)
+        size = np.zeros(len(values))
+        least = max(MOVED_DPS, 2.0 * series.code_steps[name])
+        for part in series.parts:
+            if series.still[part].all():
+                rows[part], size[part] = _moves(values[part], block, least)
+        n = int(rows.sum())
+        if not n:
+            continue
+        worst = int(np.argmax(np.abs(size)))
+        yield Marked(
+            Finding(
+                "moved", "likely", f"{name}, {rows_in_words(rows)}",
+                f"the unit is said to rest, but the output leaves its level by up to {size[worst]:.3g} deg/s for "
+                f"{n * series.step_s:.3g} s in all",
+                float(size[worst]), "deg/s", f"at most {least:.2g} deg/s",
+                "leave these readings out, or give the rate that the unit was turned at",
+                channel=name, n=n, may_leave_out=True,
+            ),
+            rows,
+        )  # fmt: skip
+
+
+def _moves(values: Array, block: int, least: float) -> tuple[Rows, Array]:
+    blocks = len(values) // block
+    rows, size = np.zeros(len(values), dtype=bool), np.zeros(len(values))
+    if blocks < 8:
+        return rows, size
+    used = blocks * block
+    medians = np.median(values[:used].reshape(blocks, block), axis=1)
+    level = medians_around(medians, min(LEVEL_BLOCKS, 2 * blocks + 1)) if blocks > LEVEL_BLOCKS else np.median(medians)
+    off = medians - level
+    usual = ROBUST * float(np.median(np.abs(np.diff(medians)))) / np.sqrt(2)
+    drift = ROBUST * float(np.median(np.abs(off)))
+    far = np.abs(off) > max(least, MOVED_NOISES * usual, 3.0 * drift)
+    edge = np.diff(np.concatenate([[0], far.astype(np.int8), [0]]))
+    # a creeping output, such as one that warms up, leaves its level too, but not at once
+    for begin, end in zip(np.flatnonzero(edge == 1), np.flatnonzero(edge == -1), strict=True):
+        before = off[max(begin - 2, 0)] if begin else 0.0
+        after = off[min(end + 1, blocks - 1)] if end < blocks else 0.0
+        most = off[begin:end][int(np.argmax(np.abs(off[begin:end])))]
+        sudden = min(abs(most - before), abs(most - after))
+        if sudden > max(least, 0.5 * abs(most)):
+            rows[begin * block : end * block] = True
+            size[begin * block : end * block] = most
+    return rows, size
