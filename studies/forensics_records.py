@@ -235,10 +235,15 @@ def copied(rng: np.random.Generator, record: Record) -> Record:
 
 
 def hum(rng: np.random.Generator, record: Record) -> Record:
-    """The mains are in an output: 50 or 60 Hz, or their first harmonic, as sampled; 0.3 to 3 noises."""
-    rate_hz = 1.0 / record.step_s
-    mains = float(rng.choice([50.0, 60.0])) * (1 + rng.normal(0.0, 2e-4)) * float(rng.choice([1.0, 2.0]))
-    return _with_line(rng, record, mains + (0.013 * rate_hz if _hidden(mains, rate_hz) else 0.0))
+    """The mains are in an output: 50 or 60 Hz, or their first harmonic, as sampled; 0.3 to 3 noises.
+
+    Sampled at 10 Hz, say, they fall on 0 Hz, where they are a constant: such a record is made again at another rate.
+    """
+    while True:
+        mains = float(rng.choice([50.0, 60.0])) * float(rng.choice([1.0, 2.0]))
+        if not _hidden(mains, 1.0 / record.step_s):
+            return _with_line(rng, record, mains * (1 + rng.normal(0.0, 2e-4)))
+        record = clean(rng)
 
 
 def _hidden(hz: float, rate_hz: float) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -38,13 +38,19 @@ def findings_of(
     if len(summary) == 0:
         return sorted(of_readings, key=_order)
     aside = np.asarray(summary[VERIFICATION], dtype=np.bool_)
-    found = [*check_damage(summary.info), *of_readings]
+    found = list(check_damage(summary.info))
     if not aside.all():
         found += _findings(summary.take(~aside), environment)
     if aside.any():
         of_part = _findings(summary.take(aside), None)
         found += [replace(each, part="verification", where=f"verification part, {each.where}") for each in of_part]
-    return sorted(found, key=_order)
+    return sorted([*found, *_not_said(of_readings, found)], key=_order)
+
+
+def _not_said(of_readings: Sequence[Finding], found: Sequence[Finding]) -> Iterator[Finding]:
+    """Yield findings of readings but those that the data sets' figures say too, with what they leave in the means."""
+    said = {(each.what, each.channel) for each in found if each.channel}
+    yield from (each for each in of_readings if (each.what, each.channel) not in said)
 
 
 def _order(finding: Finding) -> bool:

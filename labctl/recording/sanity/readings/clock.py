@@ -98,7 +98,7 @@ def _set_back(series: Series, lasting: list[tuple[int, float]]) -> Iterator[Mark
 
 def check_gaps(series: Series) -> Iterator[Marked]:
     """Yield the data sets in which readings are missing, or the clock was set on."""
-    steps = np.diff(series.t_s)
+    steps = np.diff(np.sort(series.t_s))  # rows out of order leave no gap
     same = series.dataset[1:] == series.dataset[:-1]
     usual = series.step_s
     spread = ROBUST * float(np.median(np.abs(steps[same] - usual))) if same.any() else 0.0

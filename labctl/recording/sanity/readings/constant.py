@@ -7,14 +7,15 @@ from collections.abc import Iterator
 import numpy as np
 
 from labctl.recording.sanity.finding import Finding
-from labctl.recording.sanity.readings.series import Array, Marked, Rows, Series, rows_in_words, runs
+from labctl.recording.sanity.readings.series import Array, Marked, Rows, Series, gain_of, rows_in_words, runs
 
 #: The probability, for a whole channel, of a run of equal readings that is called frozen; and its least length.
 CHANCE, LEAST_RUN = 1e-6, 20
-#: Runs up to this length tell how often a reading equals the one before; above this share a channel is too coarse.
-USUAL_RUN, MOST_REPEATS = 50, 0.6
-#: A coarse output is frozen where the rate moves on by so many steps of its code, or deg/s.
-COARSE_STEPS, COARSE_DPS = 3.0, 1.0
+#: Runs up to this length tell how often a reading equals the one before. An output is coarse whose step is above this
+#: many noises: it stays at a code by itself.
+USUAL_RUN, COARSE_NOISES = 50, 0.8
+#: A coarse output is frozen where the table's rate would move it by so many steps of its code.
+COARSE_STEPS = 5.0
 #: An output frozen in this share of the readings, or in most of a data set, makes a fit certainly wrong.
 CERTAIN_SHARE, MOST_OF_SET = 0.1, 0.9
 #: Rows are written again where this share more of them equal the row before than equal that three rows before.
@@ -53,23 +54,22 @@ def frozen_rows(series: Series, name: str, values: Array) -> Rows:
     usual = [end - begin for begin, end in steady if end - begin <= USUAL_RUN]
     long = sum(end - begin for begin, end in steady if end - begin > USUAL_RUN)
     rest = len(values) - long
-    share = sum(length - 1 for length in usual) / rest if rest > LEAST_RUN else 1.0
-    is_coarse = share > MOST_REPEATS
+    share = min(sum(length - 1 for length in usual) / rest, 0.9) if rest > LEAST_RUN else 0.9
+    is_coarse = series.code_steps[name] > COARSE_NOISES * series.noises[name]
     least = LEAST_RUN if is_coarse else max(LEAST_RUN, np.log(CHANCE / len(values)) / np.log(max(share, 1e-3)))
     ends = (float(values.min()), float(values.max()))
+    gain = gain_of(values, series.rate_dps)
     for begin, end in steady:
         if end - begin < least or (values[begin] in ends and ends[0] != ends[1] and not is_coarse):
             continue
-        if is_coarse and not _rate_moves(series, begin, end, series.code_steps[name]):
+        if is_coarse and not _would_move(series, slice(begin, end), gain, series.code_steps[name]):
             continue
         found[begin:end] = True
     return found
 
 
-def _rate_moves(series: Series, begin: int, end: int, step: float) -> bool:
-    if series.rate_dps is None:
-        return False
-    return float(np.ptp(series.rate_dps[begin:end])) > max(COARSE_STEPS * step, COARSE_DPS)
+def _would_move(series: Series, rows: slice, gain: float, step: float) -> bool:
+    return series.rate_dps is not None and abs(gain) * float(np.ptp(series.rate_dps[rows])) > COARSE_STEPS * step
 
 
 def check_repeated(series: Series, frozen: Rows) -> Iterator[Marked]:

@@ -7,7 +7,7 @@ import numpy as np
 from labctl.recording.recording import Recording
 from labctl.recording.sanity.readings.clock import check_clock, check_gaps
 from labctl.recording.sanity.readings.constant import check_frozen, check_repeated
-from labctl.recording.sanity.readings.limits import check_clipped, check_thermometers
+from labctl.recording.sanity.readings.limits import check_clipped, check_steps, check_thermometers
 from labctl.recording.sanity.readings.lines import check_lines
 from labctl.recording.sanity.readings.mixture import check_copies, check_devices, check_units, covers
 from labctl.recording.sanity.readings.series import Marked, Rows, Series, series_of
@@ -15,10 +15,15 @@ from labctl.recording.sanity.readings.sudden import check_moved, check_spikes
 
 #: What a finding explains of others: of any rows, or of rows that it covers.
 EXPLAINS = {
-    "mixed_units": frozenset({"two_devices", "moved", "mains", "vibration", "clipped"}),
+    "mixed_units": frozenset({"two_devices", "moved", "mains", "vibration", "clipped", "spikes"}),
     "two_devices": frozenset({"moved", "mains", "vibration", "clipped"}),
+    "quantised": frozenset({"mains", "vibration", "clipped"}),
+    "moved": frozenset({"mains", "vibration"}),
     "thermometer": frozenset({"spikes"}),
+    "frozen": frozenset({"moved"}),
 }
+#: Findings that explain others only of rows that they cover.
+OF_ROWS = frozenset({"thermometer", "frozen"})
 
 
 def examine(recording: Recording) -> list[Marked]:
@@ -36,6 +41,7 @@ def examined(series: Series) -> list[Marked]:
     clipped = list(check_clipped(series, _all(repeated, len(series))))
     found = [
         *check_clock(series), *check_gaps(series), *frozen, *repeated, *clipped, *check_thermometers(series),
+        *check_steps(series),
         *check_units(series), *check_devices(series), *check_copies(series), *check_spikes(series),
         *check_moved(series), *check_lines(series),
     ]  # fmt: skip
@@ -50,6 +56,6 @@ def _is_explained(one: Marked, found: list[Marked]) -> bool:
     for other in found:
         if one.finding.what not in EXPLAINS.get(other.finding.what, frozenset()):
             continue
-        if other.finding.what != "thermometer" or covers(other.rows, one.rows):
+        if other.finding.what not in OF_ROWS or covers(other.rows, one.rows):
             return True
     return False

@@ -7,8 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from labctl.recording.sanity.finding import Finding
-from labctl.recording.sanity.readings.series import Array, Marked, Rows, Series, rows_in_words
+from labctl.recording.sanity.readings.series import Array, Marked, Rows, Series, rows_in_words, spread_of
 
+#: An output is coarse whose step is above so many times the noise that its readings have, steps included.
+COARSE_STEP = 1.9
 #: Readings at the end of a range, at least: of an output in fine steps, of any other.
 LEAST_IN_STEPS, LEAST_EQUAL = 30, 8
 #: An output is clipped where so many readings are expected beyond its last code, or the last code has this many times
@@ -19,6 +21,24 @@ NO_THERMOMETER_C = (-127.0, 85.0, 0.0, -273.15)
 #: Below this no gyro is measured, deg C. Other words count where the reading jumps to them by this much, K, or by so
 #: many times its usual step.
 IMPOSSIBLE_C, JUMP_K, JUMP_STEPS = -100.0, 2.5, 20.0
+
+
+def check_steps(series: Series) -> Iterator[Marked]:
+    """Yield the outputs whose steps are larger than their noise."""
+    for name, values in series.outputs.items():
+        step, spread = series.code_steps[name], spread_of(values)
+        if not step or step < COARSE_STEP * spread:
+            continue
+        yield Marked(
+            Finding(
+                "quantised", "likely", name,
+                f"the output changes in steps of {step:.4g} deg/s, and its readings differ by {spread:.2g} deg/s from "
+                "one to the next",
+                step, "deg/s", "a step below twice the noise", "log the output with more digits or a finer converter",
+                channel=name, n=len(series),
+            ),
+            np.ones(len(series), dtype=bool),
+        )  # fmt: skip
 
 
 def check_clipped(series: Series, repeated: Rows) -> Iterator[Marked]:

@@ -87,7 +87,7 @@ def series_of(recording: Recording) -> Series | None:
     columns, info = recording.columns, recording.info
     if info.kind != "samples" or "t_s" not in columns or len(recording) < 2:
         return None
-    numbers = {name: np.asarray(values, dtype=np.float64) for name, values in columns.items() if name in _measured(columns)}
+    numbers = {name: np.asarray(columns[name], dtype=np.float64) for name in _measured(columns)}
     n = len(recording)
     known = {"rates", "profile", "rest"}
     rate = None
@@ -132,11 +132,20 @@ def noise_of(values: Array, dataset: NDArray[np.int64] | None = None) -> float:
         third = third[dataset[3:] == dataset[:-3]]
     if not len(third):
         return 0.0
-    robust = ROBUST * float(np.median(np.abs(third)))
-    if robust == 0:  # more than half of the readings repeat the code before
-        size = np.sort(np.abs(third))
-        robust = float(np.sqrt(np.mean(size[: max(int(0.99 * len(size)), 1)] ** 2)))
+    size = np.abs(third)
+    robust = ROBUST * float(np.median(size))
+    if robust == 0 and np.any(size > 0):  # more than half of the readings repeat the one before: the others tell
+        robust = ROBUST * float(np.median(size[size > 0]))
     return robust / np.sqrt(20.0)
+
+
+def spread_of(values: Array) -> float:
+    """Return the root mean square of third differences of (n,) as the noise of one reading, steps of a code included.
+
+    The largest percent of them does not count, nor do readings that stay.
+    """
+    size = np.sort(np.abs(np.diff(values, 3)))
+    return float(np.sqrt(np.mean(size[: max(int(0.99 * len(size)), 1)] ** 2) / 20.0))
 
 
 def code_step(values: Array) -> float:
@@ -148,6 +157,14 @@ def code_step(values: Array) -> float:
     apart = np.diff(codes)
     apart = apart[apart > SAME_CODE * float(np.abs(codes).max())]
     return float(apart.min()) if len(apart) else 0.0
+
+
+def gain_of(values: Array, rate: Array | None) -> float:
+    """Return by how much an output (n,) changes per deg/s of the table; 0 where the table's rate does not change."""
+    if rate is None or not np.ptp(rate):
+        return 0.0
+    centred = rate - rate.mean()
+    return float(centred @ (values - values.mean()) / (centred @ centred))
 
 
 def runs(same: Rows) -> Iterator[tuple[int, int]]:

@@ -29,7 +29,8 @@ def check_spikes(series: Series) -> Iterator[Marked]:
         size = np.zeros(len(values))
         rows = np.zeros(len(values), dtype=bool)
         for part in series.parts:
-            size[part], rows[part] = _spikes(values[part], least, steady=series.motion in ("rest", "rates"))
+            noise = series.noises[name] if is_output else 0.0
+            size[part], rows[part] = _spikes(values[part], least, noise, steady=series.motion in ("rest", "rates"))
         n = int(rows.sum())
         if not n or n > max(MOST_SPIKES * len(values), 1):
             continue
@@ -46,15 +47,13 @@ def check_spikes(series: Series) -> Iterator[Marked]:
         )  # fmt: skip
 
 
-def _spikes(values: Array, least: float, *, steady: bool) -> tuple[Array, Rows]:
+def _spikes(values: Array, least: float, noise: float, *, steady: bool) -> tuple[Array, Rows]:
     """Return how far each reading of a data set, (n,), is from those around, and which of them are spikes."""
     if len(values) < 3 * AROUND:
         return np.zeros(len(values)), np.zeros(len(values), dtype=bool)
     off = values - medians_around(values, AROUND)
     size = np.abs(off)
-    usual: Array | float = ROBUST * float(np.median(size))
-    if usual == 0:
-        usual = float(np.mean(np.minimum(size, least))) if least else 0.0
+    usual: Array | float = max(ROBUST * float(np.median(size)), noise)
     if not steady:  # where a unit is turned by hand the usual distance changes with the motion
         usual = np.maximum(usual, ROBUST * medians_around(size, min(USUAL_OVER, len(values) // 2 * 2 - 1)))
     far = (size > SPIKE_NOISES * np.maximum(usual, 1e-300)) & (size > least)
