@@ -75,7 +75,10 @@ def check_clock(series: Series) -> Iterator[Marked]:
 
 def _shift_s(series: Series, row: int) -> float:
     """Return by how much the clock stays ahead of even time from a row on, s."""
-    begin, end = max(row - BESIDE, 0), min(row + BESIDE, len(series))
+    part = next(part for part in series.parts if part.start <= row < part.stop)
+    if row == part.start:
+        return 0.0
+    begin, end = max(row - BESIDE, part.start), min(row + BESIDE, part.stop)
     off = series.t_s[begin:end] - series.step_s * np.arange(begin, end)
     return float(np.median(off[row - begin :]) - np.median(off[: row - begin]))
 

@@ -30,15 +30,18 @@ def check_frozen(series: Series) -> Iterator[Marked]:
         if not n:
             continue
         begin, end = max(runs(rows), key=lambda run: run[1] - run[0])
-        whole = any(rows[part].mean() > MOST_OF_SET for part in series.parts)
-        sure = whole or n > CERTAIN_SHARE * len(series)
+        steady = n == len(values)
+        whole = not steady and any(rows[part].mean() > MOST_OF_SET for part in series.parts)
+        sure = whole or CERTAIN_SHARE * len(series) < n < len(series)
         seconds = float(series.t_s[end - 1] - series.t_s[begin])
         yield Marked(
             Finding(
                 "frozen", "certain" if sure else "likely", f"{name}, {rows_in_words(rows)}",
-                f"the output stays at {values[begin]:.6g} deg/s for {seconds:.3g} s ({end - begin} readings)",
+                f"the output stays at {values[begin]:.6g} deg/s for {seconds:.3g} s ({end - begin} readings)"
+                + (", all of the recording: it is dead, or its steps are far larger than its noise" if steady else ""),
                 float(values[begin]), "deg/s", "readings that differ by their noise",
-                "leave these readings out, or measure again", channel=name, n=n, may_leave_out=True,
+                "check the output and its resolution" if steady else "leave these readings out, or measure again",
+                channel=name, n=n, may_leave_out=not steady,
             ),
             rows,
         )  # fmt: skip

@@ -9,21 +9,21 @@ from labctl.recording.sanity.readings.clock import check_clock, check_gaps
 from labctl.recording.sanity.readings.constant import check_frozen, check_repeated
 from labctl.recording.sanity.readings.limits import check_clipped, check_steps, check_thermometers
 from labctl.recording.sanity.readings.lines import check_lines
-from labctl.recording.sanity.readings.mixture import check_copies, check_devices, check_units, covers
+from labctl.recording.sanity.readings.mixture import check_copies, check_devices, check_units
 from labctl.recording.sanity.readings.series import Marked, Rows, Series, series_of
 from labctl.recording.sanity.readings.sudden import check_moved, check_spikes
 
 #: What a finding explains of others: of any rows, or of rows that it covers.
 EXPLAINS = {
     "mixed_units": frozenset({"two_devices", "moved", "mains", "vibration", "clipped", "spikes"}),
-    "two_devices": frozenset({"moved", "mains", "vibration", "clipped"}),
-    "quantised": frozenset({"mains", "vibration", "clipped"}),
+    "two_devices": frozenset({"moved", "mains", "vibration", "clipped", "spikes", "copied"}),
+    "quantised": frozenset({"mains", "vibration", "clipped", "repeated"}),
     "moved": frozenset({"mains", "vibration"}),
     "thermometer": frozenset({"spikes"}),
     "frozen": frozenset({"moved"}),
 }
-#: Findings that explain others only of rows that they cover.
-OF_ROWS = frozenset({"thermometer", "frozen"})
+#: Findings that explain others of their own channel only.
+OF_CHANNEL = frozenset({"thermometer", "frozen"})
 
 
 def examine(recording: Recording) -> list[Marked]:
@@ -56,6 +56,6 @@ def _is_explained(one: Marked, found: list[Marked]) -> bool:
     for other in found:
         if one.finding.what not in EXPLAINS.get(other.finding.what, frozenset()):
             continue
-        if other.finding.what not in OF_ROWS or covers(other.rows, one.rows):
+        if other.finding.what not in OF_CHANNEL or other.finding.channel == one.finding.channel:
             return True
     return False

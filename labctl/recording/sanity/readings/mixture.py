@@ -107,10 +107,10 @@ def check_copies(series: Series) -> Iterator[Marked]:
 
 def check_devices(series: Series) -> Iterator[Marked]:
     """Yield rows of a second device: by turns with the first, or after it."""
-    by_turns = [name for name, values in series.outputs.items() if _alternates(values)]
+    by_turns = [name for name, values in series.residuals.items() if _alternates(values)]
     if by_turns:
         name = by_turns[0]
-        apart = float(np.abs(np.mean(_signed(series.outputs[name]))) * 2)
+        apart = float(np.abs(np.mean(_signed(series.residuals[name]))) * 2)
         yield Marked(
             Finding(
                 "two_devices", "certain", f"{', '.join(by_turns)}, every second row",
@@ -186,8 +186,3 @@ def _lasts(values: Array, row: int, noise: float) -> bool:
     step = float(np.median(values[row + 1 : row + 1 + near * 2]) - np.median(values[max(row - 1 - near * 2, 0) : row - 1]))
     whole = float(np.median(values[row:]) - np.median(values[:row]))
     return abs(step) > 2.5 * noise and whole * step > 0 and 0.5 < whole / step < 2.0
-
-
-def covers(whole: Rows, part: Rows, share: float = 0.8) -> bool:
-    """Whether most of the rows of a part, (n,), are in the whole."""
-    return bool(part.any()) and float(np.mean(whole[part])) > share

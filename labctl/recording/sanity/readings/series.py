@@ -66,7 +66,10 @@ class Series:
     @cached_property
     def noises(self) -> Mapping[str, float]:
         """Standard deviation of one reading of each output, deg/s."""
-        return {name: noise_of(values, self.dataset) for name, values in self.outputs.items()}
+        return {
+            name: noise_of(values, self.dataset, moving=not self.code_steps[name])
+            for name, values in self.outputs.items()
+        }
 
     @cached_property
     def code_steps(self) -> Mapping[str, float]:
@@ -125,14 +128,17 @@ def _less_rate(values: Array, rate: Array | None) -> Array:
     return np.asarray(centred - columns @ solution)
 
 
-def noise_of(values: Array, dataset: NDArray[np.int64] | None = None) -> float:
-    """Return the standard deviation of one reading of (n,) by third differences: smooth motion does not count."""
+def noise_of(values: Array, dataset: NDArray[np.int64] | None = None, *, moving: bool = False) -> float:
+    """Return the standard deviation of one reading of (n,) by third differences: smooth motion does not count.
+
+    With `moving` readings that stay at a value do not count either.
+    """
     third = np.diff(values, 3)
     if dataset is not None:
         third = third[dataset[3:] == dataset[:-3]]
-    if not len(third):
+    size = np.abs(third[third != 0] if moving else third)
+    if not len(size):
         return 0.0
-    size = np.abs(third)
     robust = ROBUST * float(np.median(size))
     if robust == 0 and np.any(size > 0):  # more than half of the readings repeat the one before: the others tell
         robust = ROBUST * float(np.median(size[size > 0]))

@@ -23,7 +23,7 @@ MOVED_NOISES, MOVED_DPS = 12.0, 0.3
 
 def check_spikes(series: Series) -> Iterator[Marked]:
     """Yield single readings of the outputs and thermometers that are far from those beside them."""
-    for name, values in {**series.outputs, **series.thermometers}.items():
+    for name, values in {**series.residuals, **series.thermometers}.items():
         is_output = name in series.outputs
         least = SPIKE_CODES * series.code_steps[name] if is_output else SPIKE_K
         size = np.zeros(len(values))
