@@ -19,8 +19,6 @@ SET_STEPS = 1.5
 GAP_STEPS, GAP_DEVIATIONS = 2.5, 12.0
 #: More rows out of order than this share are no accident, and are not left out.
 MOST_OUT = 0.02
-#: A data set lacks readings when this share of its time is in gaps, or one gap lasts this long, s.
-LOST_SHARE, LONG_GAP_S = 0.1, 0.5
 
 
 def rows_in_order(t_s: Array) -> Rows:

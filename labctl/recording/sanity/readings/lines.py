@@ -8,7 +8,7 @@ import numpy as np
 from scipy.special import gammaincinv
 
 from labctl.recording.sanity.finding import Finding
-from labctl.recording.sanity.readings.series import Array, Marked, Series, medians_around
+from labctl.recording.sanity.readings.series import Array, Marked, Series, medians_of_five
 
 #: Readings of one piece of the spectrum; data sets with fewer are left out.
 MOST_READINGS, LEAST_READINGS = 2048, 128
@@ -33,7 +33,8 @@ def check_lines(series: Series) -> Iterator[Marked]:
     window = np.hanning(readings)
     for name, values in series.residuals.items():
         noise = series.noises[name]
-        smooth = values - np.clip(values - medians_around(values, 7), 8 * noise, None).clip(8 * noise) + 8 * noise
+        middle = medians_of_five(values)
+        smooth = middle + np.clip(values - middle, -8 * noise, 8 * noise)  # a spike is no line
         spectrum = np.zeros(len(hz))
         for piece in pieces:
             part = smooth[piece]

@@ -141,13 +141,13 @@ def _alternates(values: Array) -> bool:
 def _after(series: Series) -> Iterator[Marked]:
     for part in series.parts:
         n = part.stop - part.start
-        if n < 4 * LEAST_BESIDE:
-            continue
+        if n < 4 * LEAST_BESIDE or not (series.still[part].all() or series.rate_dps is not None):
+            continue  # turned by hand, a unit changes its rate on all axes at once
         found = {name: _level_step(values[part], series.noises[name]) for name, values in series.residuals.items()}
         row = int(np.argmax(np.sum([np.abs(step) for step in found.values()], axis=0)))
         apart = {name: float(step[row]) for name, step in found.items() if abs(step[row]) > APART}
         lasting = {name for name in apart if _lasts(series.residuals[name][part], row, series.noises[name])}
-        if len(lasting) < min(2, len(found)) or len(found) < 2:
+        if len(lasting) < 2:
             continue
         rows = np.zeros(len(series), dtype=bool)
         rows[part.start + row : part.stop] = True

@@ -180,6 +180,14 @@ def runs(same: Rows) -> Iterator[tuple[int, int]]:
         yield int(begin), int(end)
 
 
+def medians_of_five(values: Array) -> Array:
+    """Return the median of each of (n,) values and the two on either side; the ends are repeated."""
+    a, b, c, d, e = (np.pad(values, 2, mode="edge")[k : k + len(values)] for k in range(5))
+    low_ab, high_ab, low_de, high_de = np.minimum(a, b), np.maximum(a, b), np.minimum(d, e), np.maximum(d, e)
+    low, high = np.maximum(low_ab, low_de), np.minimum(high_ab, high_de)  # neither the least nor the largest of four
+    return np.asarray(np.maximum(np.minimum(low, high), np.minimum(np.maximum(low, high), c)))
+
+
 def medians_around(values: Array, readings: int) -> Array:
     """Return the median of the `readings` (odd) values around each of (n,); the ends are repeated."""
     half = readings // 2

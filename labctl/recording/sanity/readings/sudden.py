@@ -7,10 +7,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from labctl.recording.sanity.finding import Finding
-from labctl.recording.sanity.readings.series import ROBUST, Array, Marked, Rows, Series, medians_around, rows_in_words
+from labctl.recording.sanity.readings.series import ROBUST, Array, Marked, Rows, Series, medians_around, medians_of_five, rows_in_words
 
-#: A reading is compared with the median of so many around it, and its distance with the usual one of so many readings.
-AROUND, USUAL_OVER = 7, 201
+#: A reading is compared with the median of the five around it, and its distance with the usual one of so many readings.
+USUAL_OVER = 100
+#: Readings that a data set needs for that.
+LEAST_READINGS = 20
 #: A spike is so many usual distances off, and so many steps of its code; of a temperature so many K.
 SPIKE_NOISES, SPIKE_CODES, SPIKE_K = 8.0, 3.0, 3.0
 #: More readings than this share of all are no spikes.
@@ -49,15 +51,24 @@ def check_spikes(series: Series) -> Iterator[Marked]:
 
 def _spikes(values: Array, least: float, noise: float, *, steady: bool) -> tuple[Array, Rows]:
     """Return how far each reading of a data set, (n,), is from those around, and which of them are spikes."""
-    if len(values) < 3 * AROUND:
+    if len(values) < LEAST_READINGS:
         return np.zeros(len(values)), np.zeros(len(values), dtype=bool)
-    off = values - medians_around(values, AROUND)
+    off = values - medians_of_five(values)
     size = np.abs(off)
     usual: Array | float = max(ROBUST * float(np.median(size)), noise)
     if not steady:  # where a unit is turned by hand the usual distance changes with the motion
-        usual = np.maximum(usual, ROBUST * medians_around(size, min(USUAL_OVER, len(values) // 2 * 2 - 1)))
+        usual = np.maximum(usual, ROBUST * _medians_of_blocks(size))
     far = (size > SPIKE_NOISES * np.maximum(usual, 1e-300)) & (size > least)
     return off, far
+
+
+def _medians_of_blocks(values: Array) -> Array:
+    """Return for each of (n,) values the largest median of its block and of those beside it."""
+    blocks = max(len(values) // USUAL_OVER, 1)
+    edges = np.linspace(0, len(values), blocks + 1).astype(np.int64)
+    medians = np.array([np.median(values[a:b]) for a, b in zip(edges[:-1], edges[1:], strict=True)])
+    beside = np.pad(medians, 1, mode="edge")
+    return np.repeat(np.max([beside[:-2], medians, beside[2:]], axis=0), np.diff(edges))
 
 
 def check_moved(series: Series) -> Iterator[Marked]:
