@@ -6,9 +6,8 @@ from bisect import bisect_right
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
-from labctl.recording.sanity.finding import Finding
+from labctl.recording.sanity.finding import Finding, numbers_in_words
 from labctl.recording.sanity.readings.series import ROBUST, Array, Marked, Rows, Series, rows_in_words
 
 #: Rows before and after a step of the clock whose time stamps show whether it lasts.
@@ -107,11 +106,12 @@ def check_gaps(series: Series) -> Iterator[Marked]:
     if not wide.any():
         return
     rows = np.concatenate([[False], wide])
+    lacking = np.unique(series.dataset[rows])
     lost = np.maximum(np.round(steps[wide] / usual) - 1, 1)
     longest = int(np.argmax(np.where(wide, steps, 0.0)))
     yield Marked(
         Finding(
-            "gaps", "likely", f"t_s, {_sets(series.dataset[rows])}",
+            "gaps", "likely", f"{numbers_in_words(lacking)} ({len(lacking)} of {len(series.parts)})",
             f"readings are missing in {int(wide.sum())} places, the longest gap is {steps[longest]:.3g} s at row "
             f"{longest + 2}; or the clock was set on there",
             float(steps[longest]), "s", f"a reading every {usual:.3g} s",
@@ -120,10 +120,3 @@ def check_gaps(series: Series) -> Iterator[Marked]:
         ),
         rows,
     )  # fmt: skip
-
-
-def _sets(numbers: NDArray[np.int64]) -> str:
-    known = np.unique(numbers)
-    shown = ", ".join(str(number) for number in known[:6])
-    more = f" and {len(known) - 6} more" if len(known) > 6 else ""
-    return f"data set{'s' if len(known) > 1 else ''} {shown}{more}"

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import comb
 
 import numpy as np
-from scipy.special import gammaincinv
+from scipy.special import gammainccinv, gammaincinv
 
 from labctl.recording.sanity.finding import Finding
 from labctl.recording.sanity.readings.series import Array, Marked, Series, medians_of_five
@@ -26,24 +27,23 @@ MAINS_SHARE = 2e-3
 def check_lines(series: Series) -> Iterator[Marked]:
     """Yield the outputs with a line at one frequency in all data sets; lines that follow the table's rate are none."""
     pieces = _pieces(series)
+    if series.rate_dps is None:  # of turns by hand only what is between them can show a line
+        pieces = [same for same in pieces if all(series.still[piece].all() for piece in same)]
     if not pieces:
         return
-    readings = pieces[0].stop - pieces[0].start
+    readings = pieces[0][0].stop - pieces[0][0].start
+    limit = _limit(len(pieces), float(np.median([len(same) for same in pieces])), readings // 2)
     hz = np.fft.rfftfreq(readings, series.step_s)
     window = np.hanning(readings)
     for name, values in series.residuals.items():
         noise = series.noises[name]
         middle = medians_of_five(values)
         smooth = middle + np.clip(values - middle, -8 * noise, 8 * noise)  # a spike is no line
-        spectrum = np.zeros(len(hz))
-        for piece in pieces:
-            part = smooth[piece]
-            spectrum += np.abs(np.fft.rfft((part - part.mean()) * window)) ** 2 / len(pieces)
+        sets = [np.mean([_power(smooth[piece], window) for piece in same], axis=0) for same in pieces]
+        spectrum = np.median(sets, axis=0)  # a line that follows the table's rate is in few data sets at one frequency
         over = _over_background(spectrum)
-        degrees = max(INDEPENDENT * len(pieces), 1.0)
-        limit = float(gammaincinv(degrees, 1 - CHANCE / len(hz))) / degrees
         k = int(np.argmax(over))
-        power = float(spectrum[max(k - 1, 0) : k + 2].sum()) * 2 / float(np.sum(window**2)) / readings * 2
+        power = float(spectrum[max(k - 1, 0) : k + 2].sum()) * 4 / float(np.sum(window**2)) / readings
         size = float(np.sqrt(power))
         if over[k] <= limit or size < LEAST_SHARE * noise:
             continue
@@ -51,8 +51,22 @@ def check_lines(series: Series) -> Iterator[Marked]:
         yield Marked(_finding(name, found_hz, size, series.step_s, len(series)), np.ones(len(series), dtype=bool))
 
 
-def _pieces(series: Series) -> list[slice]:
-    """Return pieces of one length, half overlapping, of all data sets that are long enough."""
+def _power(values: Array, window: Array) -> Array:
+    return np.asarray(np.abs(np.fft.rfft((values - values.mean()) * window)) ** 2)
+
+
+def _limit(sets: int, pieces: float, bins: int) -> float:
+    """Return how far over its background noise alone takes a bin of the median over data sets, by chance in any bin.
+
+    At least half of the data sets must be above it (a bound by Bonferroni); each is a mean over its pieces.
+    """
+    shape, half = max(INDEPENDENT * pieces, 1.0), (sets + 1) // 2
+    chance = (CHANCE / bins / comb(sets, half)) ** (1.0 / half)
+    return float(gammainccinv(shape, min(chance, 0.5)) / gammaincinv(shape, 0.5))
+
+
+def _pieces(series: Series) -> list[list[slice]]:
+    """Return pieces of one length, half overlapping, of each data set that is long enough."""
     lengths = [part.stop - part.start for part in series.parts]
     long = [length for length in lengths if length >= LEAST_READINGS]
     if not long:
@@ -63,8 +77,8 @@ def _pieces(series: Series) -> list[slice]:
     found = []
     for part in series.parts:
         begins = range(part.start, part.stop - readings + 1, readings // 2)
-        found += [slice(begin, begin + readings) for begin in begins]
-    return found
+        found.append([slice(begin, begin + readings) for begin in begins])
+    return [same for same in found if same]
 
 
 def _over_background(spectrum: Array) -> Array:

@@ -14,6 +14,10 @@ from labctl.recording.sanity.readings.series import Array, Marked, Rows, Series,
 BLOCKS, LEAST_IN_BLOCK = 40, 50
 #: The ratio of deg/s to rad/s, and how near to it, as a logarithm, a ratio of noises must be.
 DEG_PER_RAD, NEAR = 180.0 / np.pi, 0.4
+#: The same of a gain, in which the bias of the outputs is too.
+GAIN_NEAR = 1.0
+#: Rates from this size on (root mean square), deg/s, show the gain of the outputs.
+LEAST_RATE_DPS = 1.0
 #: Third differences of a copy have at least this squared correlation with those of its source; and how many must move.
 COPY, LEAST_MOVING = 0.97, 50
 #: Two devices by turns: their readings differ by this many noises of readings of one.
@@ -44,6 +48,8 @@ def check_units(series: Series) -> Iterator[Marked]:
     rows = np.zeros(len(series), dtype=bool)
     for block, value in zip(blocks, size, strict=True):
         rows[block] = value < split
+    if not _gains_agree(series, rows):
+        return
     ratio = float(np.exp(np.mean(apart)))
     yield Marked(
         Finding(
@@ -56,6 +62,26 @@ def check_units(series: Series) -> Iterator[Marked]:
         ),
         rows,
     )  # fmt: skip
+
+
+def _gains_agree(series: Series, rows: Rows) -> bool:
+    """Whether the gain over the table's rate is as much smaller as the noise is: noise alone may change with the rate.
+
+    At rest the noise of two outputs or more must do.
+    """
+    if series.rate_dps is None or min(_rms(series.rate_dps[rows]), _rms(series.rate_dps[~rows])) < LEAST_RATE_DPS:
+        return len(series.outputs) > 1
+    rate = series.rate_dps
+    gains = [
+        [abs(float(values[part] @ rate[part])) / float(rate[part] @ rate[part]) for part in (rows, ~rows)]
+        for values in series.outputs.values()
+    ]
+    low, high = max(gains, key=max)
+    return low > 0 and abs(np.log(high / low / DEG_PER_RAD)) < GAIN_NEAR
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2))) if len(values) else 0.0
 
 
 def _blocks(series: Series) -> list[slice]:

@@ -61,7 +61,7 @@ class Series:
     @cached_property
     def residuals(self) -> Mapping[str, Array]:
         """Each output less what follows the table's rate, where that is known, (n,) deg/s."""
-        return {name: _less_rate(values, self.rate_dps) for name, values in self.outputs.items()}
+        return {name: _less_rate(values, self.rate_dps, self.motion) for name, values in self.outputs.items()}
 
     @cached_property
     def noises(self) -> Mapping[str, float]:
@@ -119,11 +119,12 @@ def _measured(columns: Mapping[str, NDArray[np.generic]]) -> list[str]:
     return [name for name in columns if name in names]
 
 
-def _less_rate(values: Array, rate: Array | None) -> Array:
+def _less_rate(values: Array, rate: Array | None, motion: str) -> Array:
     centred = values - float(np.median(values))
     if rate is None or not np.ptp(rate):
         return centred
-    columns = np.column_stack([np.ones(len(rate)), rate, np.gradient(rate)])
+    late = [np.gradient(rate)] if motion == "profile" else []  # an output is late by some readings
+    columns = np.column_stack([np.ones(len(rate)), rate, *late])
     solution = np.linalg.lstsq(columns, centred, rcond=None)[0]
     return np.asarray(centred - columns @ solution)
 

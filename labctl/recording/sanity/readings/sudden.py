@@ -15,6 +15,8 @@ USUAL_OVER = 100
 LEAST_READINGS = 20
 #: A spike is so many usual distances off, and so many steps of its code; of a temperature so many K.
 SPIKE_NOISES, SPIKE_CODES, SPIKE_K = 8.0, 3.0, 3.0
+#: A spike is this many times as far off as 95 % of the readings beside it.
+JERKS = 4.0
 #: More readings than this share of all are no spikes.
 MOST_SPIKES = 0.02
 #: A rest is examined in blocks of this long, s, and at least so many readings, against the median of so many blocks.
@@ -31,6 +33,8 @@ def check_spikes(series: Series) -> Iterator[Marked]:
         size = np.zeros(len(values))
         rows = np.zeros(len(values), dtype=bool)
         for part in series.parts:
+            if is_output and series.rate_dps is None and not series.still[part].all():
+                continue  # turned by hand, an output may change in one reading
             noise = series.noises[name] if is_output else 0.0
             size[part], rows[part] = _spikes(values[part], least, noise, steady=series.motion in ("rest", "rates"))
         n = int(rows.sum())
@@ -55,20 +59,27 @@ def _spikes(values: Array, least: float, noise: float, *, steady: bool) -> tuple
         return np.zeros(len(values)), np.zeros(len(values), dtype=bool)
     off = values - medians_of_five(values)
     size = np.abs(off)
-    usual: Array | float = max(ROBUST * float(np.median(size)), noise)
-    if not steady:  # where a unit is turned by hand the usual distance changes with the motion
-        usual = np.maximum(usual, ROBUST * _medians_of_blocks(size))
-    far = (size > SPIKE_NOISES * np.maximum(usual, 1e-300)) & (size > least)
+    usual = max(ROBUST * float(np.median(size)), noise)
+    far = (size > SPIKE_NOISES * max(usual, 1e-300)) & (size > least)
+    if not far.any():
+        return off, far
+    if steady:  # the steps of a table's motor shake the unit at some rates
+        far &= size > JERKS * _largest_of_blocks(size)
+    else:  # at a turn of a motion the median is off, but not a cubic; by hand the usual distance changes too
+        beside = np.pad(values, 2, mode="edge")
+        cubic = np.abs(values - (4.0 * (beside[1:-3] + beside[3:-1]) - beside[:-4] - beside[4:]) / 6.0)
+        far &= cubic > np.maximum(SPIKE_NOISES * usual, JERKS * _largest_of_blocks(cubic))
     return off, far
 
 
-def _medians_of_blocks(values: Array) -> Array:
-    """Return for each of (n,) values the largest median of its block and of those beside it."""
-    blocks = max(len(values) // USUAL_OVER, 1)
-    edges = np.linspace(0, len(values), blocks + 1).astype(np.int64)
-    medians = np.array([np.median(values[a:b]) for a, b in zip(edges[:-1], edges[1:], strict=True)])
-    beside = np.pad(medians, 1, mode="edge")
-    return np.repeat(np.max([beside[:-2], medians, beside[2:]], axis=0), np.diff(edges))
+def _largest_of_blocks(values: Array) -> Array:
+    """Return for each of (n,) values the largest 95 % quantile of its block and of those beside it."""
+    over = min(USUAL_OVER, len(values))
+    blocks = len(values) // over
+    most = np.quantile(values[: blocks * over].reshape(blocks, over), 0.95, axis=1)
+    beside = np.pad(most, 1, mode="edge")
+    largest = np.max([beside[:-2], most, beside[2:]], axis=0)
+    return largest[np.minimum(np.arange(len(values)) // over, blocks - 1)]
 
 
 def check_moved(series: Series) -> Iterator[Marked]:
