@@ -1,4 +1,4 @@
-"""Faults of readings, made one by one with numpy alone: how many of each kind labctl finds, and what it says of clean ones.
+"""Faults of readings, made one by one with numpy alone: how many labctl finds, and what it says of clean records.
 
 `LABCTL_STUDY_FORENSICS` is how many records of each kind are made; ten times as many are clean.
 """
@@ -68,7 +68,9 @@ def run(records: int = RECORDS, kinds: Collection[str] = tuple(FAULTS), clean: i
     number = 10 * records if clean is None else clean
     said = [said_of(clean_record(seed)) for seed in range(1, number + 1)]
     false = sum(bool(each) for each in said)
-    lines.append(f"{'clean':18}{number:8}{false:7}{100 * false / max(number, 1):7.1f} %   {_words(sum(said, Counter()))}")
+    lines.append(
+        f"{'clean':18}{number:8}{false:7}{100 * false / max(number, 1):7.1f} %   {_words(sum(said, Counter()))}"
+    )
     return "\n".join(lines)
 
 

@@ -32,10 +32,13 @@ class Finding:
 
     def to_json(self) -> FindingJson:
         """Return the finding as JSON, with its sentence."""
-        return {
+        found: FindingJson = {
             "what": self.what, "severity": self.severity, "where": self.where, "said": self.said, "value": self.value,
             "unit": self.unit, "expected": self.expected, "do": self.do, "text": self.text, "part": self.part,
         }  # fmt: skip
+        if self.n is not None:
+            found |= {"channel": self.channel, "n": self.n, "may_leave_out": self.may_leave_out}
+        return found
 
 
 def certain(findings: Iterable[Finding]) -> list[Finding]:

@@ -60,7 +60,7 @@ def check_clock(series: Series) -> Iterator[Marked]:
     yield Marked(
         Finding(
             "time_back", "certain", f"t_s, {rows_in_words(out)}",
-            f"{n} rows do not follow the row before in time, row {worst + 1} by {steps[worst - 1]:.4g} s",
+            f"{n} {'row does' if n == 1 else 'rows do'} not follow the row before in time, row {worst + 1} by {steps[worst - 1]:.4g} s",
             float(steps[worst - 1]), "s", "time stamps that rise from row to row",
             "leave these rows out, or sort the rows in the order of measurement" if few else
             "sort the rows in the order of measurement, or divide the recording",

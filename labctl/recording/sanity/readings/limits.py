@@ -71,7 +71,7 @@ def check_clipped(series: Series, repeated: Rows) -> Iterator[Marked]:
 
 def _is_pile(values: Array, at_end: Rows, top: float, step: float, noise: float) -> bool:
     n_end = int(at_end.sum())
-    if n_end == len(values) or noise == 0 and step:
+    if n_end == len(values) or (noise == 0 and step):
         return False
     if not step:
         return n_end >= LEAST_EQUAL

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import combinations
+from itertools import combinations, pairwise
 
 import numpy as np
 
@@ -90,7 +90,7 @@ def _blocks(series: Series) -> list[slice]:
         length = part.stop - part.start
         size = max(length // BLOCKS, LEAST_IN_BLOCK) if len(series.parts) < BLOCKS // 4 else length
         edges = np.linspace(part.start, part.stop, max(length // size, 1) + 1).astype(np.int64)
-        found += [slice(int(a), int(b)) for a, b in zip(edges[:-1], edges[1:], strict=True) if b - a >= LEAST_IN_BLOCK]
+        found += [slice(int(a), int(b)) for a, b in pairwise(edges) if b - a >= LEAST_IN_BLOCK]
     return found
 
 
@@ -106,19 +106,9 @@ def check_copies(series: Series) -> Iterator[Marked]:
     """Yield the outputs that are a copy of another, in their unit or scaled."""
     third = {name: np.diff(values, 3) for name, values in series.outputs.items()}
     for (one, a), (other, b) in combinations(third.items(), 2):
-        moving = (a != 0) | (b != 0)
-        if moving.sum() < LEAST_MOVING:
+        scale = _scale_of_copy(a, b)
+        if scale is None:
             continue
-        a, b = a[moving], b[moving]
-        limit_a, limit_b = (8.0 * max(float(np.median(np.abs(each))), 1e-300) for each in (a, b))
-        usual = (np.abs(a) < limit_a) & (np.abs(b) < limit_b)  # a knock that all axes feel is no copy
-        if usual.sum() < LEAST_MOVING:
-            continue
-        a, b = a[usual], b[usual]
-        power = float(a @ a) * float(b @ b)
-        if power == 0 or float(a @ b) ** 2 < COPY * power:
-            continue
-        scale = float(a @ b) / float(a @ a)
         yield Marked(
             Finding(
                 "copied", "certain", f"{other} and {one}",
@@ -129,6 +119,21 @@ def check_copies(series: Series) -> Iterator[Marked]:
             ),
             np.ones(len(series), dtype=bool),
         )  # fmt: skip
+
+
+def _scale_of_copy(a: Array, b: Array) -> float | None:
+    """Return by which factor third differences b (n,) are those of a; None where they are no copy."""
+    moving = (a != 0) | (b != 0)
+    if moving.sum() < LEAST_MOVING:
+        return None
+    limits = [8.0 * max(float(np.median(np.abs(each[moving]))), 1e-300) for each in (a, b)]
+    usual = moving & (np.abs(a) < limits[0]) & (np.abs(b) < limits[1])  # a knock that all axes feel is no copy
+    if usual.sum() < LEAST_MOVING:
+        return None
+    product, power = float(a[usual] @ b[usual]), float(a[usual] @ a[usual])
+    if power == 0 or product == 0 or product**2 < COPY * power * float(b[usual] @ b[usual]):
+        return None
+    return product / power
 
 
 def check_devices(series: Series) -> Iterator[Marked]:
@@ -209,6 +214,8 @@ def _level_step(values: Array, noise: float) -> Array:
 def _lasts(values: Array, row: int, noise: float) -> bool:
     """Whether a level changes at a row at once and for good: not a creep, not a turn that ends."""
     near = max(LEAST_BESIDE // 2, 3)
-    step = float(np.median(values[row + 1 : row + 1 + near * 2]) - np.median(values[max(row - 1 - near * 2, 0) : row - 1]))
+    step = float(
+        np.median(values[row + 1 : row + 1 + near * 2]) - np.median(values[max(row - 1 - near * 2, 0) : row - 1])
+    )
     whole = float(np.median(values[row:]) - np.median(values[:row]))
     return abs(step) > 2.5 * noise and whole * step > 0 and 0.5 < whole / step < 2.0

@@ -90,7 +90,7 @@ def series_of(recording: Recording) -> Series | None:
     columns, info = recording.columns, recording.info
     if info.kind != "samples" or "t_s" not in columns or len(recording) < 2:
         return None
-    numbers = {name: np.asarray(columns[name], dtype=np.float64) for name in _measured(columns)}
+    numbers = {name: np.asarray(columns[name], dtype=np.float64) for name in measured_names(columns)}
     n = len(recording)
     known = {"rates", "profile", "rest"}
     rate = None
@@ -113,7 +113,8 @@ def series_of(recording: Recording) -> Series | None:
     )  # fmt: skip
 
 
-def _measured(columns: Mapping[str, NDArray[np.generic]]) -> list[str]:
+def measured_names(columns: Mapping[str, NDArray[np.generic]]) -> list[str]:
+    """Return the columns that hold what sensors beside the gyro measured."""
     names = {"temperature_c", "own_temperature_c", "reference_c", "chamber_c", "supply_v"}
     names |= {f"temperature_{axis}_c" for axis in "xyz"} | {f"accel_{axis}_g" for axis in "xyz"}
     return [name for name in columns if name in names]
@@ -208,4 +209,5 @@ def rows_in_words(rows: Rows) -> str:
         return "no row"
     begin, end = found[0]
     first = f"row {begin + 1}" if end == begin + 1 else f"rows {begin + 1} to {end}"
-    return first + (f" and {len(found) - 1} more places" if len(found) > 1 else "")
+    more = len(found) - 1
+    return first + (f" and {more} more place{'s' if more > 1 else ''}" if more else "")

@@ -7,7 +7,16 @@ from collections.abc import Iterator
 import numpy as np
 
 from labctl.recording.sanity.finding import Finding
-from labctl.recording.sanity.readings.series import ROBUST, Array, Marked, Rows, Series, medians_around, medians_of_five, rows_in_words
+from labctl.recording.sanity.readings.series import (
+    ROBUST,
+    Array,
+    Marked,
+    Rows,
+    Series,
+    medians_around,
+    medians_of_five,
+    rows_in_words,
+)
 
 #: A reading is compared with the median of the five around it, and its distance with the usual one of so many readings.
 USUAL_OVER = 100
