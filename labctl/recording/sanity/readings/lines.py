@@ -33,7 +33,7 @@ def check_lines(series: Series) -> Iterator[Marked]:
         return
     readings = pieces[0][0].stop - pieces[0][0].start
     limit = _limit(len(pieces), float(np.median([len(same) for same in pieces])), readings // 2)
-    hz = np.fft.rfftfreq(readings, series.step_s)
+    hz = np.asarray(np.fft.rfftfreq(readings, series.step_s), dtype=np.float64)
     window = np.hanning(readings)
     for name, values in series.residuals.items():
         noise = series.noises[name]

@@ -16,6 +16,7 @@ from labctl.recording.sanity.readings.series import (
     medians_around,
     medians_of_five,
     rows_in_words,
+    runs,
 )
 
 #: A reading is compared with the median of the five around it, and its distance with the usual one of so many readings.
@@ -132,9 +133,8 @@ def _moves(values: Array, block: int, least: float) -> tuple[Rows, Array]:
     usual = ROBUST * float(np.median(np.abs(np.diff(medians)))) / np.sqrt(2)
     drift = ROBUST * float(np.median(np.abs(off)))
     far = np.abs(off) > max(least, MOVED_NOISES * usual, 3.0 * drift)
-    edge = np.diff(np.concatenate([[0], far.astype(np.int8), [0]]))
     # a creeping output, such as one that warms up, leaves its level too, but not at once
-    for begin, end in zip(np.flatnonzero(edge == 1), np.flatnonzero(edge == -1), strict=True):
+    for begin, end in runs(far):
         before = off[max(begin - 2, 0)] if begin else 0.0
         after = off[min(end + 1, blocks - 1)] if end < blocks else 0.0
         most = off[begin:end][int(np.argmax(np.abs(off[begin:end])))]
