@@ -56,11 +56,12 @@ def check_clock(series: Series) -> Iterator[Marked]:
     out = ~rows_in_order(series.t_s)
     n = int(out.sum())
     worst = int(np.argmin(steps)) + 1
+    do = "row does" if n == 1 else "rows do"
     few = n <= MOST_OUT * len(series)
     yield Marked(
         Finding(
             "time_back", "certain", f"t_s, {rows_in_words(out)}",
-            f"{n} {'row does' if n == 1 else 'rows do'} not follow the row before in time, row {worst + 1} by {steps[worst - 1]:.4g} s",
+            f"{n} {do} not follow the row before in time, row {worst + 1} by {steps[worst - 1]:.4g} s",
             float(steps[worst - 1]), "s", "time stamps that rise from row to row",
             "leave these rows out, or sort the rows in the order of measurement" if few else
             "sort the rows in the order of measurement, or divide the recording",

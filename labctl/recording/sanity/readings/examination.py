@@ -45,19 +45,17 @@ class Examination:
 def examine(recording: Recording) -> list[Marked]:
     """Return what is wrong with single readings, with the rows of each; nothing for means and tables.
 
-    Rows that are marked as bad are not examined, and have no part in a finding.
+    Of rows that are marked as bad only the time is examined: they are no gap.
     """
     n = len(recording)
     valid = np.asarray(recording.columns["valid"]) != 0 if "valid" in recording.columns else np.ones(n, dtype=bool)
-    used = recording if valid.all() else _rows(recording, valid)
-    series = series_of(used)
-    if series is None or not all(np.isfinite(values).all() for values in series.outputs.values()):
+    whole = series_of(recording)
+    series = whole if valid.all() else series_of(_rows(recording, valid))
+    if whole is None or series is None or not all(np.isfinite(values).all() for values in series.outputs.values()):
         return []
-    found = examined(series)
-    if valid.all():
-        return found
     at = np.flatnonzero(valid)
-    return [replace(each, rows=_spread(each.rows, at, n)) for each in found]
+    of_values = [replace(each, rows=_spread(each.rows, at, n)) for each in _of_values(series)]
+    return [*check_clock(whole), *check_gaps(whole), *of_values]
 
 
 def _rows(recording: Recording, kept: Rows) -> Recording:
@@ -88,13 +86,12 @@ def joined_examinations(parts: Sequence[Examination]) -> Examination:
     return Examination(list(findings.values()), joined_courses([part.courses for part in parts]), marks)
 
 
-def examined(series: Series) -> list[Marked]:
-    """Return what is wrong with the readings of a series."""
+def _of_values(series: Series) -> list[Marked]:
     frozen = list(check_frozen(series))
     repeated = list(check_repeated(series, _all(frozen, len(series))))
     clipped = list(check_clipped(series, _all(repeated, len(series))))
     found = [
-        *check_clock(series), *check_gaps(series), *frozen, *repeated, *clipped, *check_thermometers(series),
+        *frozen, *repeated, *clipped, *check_thermometers(series),
         *check_steps(series),
         *check_units(series), *check_devices(series), *check_copies(series), *check_spikes(series),
         *check_moved(series), *check_lines(series),
