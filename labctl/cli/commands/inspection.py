@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from labctl.cli.commands.recordings import Beside, ImporterName, ImporterOptions, MapFile
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.import_dialogue import read_given
-from labctl.cli.options import Database, Json
+from labctl.cli.options import Beside, Database, ImporterName, ImporterOptions, Json, MapFile
 from labctl.cli.output import console, print_json
 from labctl.cli.printing.inspection import print_inspection
 

@@ -9,7 +9,7 @@ import typer
 
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.import_dialogue import Acceptance, named, print_template, read_given
-from labctl.cli.options import Database, Json
+from labctl.cli.options import Beside, Database, ImporterName, ImporterOptions, Json, MapFile
 from labctl.cli.output import console, print_json, print_warnings
 from labctl.cli.printing.inspection import print_left_out
 
@@ -22,32 +22,6 @@ PathToImport = Annotated[
         metavar="PATH",
         help="Folder with recording.toml and its data file; a CSV, Parquet or ULog file; a ROS bag; or a file that "
         "another installed importer reads.",
-    ),
-]
-ImporterName = Annotated[
-    str | None,
-    typer.Option(
-        "--format",
-        metavar="NAME",
-        help="Name of the importer that reads the file; default: the importer that recognises the file best.",
-    ),
-]
-ImporterOptions = Annotated[
-    list[str] | None,
-    typer.Option("--option", metavar="KEY=VALUE", help="Option of the importer, as KEY=VALUE; may be repeated."),
-]
-MapFile = Annotated[
-    Path | None,
-    typer.Option(
-        "--map",
-        metavar="FILE",
-        help="Column map (TOML): which column of the log is which quantity; default: labctl proposes a map and asks.",
-    ),
-]
-Beside = Annotated[
-    list[Path] | None,
-    typer.Option(
-        "--beside", metavar="FILE", help="File with further columns of the same run, joined by time; may be repeated."
     ),
 ]
 AcceptMap = Annotated[bool, typer.Option("--accept-map", help="Import with the proposed column map without asking.")]
