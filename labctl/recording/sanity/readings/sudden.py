@@ -27,6 +27,8 @@ LEAST_READINGS = 20
 SPIKE_NOISES, SPIKE_CODES, SPIKE_K = 8.0, 3.0, 3.0
 #: A spike is this many times as far off as 95 % of the readings beside it.
 JERKS = 4.0
+#: And this many times as far off as the readings two to four places away.
+ALONE = 2.5
 #: More readings than this share of all are no spikes.
 MOST_SPIKES = 0.02
 #: A rest is examined in blocks of this long, s, and at least so many readings, against the median of so many blocks.
@@ -71,8 +73,10 @@ def _spikes(values: Array, least: float, noise: float, *, steady: bool) -> tuple
     size = np.abs(off)
     usual = max(ROBUST * float(np.median(size)), noise)
     far = (size > SPIKE_NOISES * max(usual, 1e-300)) & (size > least)
+    far[:2] = far[-2:] = False  # has readings on one side only
     if not far.any():
         return off, far
+    far &= size > ALONE * _largest_beside(size)  # where a table starts, the unit swings
     if steady:  # the steps of a table's motor shake the unit at some rates
         far &= size > JERKS * _largest_of_blocks(size)
     else:  # at a turn of a motion the median is off, but not a cubic; by hand the usual distance changes too
@@ -80,6 +84,13 @@ def _spikes(values: Array, least: float, noise: float, *, steady: bool) -> tuple
         cubic = np.abs(values - (4.0 * (beside[1:-3] + beside[3:-1]) - beside[:-4] - beside[4:]) / 6.0)
         far &= cubic > np.maximum(SPIKE_NOISES * usual, JERKS * _largest_of_blocks(cubic))
     return off, far
+
+
+def _largest_beside(values: Array) -> Array:
+    """Return for each of (n,) values the largest of those two to four places away."""
+    padded = np.pad(values, 4)
+    n = len(values)
+    return np.asarray(np.max([padded[4 + by : 4 + by + n] for by in (-4, -3, -2, 2, 3, 4)], axis=0))
 
 
 def _largest_of_blocks(values: Array) -> Array:
