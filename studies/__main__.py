@@ -34,6 +34,7 @@ STUDIES = (
     "faults",
     "attacks",
     "damaged_imports",
+    "forensics",
     "endurance",
     "log_size",
     "c_points",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from datetime import UTC, date, datetime
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -42,18 +43,6 @@ RecordingIds = Annotated[
         help="Number of the recording, or several numbers to use recordings together, such as 1,2,3; default: "
         "the unit's newest recording that can be fitted.",
     ),
-]
-ImporterName = Annotated[
-    str | None,
-    typer.Option(
-        "--format",
-        metavar="NAME",
-        help="Name of the importer that reads the file; default: the importer that recognises the file best.",
-    ),
-]
-ImporterOptions = Annotated[
-    list[str] | None,
-    typer.Option("--option", metavar="KEY=VALUE", help="Option of the importer, as KEY=VALUE; may be repeated."),
 ]
 RecordingId = Annotated[
     int | None,
@@ -111,3 +100,31 @@ def instant(given: str | None, option: str) -> datetime | None:
     except ValueError as error:
         raise BadInput(f"{option} {given!r} is not a time; write it as 2027-11-23T08:00Z") from error
     return moment.replace(tzinfo=UTC) if moment is not None and moment.tzinfo is None else moment
+
+
+ImporterName = Annotated[
+    str | None,
+    typer.Option(
+        "--format",
+        metavar="NAME",
+        help="Name of the importer that reads the file; default: the importer that recognises the file best.",
+    ),
+]
+ImporterOptions = Annotated[
+    list[str] | None,
+    typer.Option("--option", metavar="KEY=VALUE", help="Option of the importer, as KEY=VALUE; may be repeated."),
+]
+MapFile = Annotated[
+    Path | None,
+    typer.Option(
+        "--map",
+        metavar="FILE",
+        help="Column map (TOML): which column of the log is which quantity; default: labctl proposes a map and asks.",
+    ),
+]
+Beside = Annotated[
+    list[Path] | None,
+    typer.Option(
+        "--beside", metavar="FILE", help="File with further columns of the same run, joined by time; may be repeated."
+    ),
+]

@@ -16,7 +16,8 @@ Part = Literal["fitted", "verification"]
 class FindingJson(TypedDict):
     """One thing that is wrong: what, where, its value, what was expected, what to do; `text`: all of it.
 
-    A finding that was kept before `part` was added concerns the whole recording.
+    A finding that was kept before `part` was added concerns the whole recording. Of single readings `channel` names
+    the column, `n` is how many they are, and `may_leave_out` says whether the rest can be used without them.
     """
 
     what: str
@@ -29,3 +30,6 @@ class FindingJson(TypedDict):
     do: str
     text: str
     part: NotRequired[Part]
+    channel: NotRequired[str]
+    n: NotRequired[int]
+    may_leave_out: NotRequired[bool]

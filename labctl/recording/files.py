@@ -90,7 +90,8 @@ def write_recording(recording: Recording, folder: Path, file_format: FileFormat 
     with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}-") as made:
         whole = Path(made) / "recording"
         whole.mkdir()
-        unstated = {name for name in ("standards", "thermometer", "unread") if not getattr(recording.info, name)}
+        optional = ("standards", "thermometer", "unread", "left_out")
+        unstated = {name for name in optional if not getattr(recording.info, name)}
         if recording.info.date_known:
             unstated.add("date_known")
         head = recording.info.model_dump(mode="json", exclude_none=True, exclude=unstated)

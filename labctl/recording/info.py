@@ -69,6 +69,18 @@ class OutputUnit(BaseModel):
         return self
 
 
+class LeftOut(BaseModel):
+    """Readings that were left out by choice when a recording was imported: they are marked with valid = 0."""
+
+    model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True)
+
+    what: str  #: the kind of the finding, such as "spikes"
+    channel: str = ""  #: empty: of the whole rows
+    n: int = Field(ge=0)
+    of: int = Field(ge=0)
+    why: str  #: what was found
+
+
 class RecordingInfo(BaseModel):
     """The head of a recording (recording.toml, format version 1)."""
 
@@ -86,6 +98,8 @@ class RecordingInfo(BaseModel):
     #: What of the file that it was read from could not be read, in words, and its share, 0 to 1.
     unread: str = ""
     unread_share: float | None = Field(default=None, ge=0, le=1)
+    #: Readings that were left out by choice.
+    left_out: tuple[LeftOut, ...] = ()
     power_on_s: float | None = None
     latitude_deg: float | None = Field(default=None, ge=-90, le=90)
     table_axis: Literal["up"] = "up"

@@ -17,11 +17,13 @@ from labctl.services.commands.registry import IMPORT_EXAMPLE, IMPORT_LOG, IMPORT
 from labctl.services.commands.requests import LogFile, RecordingFolder
 from labctl.services.recordings import catalogue
 from labctl.services.recordings.allan import allan_unit
+from labctl.services.recordings.examination import inspection_of_recording
 from labctl.services.recordings.importers import parsed_options
 from labctl.services.recordings.log_preview import preview_log
 from labctl.services.recordings.traces import trace as trace_of
 from labctl.services.recordings.transfer import import_files, zip_recording
 from labctl.services.recordings.uploads import sent_map, with_staged
+from labctl.services.schemas.inspection import InspectionResponse
 from labctl.services.schemas.recordings import (
     AllanResponse,
     DataSetsResponse,
@@ -187,6 +189,13 @@ async def trace(
 ) -> TraceResponse:
     """Smallest, largest and mean reading of a channel in time bins of equal length; empty bins are left out."""
     return await while_connected(request, service, trace_of, recording, channel, from_s, until_s, points)
+
+
+@router.get("/{recording}/inspection", summary="Inspection of a recording")
+async def inspection(request: Request, recording: int, service: ServiceDep) -> InspectionResponse:
+    """What is wrong with the readings before anything is fitted to them, what was left out when they were imported, and
+    a picture of every channel with the places of the findings."""
+    return await while_connected(request, service, inspection_of_recording, recording)
 
 
 @router.get("/{recording}/allan", summary="Noise of a recording at rest")

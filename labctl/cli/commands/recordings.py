@@ -9,8 +9,9 @@ import typer
 
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.import_dialogue import Acceptance, named, print_template, read_given
-from labctl.cli.options import Database, ImporterName, ImporterOptions, Json
+from labctl.cli.options import Beside, Database, ImporterName, ImporterOptions, Json, MapFile
 from labctl.cli.output import console, print_json, print_warnings
+from labctl.cli.printing.inspection import print_left_out
 
 export_app = typer.Typer(no_args_is_help=True, help="Export recordings from the database to files.")
 
@@ -21,20 +22,6 @@ PathToImport = Annotated[
         metavar="PATH",
         help="Folder with recording.toml and its data file; a CSV, Parquet or ULog file; a ROS bag; or a file that "
         "another installed importer reads.",
-    ),
-]
-MapFile = Annotated[
-    Path | None,
-    typer.Option(
-        "--map",
-        metavar="FILE",
-        help="Column map (TOML): which column of the log is which quantity; default: labctl proposes a map and asks.",
-    ),
-]
-Beside = Annotated[
-    list[Path] | None,
-    typer.Option(
-        "--beside", metavar="FILE", help="File with further columns of the same run, joined by time; may be repeated."
     ),
 ]
 AcceptMap = Annotated[bool, typer.Option("--accept-map", help="Import with the proposed column map without asking.")]
@@ -50,6 +37,16 @@ TemplateKind = Annotated[
     str | None,
     typer.Option("--template", metavar="KIND", help="Print a CSV template: rest, rates, turns, profile or poses."),
 ]
+LeaveOut = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--leave-out",
+        metavar="KIND",
+        help="Leave out the readings of one kind of finding: time_back, frozen, clipped, thermometer, spikes, "
+        "repeated, moved, or all of these; may be repeated. They are marked as bad, counted and stated in the "
+        "recording.",
+    ),
+]
 
 
 def import_(
@@ -61,6 +58,7 @@ def import_(
     accept_map: AcceptMap = False,
     write_map: WriteMap = None,
     template: TemplateKind = None,
+    leave_out: LeaveOut = None,
     as_json: Json = False,
     database: Database = None,
 ) -> None:
@@ -79,13 +77,16 @@ def import_(
             named(path), given=column_map is not None, accepted=accept_map, out=write_map, quiet=as_json
         )
         with as_interchange(
-            accept.path, importer, option or [], read_given(column_map), accept.ask, beside or []
+            accept.path, importer, option or [], read_given(column_map), accept.ask, beside or [], leave_out or []
         ) as folder:
             answer = execute(database, IMPORT_RECORDING, RecordingFolder(folder))
     if as_json:
         print_json(answer)
         return
     print_warnings(answer.warnings)
+    print_left_out(answer.left_out)
+    if any(warning.n is not None for warning in answer.warnings):
+        console.print(f"where in the recording: labctl inspect {answer.recording} --picture FILE.html", style="dim")
     if answer.measured_at is None:
         console.print(
             f"The file states no date, so the date of the measurement is not known; {GIVE_DATE}.", markup=False

@@ -8,6 +8,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.recording.sanity.readings.series import code_step
+
 Array = NDArray[np.float64]
 
 #: Readings are judged in windows of about this time, s, and of at least so many readings.
@@ -50,7 +52,8 @@ def movement(rates_dps: Array, t_s: Array) -> Movement:
     centred = rates_dps - np.repeat(means, counts, axis=0)
     spread = np.sqrt(np.add.reduceat(centred**2, starts, axis=0) / counts[:, None])
     usual = np.minimum(np.percentile(spread, 20, axis=0), MOST_NOISE_DPS)
-    moves = (spread > np.maximum(TIMES_USUAL * usual, LEAST_SPREAD_DPS)).any(axis=1)
+    steps = [code_step(column) for column in rates_dps.T]  # a still output that lies between two codes spreads by one
+    moves = (spread > np.maximum(TIMES_USUAL * usual, np.maximum(LEAST_SPREAD_DPS, steps))).any(axis=1)
     if not moves.all():
         quiet = means[~moves]
         slowest = np.argsort(np.linalg.norm(quiet, axis=1))[: max(1, len(quiet) // 2)]

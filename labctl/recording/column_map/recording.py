@@ -35,7 +35,7 @@ LEAST_ROWS = 2
 _TAKEN = frozenset(
     {
         "format", "serial", "axes", "kind", "motion", "started_at", "date_known", "output", "sample_rate_hz", "unread",
-        "unread_share",
+        "unread_share", "left_out",
     }
 )  # fmt: skip
 #: An instant of a file before this is that of a clock that was never set: seconds since power-on, or a simulation.

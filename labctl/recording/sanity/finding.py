@@ -21,6 +21,9 @@ class Finding:
     expected: str
     do: str
     part: Part = "fitted"  #: of the recording: what a fit takes in, or what was measured to verify a calibration
+    channel: str = ""  #: the column that it is about; empty: the recording, or data sets
+    n: int | None = None  #: readings that it is about; None: it is not about single readings
+    may_leave_out: bool = False  #: whether those readings can be left out, and the rest be used
 
     @property
     def text(self) -> str:
@@ -29,10 +32,13 @@ class Finding:
 
     def to_json(self) -> FindingJson:
         """Return the finding as JSON, with its sentence."""
-        return {
+        found: FindingJson = {
             "what": self.what, "severity": self.severity, "where": self.where, "said": self.said, "value": self.value,
             "unit": self.unit, "expected": self.expected, "do": self.do, "text": self.text, "part": self.part,
         }  # fmt: skip
+        if self.n is not None:
+            found |= {"channel": self.channel, "n": self.n, "may_leave_out": self.may_leave_out}
+        return found
 
 
 def certain(findings: Iterable[Finding]) -> list[Finding]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +13,7 @@ from labctl.recording.sanity.damage import check_damage
 from labctl.recording.sanity.finding import Finding
 from labctl.recording.sanity.gain import check_responses
 from labctl.recording.sanity.outlying import check_outlying
+from labctl.recording.sanity.readings import examine
 from labctl.recording.sanity.reference import check_reference
 from labctl.recording.sanity.response import responses
 from labctl.recording.sanity.summary import Summary, summarise
@@ -22,17 +24,19 @@ from labctl.recording.sanity.within import check_at_rest, check_changes, check_c
 
 def inspect_recording(recording: Recording) -> list[Finding]:
     """Return the findings of a whole recording, the certain ones first; none for a table of coefficients."""
-    return findings_of(summarise(recording), recording.environment)
+    return findings_of(summarise(recording), recording.environment, [each.finding for each in examine(recording)])
 
 
-def findings_of(summary: Summary, environment: Columns | None = None) -> list[Finding]:
-    """Return the findings of a summary, the certain ones first.
+def findings_of(
+    summary: Summary, environment: Columns | None = None, of_readings: Sequence[Finding] = ()
+) -> list[Finding]:
+    """Return the findings of a summary, and those of single readings, the certain ones first.
 
     What is fitted and what was measured to verify a calibration are examined apart: neither hides a fault of the other,
     and each finding names its part.
     """
     if len(summary) == 0:
-        return []
+        return sorted(of_readings, key=_order)
     aside = np.asarray(summary[VERIFICATION], dtype=np.bool_)
     found = list(check_damage(summary.info))
     if not aside.all():
@@ -40,7 +44,17 @@ def findings_of(summary: Summary, environment: Columns | None = None) -> list[Fi
     if aside.any():
         of_part = _findings(summary.take(aside), None)
         found += [replace(each, part="verification", where=f"verification part, {each.where}") for each in of_part]
-    return sorted(found, key=lambda finding: finding.severity != "certain")
+    return sorted([*found, *_not_said(of_readings, found)], key=_order)
+
+
+def _not_said(of_readings: Sequence[Finding], found: Sequence[Finding]) -> Iterator[Finding]:
+    """Yield findings of readings but those that the data sets' figures say too, with what they leave in the means."""
+    said = {(each.what, each.channel) for each in found if each.channel}
+    yield from (each for each in of_readings if (each.what, each.channel) not in said)
+
+
+def _order(finding: Finding) -> bool:
+    return finding.severity != "certain"
 
 
 def _findings(summary: Summary, environment: Columns | None) -> list[Finding]:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from labctl.recording.recording import Columns
-from labctl.recording.sanity.finding import Finding, numbers_in_words
+from labctl.recording.sanity.finding import Finding
 from labctl.recording.sanity.summary import Summary
 
 #: Units that time stamps come in, and how many of them are a second.
@@ -22,8 +22,6 @@ SLOW_STEP_S, LONG_S = 5.0, 1e7
 LEAST_READINGS = 16
 #: Time stamps that begin later than this after `started_at`, s, count from somewhere else.
 LATE_S = 1e8
-#: A data set lacks readings when this share of its time is in gaps.
-LOST_SHARE = 0.1
 
 
 def check_time(summary: Summary, environment: Columns | None = None) -> Iterator[Finding]:
@@ -33,7 +31,6 @@ def check_time(summary: Summary, environment: Columns | None = None) -> Iterator
         return
     yield from _unit(summary, environment)
     yield from _origin(summary, float(begin[0]))
-    yield from _gaps(summary)
 
 
 def _unit(summary: Summary, environment: Columns | None) -> Iterator[Finding]:
@@ -99,17 +96,3 @@ def _origin(summary: Summary, first_s: float) -> Iterator[Finding]:
     instant = f"the instant of started_at ({begun:%Y-%m-%d %H:%M} UTC)" if begun else "the time of the first reading"
     do = f"subtract {instant} from column t_s"
     yield Finding("time_origin", "likely", "column t_s", said, first_s, "s", "seconds since started_at", do)
-
-
-def _gaps(summary: Summary) -> Iterator[Finding]:
-    lost = np.asarray(summary["lost_s"], dtype=np.float64)
-    length = np.asarray(summary["t_end_s"], dtype=np.float64) - np.asarray(summary["t_begin_s"], dtype=np.float64)
-    lacking = np.nan_to_num(lost) > LOST_SHARE * np.maximum(length, 1e-9)
-    if not lacking.any():
-        return
-    longest = float(np.nanmax(np.where(lacking, np.asarray(summary["gap_s"], dtype=np.float64), 0.0)))
-    yield Finding(
-        "gaps", "likely", f"{numbers_in_words(summary['dataset'][lacking])} ({int(lacking.sum())} of {len(lacking)})",
-        f"readings are missing within the data set, the longest gap is {longest:.3g} s",
-        longest, "s", "readings without gaps", "check the logger; lost readings are missing from the mean",
-    )  # fmt: skip

@@ -128,6 +128,7 @@ def check_codes(summary: Summary) -> Iterator[Finding]:
             f"the output changes in steps of {step:.4g} deg/s, the readings of these data sets spread by {noise:.2g} "
             f"deg/s, and their mean has an uncertainty of u = {float(u.max()):.2g} deg/s",
             step, "deg/s", "a step below twice the noise", "log the output with more digits or a finer converter",
+            channel=f"gyro_{axis}",
         )  # fmt: skip
 
 

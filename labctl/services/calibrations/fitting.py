@@ -17,7 +17,8 @@ from labctl.services.calibrations.next_version import keep_next_version
 from labctl.services.calibrations.remembered import remembered_by
 from labctl.services.criticism.measurements import measurements_of
 from labctl.services.fixed_coefficients import fixed_of
-from labctl.services.recordings.inspection import as_json, refuse_wrong, warning_of
+from labctl.services.recordings.inspection import refuse_wrong
+from labctl.services.recordings.warnings import as_json, warning_of
 from labctl.services.schemas.calibrations import (
     CalibrationRow,
     FitRequest,

@@ -29,7 +29,8 @@ from labctl.services.criticism.evaluation import model_of
 from labctl.services.criticism.measurements import Measurements, measurements_of
 from labctl.services.criticism.residuals import residual_columns
 from labctl.services.criticism.versions import version_of
-from labctl.services.recordings.inspection import as_json, refuse_wrong, warning_of
+from labctl.services.recordings.inspection import refuse_wrong
+from labctl.services.recordings.warnings import as_json, warning_of
 from labctl.services.schemas.calibrations import (
     ImproveRequest,
     ImproveResponse,

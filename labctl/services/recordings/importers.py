@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from instruments.plugins import PluginError, PluginGroup, failure, instance_of
 from labctl.errors import BadInput, BadRecording, LabctlError
-from labctl.recording import Recording, write_recording
+from labctl.recording import Recording, read_recording, write_recording
 from labctl.recording.checks import checked, checked_environment
 from labctl.recording.column_map import ColumnMap, FileKeys
 from labctl.recording.data_files.damaged_files import refuse_computer_errors
@@ -20,8 +20,10 @@ from labctl.recording.importer import Importer, TableImporter
 from labctl.recording.logs.layout import layout_of
 from labctl.recording.logs.recognition import MOST_TEXT_BYTES, head_of, refuse_large, refuse_other
 from labctl.recording.raw_table import RawTable
+from labctl.recording.sanity.readings import without
 from labctl.services.recordings.logs import Accept, MappedFile, given_layout, mapped_file
 from labctl.services.recordings.staging import staging_folder
+from labctl.services.recordings.time_order import OUT_OF_ORDER, OutOfOrder, leaves_out_rows
 
 
 def _importer(found: object) -> Importer[Any] | TableImporter[Any]:
@@ -41,12 +43,14 @@ def as_interchange(
     column_map: ColumnMap | None = None,
     accept: Accept | None = None,
     beside: Sequence[Path] = (),
+    leave_out: Sequence[str] = (),
 ) -> Iterator[Path]:
     """Give the folder of a recording in the interchange format: the path itself, or one made of what `path` holds.
 
     `name` is an importer's; without it the importer that is surest. `options` are KEY=VALUE. `column_map` says what the
     columns of a log are; without it one is proposed. `accept` is shown what a log would become, and raises where that
-    is not wanted. `beside` are files with further columns of the same run. Raises BadInput for an importer or option
+    is not wanted. `beside` are files with further columns of the same run. `leave_out` are kinds of findings whose
+    readings are left out. Raises BadInput for an importer or option
     that there is not, BadRecording for what cannot be read.
     """
     given = parsed_options(options)
@@ -56,9 +60,15 @@ def as_interchange(
             raise _no_map(chosen)
         if beside:
             raise _nothing_beside(chosen)
-        yield path
-        return
-    recording = read_with(chosen, path, given, column_map, accept, beside)
+        if not leave_out:
+            yield path
+            return
+        recording = read_recording(path)
+    else:
+        in_order = OutOfOrder() if leaves_out_rows(leave_out) else None
+        recording = read_with(chosen, path, given, column_map, accept, beside, in_order)
+    if of_readings := [kind for kind in leave_out if kind != OUT_OF_ORDER]:
+        recording = without(recording, of_readings, str(path))
     with staging_folder() as made:
         folder = made / "recording"
         write_recording(recording, folder)
@@ -112,8 +122,12 @@ def read_with(
     column_map: ColumnMap | None = None,
     accept: Accept | None = None,
     beside: Sequence[Path] = (),
+    out_of_order: OutOfOrder | None = None,
 ) -> Recording:
-    """Return what an importer reads, checked by the rules of the interchange format; raises BadInput, BadRecording."""
+    """Return what an importer reads, checked by the rules of the interchange format; raises BadInput, BadRecording.
+
+    With `out_of_order` a log is read without the rows whose time goes back, and that says which they were.
+    """
     importer, given = _importer_and_options(name, options)
     plugin = IMPORTERS.plugin(name)
     if not path.exists():
@@ -125,7 +139,8 @@ def read_with(
     made: MappedFile | None = None
     with _failures_named(path, name):
         if isinstance(importer, TableImporter):
-            made = mapped_file(name, importer, path, given, column_map, [_table(each, column_map) for each in beside])
+            tables = [_table(each, column_map) for each in beside]
+            made = mapped_file(name, importer, path, given, column_map, tables, out_of_order)
         else:
             found = instance_of(Recording)(importer.read(path, given))
     if made is not None:

@@ -6,10 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.errors import DataRefused
-from labctl.json_types.findings import FindingJson
 from labctl.recording import Recording
-from labctl.recording.sanity import Finding, Summary, findings_of, joined, steps_of, summarise
+from labctl.recording.sanity import Summary, findings_of, joined, steps_of, summarise
 from labctl.services.cache import cached
+from labctl.services.recordings.readings_examined import examined_stored
+from labctl.services.recordings.warnings import as_json, finding_of, warning_of
+from labctl.services.schemas.inspection import ReadingsExamined
 from labctl.services.schemas.warnings import DataWarning, RecordingInspection
 from labctl.store import RecordingRow, Store
 
@@ -25,24 +27,26 @@ def inspect_stored(store: Store, row: RecordingRow, recording: Recording | None 
 
 def _inspected(store: Store, row: RecordingRow, recording: Recording | None) -> RecordingInspection:
     if recording is not None:
-        return _response(summarise(recording), recording)
+        return _response(summarise(recording), recording, examined_stored(store, row, recording))
     points = store.recordings.points(row.id, head=row)
     if row.kind != "samples":
-        return _response(summarise(points), points)
+        return _response(summarise(points), points, examined_stored(store, row, points))
     info = points.info.model_copy(update={"kind": "samples"})
     parts = [summarise(Recording(info, columns)) for _, columns in store.recordings.iter_datasets(row.id)]
-    return _response(joined(info, parts), points)
+    return _response(joined(info, parts), points, examined_stored(store, row))
 
 
-def _response(summary: Summary, recording: Recording) -> RecordingInspection:
+def _response(summary: Summary, recording: Recording, readings: ReadingsExamined) -> RecordingInspection:
+    of_readings = [finding_of(each) for each in readings.warnings]
+    warnings = [warning_of(each) for each in findings_of(summary, recording.environment, of_readings)]
     if len(summary) == 0:
         return RecordingInspection(
-            warnings=[], dataset=[], rate_low_dps=[], rate_high_dps=[], temperature_low_c=[], temperature_high_c=[],
-            position=[], quantisation_dps={},
+            warnings=warnings, dataset=[], rate_low_dps=[], rate_high_dps=[], temperature_low_c=[],
+            temperature_high_c=[], position=[], quantisation_dps={},
         )  # fmt: skip
     coarse = {axis: steps_of(summary, axis) for axis in summary.info.axes}
     return RecordingInspection(
-        warnings=[warning_of(finding) for finding in findings_of(summary, recording.environment)],
+        warnings=warnings,
         dataset=summary["dataset"].tolist(),
         rate_low_dps=summary["rate_low_dps"].tolist(),
         rate_high_dps=summary["rate_high_dps"].tolist(),
@@ -55,20 +59,6 @@ def _response(summary: Summary, recording: Recording) -> RecordingInspection:
 
 def _numbers(values: NDArray[np.float64]) -> list[float | None]:
     return [float(value) if np.isfinite(value) else None for value in values]
-
-
-def warning_of(finding: Finding) -> DataWarning:
-    """Return a finding as a response."""
-    return DataWarning.model_validate(finding.to_json(), extra="forbid")
-
-
-def as_json(warning: DataWarning) -> FindingJson:
-    """Return a warning as it is kept with a version."""
-    return {
-        "what": warning.what, "severity": warning.severity, "where": warning.where, "said": warning.said,
-        "value": warning.value, "unit": warning.unit, "expected": warning.expected, "do": warning.do,
-        "text": warning.text, "part": warning.part,
-    }  # fmt: skip
 
 
 INSIST = "; to do it nevertheless: --accept-warnings"

@@ -16,7 +16,8 @@ from labctl.recording.quantisation import QUANTISATION
 from labctl.recording.sanity import Finding
 from labctl.recording.verification import is_marked
 from labctl.services.cache import UNNAMED, compute
-from labctl.services.recordings.inspection import inspect_stored, warning_of
+from labctl.services.recordings.inspection import inspect_stored
+from labctl.services.recordings.warnings import warning_of
 from labctl.services.schemas.warnings import DataWarning, RecordingInspection
 from labctl.store import RecordingRow, Store
 

@@ -20,6 +20,7 @@ from labctl.recording.column_map import (
 from labctl.recording.importer import TableImporter, TableOptionsT
 from labctl.recording.logs.beside import joined
 from labctl.recording.raw_table import RawTable
+from labctl.services.recordings.time_order import OutOfOrder
 
 
 @dataclass(frozen=True)
@@ -49,11 +50,12 @@ Accept = Callable[[MappedFile], None]
 
 def mapped_file(
     name: str, importer: TableImporter[TableOptionsT], path: Path, options: TableOptionsT, column_map: ColumnMap | None,
-    beside: Sequence[RawTable] = (),
+    beside: Sequence[RawTable] = (), out_of_order: OutOfOrder | None = None,
 ) -> MappedFile:  # fmt: skip
     """Return what a log becomes by a map, or by the one that is proposed; raises BadRecording for what is no log.
 
-    `beside` are the tables of further files of the same run.
+    `beside` are the tables of further files of the same run. With `out_of_order` the rows whose time goes back are
+    left out, and that keeps which they were.
     """
     table = joined(importer.table(path, given_layout(options, column_map)), beside, column_map)
     proposal = propose(table) if column_map is None else completed(table, column_map)
@@ -63,10 +65,13 @@ def mapped_file(
     if options.started_at is not None:
         chosen = chosen.model_copy(update={"started_at": options.started_at})
     made = MappedFile(name, importer.title, table, chosen, column_map is None, proposal.guesses)
+    used = table if out_of_order is None else out_of_order.rows_in_order(table, chosen)
     try:
-        log = recording_of(table, chosen)
+        log = recording_of(used, chosen)
     except BadFile as error:
         return replace(made, problems=error.problems)
+    if out_of_order is not None:
+        log = replace(log, recording=out_of_order.stated(log.recording, table.rows))
     return replace(made, log=log)
 
 

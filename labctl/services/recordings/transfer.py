@@ -43,6 +43,7 @@ def import_folder(store: Store, folder: Path, at: datetime) -> ImportResponse:
         suggested_model=model_for(store, row),
         measured_at=recording.info.measured_at,
         warnings=inspect_stored(store, row, recording).warnings,
+        left_out=list(recording.info.left_out),
     )
 
 

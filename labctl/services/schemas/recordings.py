@@ -8,7 +8,7 @@ from pydantic import Field, JsonValue
 
 from instruments.bench_config import SERIAL
 from labctl.json_types.noise import AllanJson
-from labctl.recording.info import Motion
+from labctl.recording.info import LeftOut, Motion
 from labctl.services.schemas.base import Request, ResponseModel
 from labctl.services.schemas.plans import RecipeSource
 from labctl.services.schemas.warnings import WARNINGS, DataWarning
@@ -62,6 +62,9 @@ class ImportResponse(ResponseModel):
         default=None, description="Date of the measurement; null: the file states none, and it is not known."
     )
     warnings: list[DataWarning] = Field(default_factory=list, description=WARNINGS)
+    left_out: list[LeftOut] = Field(
+        default_factory=list, description="Readings that were left out by choice, with how many and why."
+    )
 
 
 class SimulatedRecordingResponse(ImportResponse):

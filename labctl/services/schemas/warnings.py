@@ -33,6 +33,15 @@ class DataWarning(ResponseModel):
         description="The part of the recording that the warning concerns. `fitted`: what a fit takes in; "
         "`verification`: data sets measured to verify a calibration, whose errors refuse no fit but a certification.",
     )
+    channel: str = Field(
+        default="", description="Of single readings: the column that the warning concerns; empty: whole rows."
+    )
+    n: int | None = Field(
+        default=None, description="How many readings the warning concerns; null: it is not about single readings."
+    )
+    may_leave_out: bool = Field(
+        default=False, description="Whether those readings can be left out (`labctl import --leave-out`)."
+    )
 
 
 class RecordingInspection(ResponseModel):

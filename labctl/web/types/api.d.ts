@@ -76,6 +76,7 @@ export type CampaignState = Campaign["state"];
 export type Timeline = Schema<"TimelineColumns"> & Partial<Schema<"RunColumns">>;
 
 export type Allan = Schema<"AllanResponse">;
+export type Inspection = Schema<"InspectionResponse">;
 export type AllanAxis = Schema<"AllanJson">;
 export type Bench = Schema<"BenchResponse">;
 export type CampaignEvent = Schema<"EventResponse">;

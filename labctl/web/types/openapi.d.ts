@@ -1311,6 +1311,27 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/recordings/{recording}/inspection": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Inspection of a recording
+         * @description What is wrong with the readings before anything is fitted to them, what was left out when they were imported, and
+         *     a picture of every channel with the places of the findings.
+         */
+        get: operations["inspection_api_recordings__recording__inspection_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/recordings/{recording}/allan": {
         parameters: {
             query?: never;
@@ -4039,7 +4060,7 @@ export interface components {
              * Left Out
              * @description Effects of the fit that are not exported with the calibration.
              */
-            left_out: components["schemas"]["LeftOut"][];
+            left_out: components["schemas"]["labctl__json_types__models__LeftOut"][];
             /**
              * Least Turn Rate Dps
              * @description The error per turn is computed where the magnitude of the rate is at least this, deg/s.
@@ -4125,6 +4146,28 @@ export interface components {
             rate_dps: number;
             over_rate: components["schemas"]["ContributionLines"];
             over_temperature: components["schemas"]["ContributionLines"];
+        };
+        /**
+         * CourseJson
+         * @description One channel in bins in the order of time: begin of each, least and largest reading; all `readings` are in them.
+         *
+         *     null: no number, or a data set ends there.
+         */
+        CourseJson: {
+            /** Channel */
+            channel: string;
+            /** Unit */
+            unit: string;
+            /** T S */
+            t_s: (number | null)[];
+            /** Low */
+            low: (number | null)[];
+            /** High */
+            high: (number | null)[];
+            /** Readings */
+            readings: number;
+            /** Bins */
+            bins: number;
         };
         /**
          * CriticisedErrors
@@ -4479,6 +4522,23 @@ export interface components {
              * @enum {string}
              */
             part: "fitted" | "verification";
+            /**
+             * Channel
+             * @description Of single readings: the column that the warning concerns; empty: whole rows.
+             * @default
+             */
+            channel: string;
+            /**
+             * N
+             * @description How many readings the warning concerns; null: it is not about single readings.
+             */
+            n: number | null;
+            /**
+             * May Leave Out
+             * @description Whether those readings can be left out (`labctl import --leave-out`).
+             * @default false
+             */
+            may_leave_out: boolean;
         };
         /**
          * DatasheetResponse
@@ -5511,6 +5571,11 @@ export interface components {
              * @description Certain and probable errors of the data or of the fit, the certain errors first; empty if there are none.
              */
             warnings: components["schemas"]["DataWarning"][];
+            /**
+             * Left Out
+             * @description Readings that were left out by choice, with how many and why.
+             */
+            left_out: components["schemas"]["labctl__recording__info__LeftOut"][];
         };
         /**
          * ImproveRequest
@@ -5622,7 +5687,7 @@ export interface components {
              * Left Out
              * @description Effects in the fitted model that the exported calibration leaves out.
              */
-            left_out: components["schemas"]["LeftOut"][];
+            left_out: components["schemas"]["labctl__json_types__models__LeftOut"][];
             /** Version */
             version: number;
             /** Parent */
@@ -5701,7 +5766,7 @@ export interface components {
              * Left Out
              * @description Effects in the fitted model that an export leaves out, each with the RMS of its contribution to the rate, deg/s.
              */
-            left_out: components["schemas"]["LeftOut"][];
+            left_out: components["schemas"]["labctl__json_types__models__LeftOut"][];
             /** Version */
             version: number;
             /** Parent */
@@ -5741,6 +5806,58 @@ export interface components {
              * @description Temperature states (thermal lag or hysteresis) that must be updated with the temperature of every sample.
              */
             remembers: components["schemas"]["Follower"][];
+        };
+        /**
+         * InspectionResponse
+         * @description What is wrong with a recording or a file before anything is fitted to it, and where.
+         */
+        InspectionResponse: {
+            /**
+             * Source
+             * @description The file, or `recording N`.
+             */
+            source: string;
+            /**
+             * Recording
+             * @description Number of the recording; null: a file that is not imported.
+             */
+            recording: number | null;
+            /** Serial */
+            serial: string;
+            /** Kind */
+            kind: string;
+            /**
+             * Motion
+             * @enum {string}
+             */
+            motion: "rates" | "rest" | "turns" | "profile" | "poses";
+            /**
+             * Readings
+             * @description Readings that were examined, also those that are marked as bad.
+             */
+            readings: number;
+            /**
+             * Warnings
+             * @description Certain and probable errors of the data or of the fit, the certain errors first; empty if there are none.
+             */
+            warnings: components["schemas"]["DataWarning"][];
+            /**
+             * Left Out
+             * @description Readings that were left out by choice when it was imported.
+             */
+            left_out: components["schemas"]["labctl__recording__info__LeftOut"][];
+            /**
+             * Courses
+             * @description Each channel in bins: least and largest reading; all readings are in them.
+             */
+            courses: components["schemas"]["CourseJson"][];
+            /**
+             * Marks
+             * @description Where each finding about single readings is.
+             */
+            marks: components["schemas"]["MarkJson"][];
+            /** @description The courses and marks, drawn; null: there are no readings. */
+            picture: components["schemas"]["PictureResponse"] | null;
         };
         /**
          * JointJson
@@ -5989,26 +6106,6 @@ export interface components {
             latest: string | null;
         };
         /**
-         * LeftOut
-         * @description An effect of a fit that no correction by output and temperature contains.
-         *
-         *     It does not belong to the unit, or its input is known on the bench only; `specific_force` of a file has those for
-         *     which a consumer needs an accelerometer.
-         */
-        LeftOut: {
-            /** Effect */
-            effect: string;
-            /**
-             * Origin
-             * @enum {string}
-             */
-            origin: "sensor" | "package" | "fixture" | "bench" | "environment";
-            /** Term */
-            term: string;
-            /** Rms Dps */
-            rms_dps?: number | null;
-        };
-        /**
          * LegError
          * @description How well one leg, a stretch of heating or of cooling, is predicted by a fit to the others.
          */
@@ -6211,6 +6308,26 @@ export interface components {
             low: (number | null)[];
             /** High */
             high: (number | null)[];
+        };
+        /**
+         * MarkJson
+         * @description Where one kind of finding is in a channel: the times of the longest of `places` stretches.
+         *
+         *     `whole`: it is about all of the channel. An empty channel is every channel.
+         */
+        MarkJson: {
+            /** What */
+            what: string;
+            /** Channel */
+            channel: string;
+            /** From S */
+            from_s: number[];
+            /** Until S */
+            until_s: number[];
+            /** Places */
+            places: number;
+            /** Whole */
+            whole: boolean;
         };
         /**
          * MeasuredUnder
@@ -6941,7 +7058,7 @@ export interface components {
              * Left Out
              * @description Effects in the fitted model that the exported calibration leaves out.
              */
-            left_out: components["schemas"]["LeftOut"][];
+            left_out: components["schemas"]["labctl__json_types__models__LeftOut"][];
             /** @description Residuals of the changed model, by data set. */
             residuals: components["schemas"]["ResidualColumns"];
         };
@@ -7969,6 +8086,11 @@ export interface components {
              * @description Certain and probable errors of the data or of the fit, the certain errors first; empty if there are none.
              */
             warnings: components["schemas"]["DataWarning"][];
+            /**
+             * Left Out
+             * @description Readings that were left out by choice, with how many and why.
+             */
+            left_out: components["schemas"]["labctl__recording__info__LeftOut"][];
             /** Recipe */
             recipe: string;
             /** Bench */
@@ -8465,7 +8587,7 @@ export interface components {
              * Left Out
              * @description Effects in the fitted model that the exported calibration leaves out.
              */
-            left_out: components["schemas"]["LeftOut"][];
+            left_out: components["schemas"]["labctl__json_types__models__LeftOut"][];
             /** Axes */
             axes: {
                 [key: string]: components["schemas"]["Surface"];
@@ -9206,7 +9328,7 @@ export interface components {
              * Left Out
              * @description Effects in the fitted model that an export leaves out, each with the RMS of its contribution to the rate, deg/s.
              */
-            left_out: components["schemas"]["LeftOut"][];
+            left_out: components["schemas"]["labctl__json_types__models__LeftOut"][];
             /**
              * Remembers
              * @description Temperature states (thermal lag or hysteresis) that must be updated with the temperature of every sample.
@@ -9342,6 +9464,45 @@ export interface components {
             residual_dps: number;
             /** Over Floor */
             over_floor: number;
+        };
+        /**
+         * LeftOut
+         * @description An effect of a fit that no correction by output and temperature contains.
+         *
+         *     It does not belong to the unit, or its input is known on the bench only; `specific_force` of a file has those for
+         *     which a consumer needs an accelerometer.
+         */
+        labctl__json_types__models__LeftOut: {
+            /** Effect */
+            effect: string;
+            /**
+             * Origin
+             * @enum {string}
+             */
+            origin: "sensor" | "package" | "fixture" | "bench" | "environment";
+            /** Term */
+            term: string;
+            /** Rms Dps */
+            rms_dps?: number | null;
+        };
+        /**
+         * LeftOut
+         * @description Readings that were left out by choice when a recording was imported: they are marked with valid = 0.
+         */
+        labctl__recording__info__LeftOut: {
+            /** What */
+            what: string;
+            /**
+             * Channel
+             * @default
+             */
+            channel?: string;
+            /** N */
+            n: number;
+            /** Of */
+            of: number;
+            /** Why */
+            why: string;
         };
     };
     responses: never;
@@ -11487,6 +11648,37 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["TraceResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    inspection_api_recordings__recording__inspection_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                recording: number;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["InspectionResponse"];
                 };
             };
             /** @description Validation Error */

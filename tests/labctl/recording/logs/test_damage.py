@@ -138,7 +138,7 @@ def test_four_kilobytes_of_damage_cost_as_many_readings_and_the_answers_say_so(t
     with open_client(lab.database) as client:
         sent = client.post("/api/recordings/logs", files={"file": ("a.ulg", bytes(content))})
         assert sent.status_code == 201
-        assert [each["what"] for each in sent.json()["warnings"]] == ["unread"]
+        assert [each["what"] for each in sent.json()["warnings"]] == ["unread", "gaps"]
     criticised = lab.json("fit", answer["serial"], "--model", "bias")
     assert "unread" in [each["what"] for each in criticised["warnings"]]
 

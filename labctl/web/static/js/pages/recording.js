@@ -11,6 +11,7 @@ import { channelUnit } from "../recordings/channels.js";
 import { meanPlots } from "../recordings/mean_plots.js";
 import { REFERENCE_TEXTS } from "../recordings/motion_texts.js";
 import { datasetReadings } from "../recordings/readings.js";
+import { inspectionCard } from "../recordings/inspection.js";
 import { datasetTable } from "../recordings/dataset_table.js";
 import { trace } from "../recordings/trace.js";
 import { SIMULATED } from "../campaigns/campaign_time.js";
@@ -73,6 +74,7 @@ export async function page({ params, query, signal }) {
   const motion = info.motion ?? "rates";
   if (motion !== "rates") element.append(motionCard(about.id, motion, info.axes, signal));
   if (about.kind === "samples" && info.motion !== "poses") parts.push(allan(state, signal));
+  if (about.kind === "samples") element.append(inspectionCard(about.id, signal));
   element.append(...parts);
   return element;
 }

@@ -1,0 +1,87 @@
+"""The picture of an inspection: every channel over time, with the places of what was found."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+
+import plotly.graph_objects as go
+
+from labctl.json_types.inspection import CourseJson, MarkJson
+from labctl.plots.page import figure_part, whole_page
+from labctl.plots.registry import Picture
+from labctl.plots.theme import ACCENT, GAP_PX, TEMPLATE, WARM, colour_of, grid_of, place, translucent
+
+ROW_PX = 170
+#: Colours of the kinds of findings, in the order in which they appear.
+COLOURS = ("#b3242f", WARM, ACCENT, "#7b5ea7", "#3a9d6e", "#a88b1f")
+TITLE = "All readings, and where something was found"
+CAPTION = (
+    "Each channel over time. A line from the least to the largest reading of each bin: every reading lies within it, "
+    "so no single reading is hidden. A coloured band marks the place of a finding; the heading of a channel says which "
+    "findings it has, and how many of their places are drawn. A finding about whole rows is drawn in every channel."
+)
+
+
+def inspection_picture(courses: Sequence[CourseJson], marks: Sequence[MarkJson]) -> Picture | None:
+    """Return the picture of an inspection; None without readings."""
+    if not courses:
+        return None
+    kinds = list(dict.fromkeys(mark["what"] for mark in marks))
+    colours = {what: COLOURS[k % len(COLOURS)] for k, what in enumerate(kinds)}
+    figure = grid_of([_heading(course, _marks_of(course, marks)) for course in courses], 1, shared_xaxes=True)
+    height = ROW_PX * len(courses) + GAP_PX
+    figure.update_layout(template=TEMPLATE, height=height)
+    for panel, course in enumerate(courses):
+        where = place(panel, 1)
+        figure.add_trace(_envelope(course), **where)
+        figure.update_yaxes(title=course["unit"], **where)
+        for mark in _marks_of(course, marks):
+            for begin, end in zip(mark["from_s"], mark["until_s"], strict=True):
+                figure.add_vrect(
+                    x0=begin, x1=end, fillcolor=translucent(colours[mark["what"]]), layer="below",
+                    line={"color": colours[mark["what"]], "width": 1}, **where,
+                )  # fmt: skip
+    figure.update_xaxes(title="t_s, s", row=len(courses), col=1)
+    return Picture("inspection", TITLE, CAPTION, figure)
+
+
+def inspection_html(
+    source: str, sentences: Sequence[str], courses: Sequence[CourseJson], marks: Sequence[MarkJson]
+) -> str:
+    """Return an HTML document of an inspection: its sentences, and the picture."""
+    picture = inspection_picture(courses, marks)
+    said = "".join(f"<li>{escape(sentence)}</li>" for sentence in sentences) or "<li>nothing was found</li>"
+    parts = [f"<h1>Inspection of {escape(source)}</h1>", f"<ul>{said}</ul>"]
+    if picture is not None:
+        parts.append(figure_part(picture))
+    return whole_page(f"Inspection of {source}", parts, drawn=picture is not None)
+
+
+def _marks_of(course: CourseJson, marks: Sequence[MarkJson]) -> list[MarkJson]:
+    return [mark for mark in marks if mark["channel"] in ("", course["channel"])]
+
+
+def _heading(course: CourseJson, marks: Sequence[MarkJson]) -> str:
+    drawn = "reading by reading" if course["bins"] >= course["readings"] else f"in {course['bins']} bins"
+    said = [f"{course['channel']}: all {course['readings']} readings, {drawn}"]
+    for mark in marks:
+        if mark["whole"]:
+            said.append(f"{mark['what']} (all of it)")
+        elif len(mark["from_s"]) < mark["places"]:
+            said.append(f"{mark['what']} ({len(mark['from_s'])} of {mark['places']} places drawn)")
+        else:
+            said.append(f"{mark['what']} ({mark['places']} places)")
+    return "; ".join(said)
+
+
+def _envelope(course: CourseJson) -> go.Scatter:
+    x: list[float | None] = []
+    y: list[float | None] = []
+    for t_s, low, high in zip(course["t_s"], course["low"], course["high"], strict=True):
+        x += [t_s] if low == high else [t_s, t_s]
+        y += [low] if low == high else [low, high]
+    axis = course["channel"].removeprefix("gyro_").removeprefix("accel_")[:1]
+    return go.Scatter(
+        x=x, y=y, mode="lines", line={"color": colour_of(axis), "width": 1}, name=course["channel"], connectgaps=False
+    )

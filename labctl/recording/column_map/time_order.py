@@ -1,0 +1,42 @@
+"""Rows of a log whose time does not follow that of the row before: which they are, and the log without them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from labctl.recording.column_map.model import ColumnMap
+from labctl.recording.column_map.sources import source
+from labctl.recording.column_map.units import find_unit
+from labctl.recording.raw_table import RawTable
+from labctl.recording.sanity.finding import Finding
+from labctl.recording.sanity.readings.clock import check_clock, rows_in_order
+from labctl.recording.sanity.readings.series import Series
+
+
+def in_order_of_time(table: RawTable, column_map: ColumnMap) -> tuple[RawTable, Finding | None]:
+    """Return a log with the most rows whose time rises from each to the next, and the finding about the others.
+
+    The log itself, and None, where its time rises, is no column of numbers, or begins again by the map's `wrap_bits`.
+    """
+    mapped = column_map.columns.get("t_s")
+    column = None if mapped is None else source(table, mapped.source)
+    if mapped is None or column is None or not column.is_number or mapped.wrap_bits is not None:
+        return table, None
+    values = column.values
+    if len(values) < 2 or not np.isfinite(values).all() or bool(np.all(np.diff(values) > 0)):
+        return table, None
+    unit = find_unit("s", mapped.unit or column.unit) if mapped.unit or column.unit else None
+    n = len(values)
+    series = Series(
+        (values - values[0]) * (unit.factor if unit is not None else 1.0), np.ones(n, dtype=np.int64), None,
+        np.zeros(n, dtype=bool), {}, {}, {}, "rest",
+    )  # fmt: skip
+    kept = rows_in_order(values)
+    columns = {
+        name: replace(each, values=each.values[kept], words=None if each.words is None else each.words[kept])
+        for name, each in table.columns.items()
+    }
+    found = next((marked.finding for marked in check_clock(series)), None)
+    return replace(table, columns=columns, rows=int(kept.sum()), first_rows=()), found

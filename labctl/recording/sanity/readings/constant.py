@@ -1,0 +1,101 @@
+"""Readings that do not change: an output that stays at one value, rows that are written again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from labctl.recording.sanity.finding import Finding
+from labctl.recording.sanity.readings.series import Array, Marked, Rows, Series, gain_of, rows_in_words, runs
+
+#: The probability, for a whole channel, of a run of equal readings that is called frozen; and its least length.
+CHANCE, LEAST_RUN = 1e-6, 20
+#: Runs up to this length tell how often a reading equals the one before. An output is coarse whose step is above this
+#: many noises: it stays at a code by itself.
+USUAL_RUN, COARSE_NOISES = 50, 0.8
+#: A coarse output is frozen where the table's rate would move it by so many steps of its code.
+COARSE_STEPS = 5.0
+#: An output frozen in this share of the readings, or in most of a data set, makes a fit certainly wrong.
+CERTAIN_SHARE, MOST_OF_SET = 0.1, 0.9
+#: Rows are written again where this share more of them equal the row before than equal that three rows before.
+REPEATED_SHARE, DEVIATIONS = 0.003, 5.0
+
+
+def check_frozen(series: Series) -> Iterator[Marked]:
+    """Yield the outputs that stay at one value; one that stays at an end of its range is clipped instead."""
+    for name, values in series.outputs.items():
+        rows = frozen_rows(series, name, values)
+        n = int(rows.sum())
+        if not n:
+            continue
+        begin, end = max(runs(rows), key=lambda run: run[1] - run[0])
+        steady = n == len(values)
+        whole = not steady and any(rows[part].mean() > MOST_OF_SET for part in series.parts)
+        sure = whole or CERTAIN_SHARE * len(series) < n < len(series)
+        seconds = float(series.t_s[end - 1] - series.t_s[begin])
+        yield Marked(
+            Finding(
+                "frozen", "certain" if sure else "likely", f"{name}, {rows_in_words(rows)}",
+                f"the output stays at {values[begin]:.6g} deg/s for {seconds:.3g} s ({end - begin} readings)"
+                + (", all of the recording: it is dead, or its steps are far larger than its noise" if steady else ""),
+                float(values[begin]), "deg/s", "readings that differ by their noise",
+                "check the output and its resolution" if steady else "leave these readings out, or measure again",
+                channel=name, n=n, may_leave_out=not steady,
+            ),
+            rows,
+        )  # fmt: skip
+
+
+def frozen_rows(series: Series, name: str, values: Array) -> Rows:
+    """Return which rows, (n,), are in a run of equal readings that is no accident."""
+    found = np.zeros(len(values), dtype=bool)
+    # a run of k+1 equal readings is k steps of 0
+    steady = [(begin, end + 1) for begin, end in runs(np.diff(values) == 0)]
+    if not steady:
+        return found
+    usual = [end - begin for begin, end in steady if end - begin <= USUAL_RUN]
+    long = sum(end - begin for begin, end in steady if end - begin > USUAL_RUN)
+    rest = len(values) - long
+    share = min(sum(length - 1 for length in usual) / rest, 0.9) if rest > LEAST_RUN else 0.9
+    is_coarse = series.code_steps[name] > COARSE_NOISES * series.noises[name]
+    least = LEAST_RUN if is_coarse else max(LEAST_RUN, np.log(CHANCE / len(values)) / np.log(max(share, 1e-3)))
+    ends = (float(values.min()), float(values.max()))
+    gain = gain_of(values, series.rate_dps)
+    for begin, end in steady:
+        if end - begin < least or (values[begin] in ends and ends[0] != ends[1] and not is_coarse):
+            continue
+        if is_coarse and not _would_move(series, slice(begin, end), gain, series.code_steps[name]):
+            continue
+        found[begin:end] = True
+    return found
+
+
+def _would_move(series: Series, rows: slice, gain: float, step: float) -> bool:
+    return series.rate_dps is not None and abs(gain) * float(np.ptp(series.rate_dps[rows])) > COARSE_STEPS * step
+
+
+def check_repeated(series: Series, frozen: Rows) -> Iterator[Marked]:
+    """Yield rows that hold in every measured channel what the row before holds."""
+    channels = [*series.outputs.values(), *series.thermometers.values(), *series.others.values()]
+    equal = _equal(channels, 1) & ~frozen[1:] & (series.dataset[1:] == series.dataset[:-1])
+    apart = _equal(channels, 3) & ~frozen[3:] & (series.dataset[3:] == series.dataset[:-3])
+    n = len(series)
+    share, usual = equal.sum() / n, apart.sum() / n
+    if share - usual <= max(REPEATED_SHARE, DEVIATIONS * np.sqrt((share + usual) / n)):
+        return
+    rows = np.concatenate([[False], equal])
+    yield Marked(
+        Finding(
+            "repeated", "likely", rows_in_words(rows),
+            f"{int(rows.sum())} rows repeat the readings of the row before ({100 * share:.2g} % of all)",
+            100 * float(share), "%", f"at most {100 * usual:.2g} %, as by chance",
+            "leave the repeated rows out: they are no new readings, and make the noise look smaller than it is",
+            n=int(rows.sum()), may_leave_out=True,
+        ),
+        rows,
+    )  # fmt: skip
+
+
+def _equal(channels: list[Array], lag: int) -> Rows:
+    return np.asarray(np.all([values[lag:] == values[:-lag] for values in channels], axis=0))

@@ -1,0 +1,52 @@
+"""Readings that are left out by choice: marked as bad with what, how many and why, and kept in the recording."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from labctl.errors import BadInput
+from labctl.recording.info import LeftOut
+from labctl.recording.recording import Recording
+from labctl.recording.sanity.readings.examination import examine
+
+#: Kinds of findings whose readings can be left out.
+MAY_BE_LEFT_OUT = ("frozen", "clipped", "thermometer", "spikes", "repeated", "moved")
+ALL = "all"
+
+
+def without(recording: Recording, kinds: Sequence[str], name: str) -> Recording:
+    """Return a recording whose readings of some kinds of findings are marked with valid = 0; `name` is its file's.
+
+    What is left out is stated in `left_out` of its head. Nothing is removed: the readings stay as they were measured.
+    Raises BadInput for an unknown kind, for one that cannot be left out, and where no reading would stay.
+    """
+    unknown = [kind for kind in kinds if kind not in (*MAY_BE_LEFT_OUT, ALL)]
+    if unknown:
+        raise BadInput(
+            f"--leave-out {unknown[0]}: readings of this kind cannot be left out; choose from "
+            f"time_back, {', '.join(MAY_BE_LEFT_OUT)} or {ALL}"
+        )
+    found = [each for each in examine(recording) if ALL in kinds or each.finding.what in kinds]
+    chosen = [each for each in found if each.finding.may_leave_out]
+    if refused := [each.finding for each in found if not each.finding.may_leave_out and each.finding.what in kinds]:
+        raise BadInput(f"{name}: {refused[0].where}: cannot be left out: {refused[0].said}; {refused[0].do}")
+    if not chosen:
+        return recording
+    n = len(recording)
+    valid = np.asarray(recording.columns["valid"]) != 0 if "valid" in recording.columns else np.ones(n, dtype=bool)
+    left: list[LeftOut] = []
+    for each in chosen:
+        rows = each.rows & valid
+        valid &= ~each.rows
+        left.append(
+            LeftOut(
+                what=each.finding.what, channel=each.finding.channel, n=int(rows.sum()), of=n, why=each.finding.said
+            )
+        )
+    if not valid.any():
+        raise BadInput(f"{name}: no reading would be left without those of {', '.join(kinds)}; measure again")
+    info = recording.info.model_copy(update={"left_out": (*recording.info.left_out, *left)})
+    return replace(recording, info=info, columns={**recording.columns, "valid": valid.astype(np.int64)})

@@ -1,0 +1,221 @@
+"""Readings that do not belong together: two units of measure in one file, two devices, a channel that is a copy."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations, pairwise
+
+import numpy as np
+
+from labctl.recording.sanity.finding import Finding
+from labctl.recording.sanity.readings.series import Array, Marked, Rows, Series, noise_of, rows_in_words
+
+#: Blocks in which the noise of long data sets is compared, and readings of one.
+BLOCKS, LEAST_IN_BLOCK = 40, 50
+#: The ratio of deg/s to rad/s, and how near to it, as a logarithm, a ratio of noises must be.
+DEG_PER_RAD, NEAR = 180.0 / np.pi, 0.4
+#: The same of a gain, in which the bias of the outputs is too.
+GAIN_NEAR = 1.0
+#: Rates from this size on (root mean square), deg/s, show the gain of the outputs.
+LEAST_RATE_DPS = 1.0
+#: Third differences of a copy have at least this squared correlation with those of its source; and how many must move.
+COPY, LEAST_MOVING = 0.97, 50
+#: Two devices by turns: their readings differ by this many noises of readings of one.
+BY_TURNS = 3.0
+#: Two devices one after the other: both levels last so many readings, and are this many noises apart in two outputs.
+BESIDE, LEAST_BESIDE, APART = 60, 10, 3.5
+
+
+def check_units(series: Series) -> Iterator[Marked]:
+    """Yield the rows whose outputs are all as much smaller than the others' as rad/s are than deg/s."""
+    blocks = _blocks(series)
+    if len(blocks) < 4:
+        return
+    noises = np.array([[noise_of(values[block]) for values in series.outputs.values()] for block in blocks])
+    known = (noises > 0).all(axis=1)
+    if known.sum() < 4:
+        return
+    size = np.full(len(blocks), np.nan)
+    size[known] = np.mean(np.log(noises[known] / np.median(noises[known], axis=0)), axis=1)
+    split = _two_levels(size[known])
+    if split is None:
+        return
+    each = np.log(noises[known])
+    low = size[known] < split
+    apart = np.median(each[~low], axis=0) - np.median(each[low], axis=0)
+    if np.any(np.abs(apart - np.log(DEG_PER_RAD)) > NEAR):
+        return
+    rows = np.zeros(len(series), dtype=bool)
+    for block, value in zip(blocks, size, strict=True):
+        rows[block] = value < split
+    if not _gains_agree(series, rows):
+        return
+    ratio = float(np.exp(np.mean(apart)))
+    yield Marked(
+        Finding(
+            "mixed_units", "certain", rows_in_words(rows),
+            f"the noise of every output is {ratio:.3g} times smaller than in the other rows, near 180/pi: these "
+            "readings are in rad/s, the others in deg/s",
+            ratio, "1", "one unit in a file",
+            "multiply these rows by 180/pi (57.2958), or import the two parts as recordings of their own",
+            n=int(rows.sum()),
+        ),
+        rows,
+    )  # fmt: skip
+
+
+def _gains_agree(series: Series, rows: Rows) -> bool:
+    """Whether the gain over the table's rate is as much smaller as the noise is: noise alone may change with the rate.
+
+    At rest the noise of two outputs or more must do.
+    """
+    if series.rate_dps is None or min(_rms(series.rate_dps[rows]), _rms(series.rate_dps[~rows])) < LEAST_RATE_DPS:
+        return len(series.outputs) > 1
+    rate = series.rate_dps
+    gains = [
+        [abs(float(values[part] @ rate[part])) / float(rate[part] @ rate[part]) for part in (rows, ~rows)]
+        for values in series.outputs.values()
+    ]
+    low, high = max(gains, key=max)
+    return low > 0 and abs(np.log(high / low / DEG_PER_RAD)) < GAIN_NEAR
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2))) if len(values) else 0.0
+
+
+def _blocks(series: Series) -> list[slice]:
+    found = []
+    for part in series.parts:
+        length = part.stop - part.start
+        size = max(length // BLOCKS, LEAST_IN_BLOCK) if len(series.parts) < BLOCKS // 4 else length
+        edges = np.linspace(part.start, part.stop, max(length // size, 1) + 1).astype(np.int64)
+        found += [slice(int(a), int(b)) for a, b in pairwise(edges) if b - a >= LEAST_IN_BLOCK]
+    return found
+
+
+def _two_levels(values: Array) -> float | None:
+    """Return what divides values (m,) where the largest distance between neighbours is; None for one of less than 2."""
+    ordered = np.sort(values)
+    apart = np.diff(ordered)
+    widest = int(np.argmax(apart))
+    return float(ordered[widest] + apart[widest] / 2) if apart[widest] > 1.0 else None
+
+
+def check_copies(series: Series) -> Iterator[Marked]:
+    """Yield the outputs that are a copy of another, in their unit or scaled."""
+    third = {name: np.diff(values, 3) for name, values in series.outputs.items()}
+    for (one, a), (other, b) in combinations(third.items(), 2):
+        scale = _scale_of_copy(a, b)
+        if scale is None:
+            continue
+        yield Marked(
+            Finding(
+                "copied", "certain", f"{other} and {one}",
+                f"{other} is {scale:.5g} times {one} down to its noise: one is a copy of the other",
+                scale, "1", "outputs with noise of their own",
+                "correct the column map: one of the two columns is not this axis; or leave the axis out",
+                channel=other, n=len(series),
+            ),
+            np.ones(len(series), dtype=bool),
+        )  # fmt: skip
+
+
+def _scale_of_copy(a: Array, b: Array) -> float | None:
+    """Return by which factor third differences b (n,) are those of a; None where they are no copy."""
+    moving = (a != 0) | (b != 0)
+    if moving.sum() < LEAST_MOVING:
+        return None
+    limits = [8.0 * max(float(np.median(np.abs(each[moving]))), 1e-300) for each in (a, b)]
+    usual = moving & (np.abs(a) < limits[0]) & (np.abs(b) < limits[1])  # a knock that all axes feel is no copy
+    if usual.sum() < LEAST_MOVING:
+        return None
+    product, power = float(a[usual] @ b[usual]), float(a[usual] @ a[usual])
+    if power == 0 or product == 0 or product**2 < COPY * power * float(b[usual] @ b[usual]):
+        return None
+    return product / power
+
+
+def check_devices(series: Series) -> Iterator[Marked]:
+    """Yield rows of a second device: by turns with the first, or after it."""
+    by_turns = [name for name, values in series.residuals.items() if _alternates(values)]
+    if by_turns:
+        name = by_turns[0]
+        apart = float(np.abs(np.mean(_signed(series.residuals[name]))) * 2)
+        yield Marked(
+            Finding(
+                "two_devices", "certain", f"{', '.join(by_turns)}, every second row",
+                f"every second reading is {apart:.3g} deg/s from those between: two devices write into one file",
+                apart, "deg/s", "one device in a recording", "divide the rows by device, and import each by itself",
+                channel=name, n=len(series) // 2,
+            ),
+            np.arange(len(series)) % 2 == 1,
+        )  # fmt: skip
+        return
+    yield from _after(series)
+
+
+def _signed(values: Array) -> Array:
+    return values * np.where(np.arange(len(values)) % 2, 1.0, -1.0)
+
+
+def _alternates(values: Array) -> bool:
+    if len(values) < 100:
+        return False
+    swing = np.diff(values)
+    sign = np.where(np.arange(len(swing)) % 2, -1.0, 1.0)
+    mean = float(np.median(sign * swing))
+    own = float(np.median(np.abs(values[2:] - values[:-2]))) * 1.4826 / np.sqrt(2)
+    return abs(mean) > BY_TURNS * max(own, 1e-300)
+
+
+def _after(series: Series) -> Iterator[Marked]:
+    for part in series.parts:
+        n = part.stop - part.start
+        if n < 4 * LEAST_BESIDE or not (series.still[part].all() or series.rate_dps is not None):
+            continue  # turned by hand, a unit changes its rate on all axes at once
+        found = {name: _level_step(values[part], series.noises[name]) for name, values in series.residuals.items()}
+        row = int(np.argmax(np.sum([np.abs(step) for step in found.values()], axis=0)))
+        apart = {name: float(step[row]) for name, step in found.items() if abs(step[row]) > APART}
+        lasting = {name for name in apart if _lasts(series.residuals[name][part], row, series.noises[name])}
+        if len(lasting) < 2:
+            continue
+        rows = np.zeros(len(series), dtype=bool)
+        rows[part.start + row : part.stop] = True
+        name = max(lasting, key=lambda each: abs(apart[each]))
+        size = apart[name] * series.noises[name]
+        yield Marked(
+            Finding(
+                "two_devices", "likely", f"{', '.join(sorted(lasting))}, from row {part.start + row + 1} on",
+                f"the level of {len(lasting)} outputs changes at once, that of {name} by {size:.3g} deg/s: another "
+                "device, or the same after it was switched off or mounted again",
+                size, "deg/s", "one device in one mounting in a data set",
+                f"divide the recording at row {part.start + row + 1}", channel=name, n=int(rows.sum()),
+            ),
+            rows,
+        )  # fmt: skip
+
+
+def _level_step(values: Array, noise: float) -> Array:
+    """Return at each row of (n,) the mean after less that before, in noises; 0 near the ends."""
+    n = len(values)
+    if noise <= 0:
+        return np.zeros(n)
+    limit = 200.0 * noise
+    total = np.concatenate([[0.0], np.cumsum(np.clip(values - np.median(values), -limit, limit))])
+    at = np.arange(n)
+    low, high = np.maximum(at - BESIDE, 0), np.minimum(at + BESIDE, n)
+    before, after = np.maximum(at - low, 1), np.maximum(high - at, 1)
+    step = (total[high] - total[at]) / after - (total[at] - total[low]) / before
+    step[(at < LEAST_BESIDE) | (at > n - LEAST_BESIDE)] = 0.0
+    return np.asarray(step / noise)
+
+
+def _lasts(values: Array, row: int, noise: float) -> bool:
+    """Whether a level changes at a row at once and for good: not a creep, not a turn that ends."""
+    near = max(LEAST_BESIDE // 2, 3)
+    step = float(
+        np.median(values[row + 1 : row + 1 + near * 2]) - np.median(values[max(row - 1 - near * 2, 0) : row - 1])
+    )
+    whole = float(np.median(values[row:]) - np.median(values[:row]))
+    return abs(step) > 2.5 * noise and whole * step > 0 and 0.5 < whole / step < 2.0

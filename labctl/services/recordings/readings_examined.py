@@ -1,0 +1,61 @@
+"""The examination of the single readings of a stored recording, computed once for the readings that it holds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from labctl.recording import Recording, RecordingInfo
+from labctl.recording.recording import Columns
+from labctl.recording.sanity.readings import examination, joined_examinations
+from labctl.services.cache import cached
+from labctl.services.recordings.warnings import warning_of
+from labctl.services.schemas.inspection import ReadingsExamined
+from labctl.store import RecordingRow, Store
+
+#: Readings that are examined together, at most, where a recording is not in memory already.
+READINGS_TOGETHER = 2_000_000
+
+
+def examined_stored(store: Store, row: RecordingRow, recording: Recording | None = None) -> ReadingsExamined:
+    """Return what is wrong with single readings of a recording; nothing for means and tables of coefficients.
+
+    `recording` is the whole recording, where it is in memory already.
+    """
+    question = {"examine": row.id, "readings": store.recordings.fingerprint(row.id, head=row)}
+    return cached(ReadingsExamined, question, lambda: _examined(store, row, recording))
+
+
+def _examined(store: Store, row: RecordingRow, recording: Recording | None) -> ReadingsExamined:
+    if row.kind != "samples":
+        return ReadingsExamined(warnings=[], courses=[], marks=[])
+    if recording is not None:
+        found = examination(recording)
+    else:
+        info = RecordingInfo.model_validate(row.info)
+        found = joined_examinations([examination(Recording(info, columns)) for columns in _together(store, row.id)])
+    return ReadingsExamined(
+        warnings=[warning_of(each) for each in found.findings], courses=found.courses, marks=found.marks
+    )
+
+
+def _together(store: Store, recording: int) -> Iterator[Columns]:
+    """Yield the readings of consecutive data sets, of many at once."""
+    parts: list[Columns] = []
+    n = 0
+    for _, columns in store.recordings.iter_datasets(recording):
+        length = len(columns["t_s"]) if "t_s" in columns else 0
+        if n and n + length > READINGS_TOGETHER:
+            yield _one(parts)
+            parts, n = [], 0
+        if length:
+            parts.append(columns)
+            n += length
+    if parts:
+        yield _one(parts)
+
+
+def _one(parts: list[Columns]) -> Columns:
+    names = [name for name in parts[0] if all(name in part for part in parts)]
+    return {name: np.concatenate([part[name] for part in parts]) for name in names}

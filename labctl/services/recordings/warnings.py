@@ -1,0 +1,32 @@
+"""Findings as responses, and back."""
+
+from __future__ import annotations
+
+from labctl.json_types.findings import FindingJson
+from labctl.recording.sanity import Finding
+from labctl.services.schemas.warnings import DataWarning
+
+
+def warning_of(finding: Finding) -> DataWarning:
+    """Return a finding as a response."""
+    return DataWarning.model_validate(finding.to_json(), extra="forbid")
+
+
+def finding_of(warning: DataWarning) -> Finding:
+    """Return a response as the finding that it is of."""
+    return Finding(
+        warning.what, warning.severity, warning.where, warning.said, warning.value, warning.unit, warning.expected,
+        warning.do, warning.part, warning.channel, warning.n, warning.may_leave_out,
+    )  # fmt: skip
+
+
+def as_json(warning: DataWarning) -> FindingJson:
+    """Return a warning as it is kept with a version."""
+    found: FindingJson = {
+        "what": warning.what, "severity": warning.severity, "where": warning.where, "said": warning.said,
+        "value": warning.value, "unit": warning.unit, "expected": warning.expected, "do": warning.do,
+        "text": warning.text, "part": warning.part,
+    }  # fmt: skip
+    if warning.n is not None:
+        found |= {"channel": warning.channel, "n": warning.n, "may_leave_out": warning.may_leave_out}
+    return found

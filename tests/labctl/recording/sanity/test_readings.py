@@ -1,0 +1,124 @@
+"""Faults of single readings, made by a generator that knows nothing of the checks, and what is said of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from labctl.errors import BadInput
+from labctl.recording import Recording, read_recording, write_recording
+from labctl.recording.column_map.movement import movement
+from labctl.recording.sanity import inspect_recording
+from labctl.recording.sanity.readings import examination, examine, joined_examinations, without
+from labctl.services.recordings.examples import examples
+from studies.forensics import NAMES, recording_of, said_of
+from studies.forensics_records import FAULTS, Record, clean_record, faulty
+
+SEEDS = (301, 302)
+
+
+@pytest.mark.parametrize("kind", FAULTS)
+def test_each_kind_of_fault_is_found(kind: str) -> None:
+    for seed in SEEDS:
+        assert NAMES[kind] & set(said_of(faulty(kind, seed))), (kind, seed)
+
+
+def test_clean_records_get_no_finding() -> None:
+    assert [dict(said_of(clean_record(seed))) for seed in range(301, 316)] == [{}] * 15
+
+
+@pytest.mark.parametrize("name", [name for name in examples() if name != "weiss-gyrostar"])
+def test_the_examples_get_no_finding_of_single_readings(name: str) -> None:
+    assert examine(read_recording(examples()[name])) == []
+
+
+def at_rest(change: Callable[[np.ndarray], None] | None = None) -> Recording:
+    """Return a record of 60 s at rest whose first output is changed."""
+    record = next(made for made in map(clean_record, range(1, 99)) if made.motion == "rest")
+    gyro = record.gyro_dps.copy()
+    if change is not None:
+        change(gyro)
+    return recording_of(replace(record, gyro_dps=gyro))
+
+
+def spiked(gyro: np.ndarray) -> None:
+    gyro[[500, 900, 901], 0] += 40.0
+
+
+def test_a_finding_says_channel_rows_size_and_that_they_may_be_left_out() -> None:
+    (found,) = inspect_recording(at_rest(spiked))
+    assert (found.what, found.channel, found.n, found.may_leave_out) == ("spikes", "gyro_x", 3, True)
+    assert "row 501 and 1 more place" in found.where
+    assert abs(found.value or 0.0) == pytest.approx(40.0, rel=0.05)
+
+
+def test_readings_are_left_out_by_choice_and_the_recording_says_so(tmp_path: Path) -> None:
+    made = without(at_rest(spiked), ["spikes"], "a.csv")
+    assert np.flatnonzero(np.asarray(made.columns["valid"]) == 0).tolist() == [500, 900, 901]
+    (left,) = made.info.left_out
+    assert (left.what, left.channel, left.n, left.of) == ("spikes", "gyro_x", 3, len(made))
+    assert inspect_recording(made) == []
+    write_recording(made, tmp_path / "made")
+    assert read_recording(tmp_path / "made").info.left_out == made.info.left_out
+
+
+def test_nothing_is_left_out_where_nothing_was_found() -> None:
+    clean = at_rest()
+    assert without(clean, ["all"], "a.csv") is clean
+
+
+def test_a_kind_that_cannot_be_left_out_is_refused() -> None:
+    with pytest.raises(BadInput, match="--leave-out copied: readings of this kind cannot be left out; choose from"):
+        without(at_rest(), ["copied"], "a.csv")
+
+
+def test_every_reading_is_in_the_picture() -> None:
+    made = at_rest(spiked)
+    course = next(each for each in examination(made).courses if each["channel"] == "gyro_x")
+    values = np.asarray(made.columns["gyro_x"], dtype=np.float64)
+    assert course["readings"] == len(made)
+    assert max(high for high in course["high"] if high is not None) == values.max()
+    assert min(low for low in course["low"] if low is not None) == values.min()
+
+
+def test_the_places_of_a_finding_are_marked() -> None:
+    made = at_rest(spiked)
+    (mark,) = examination(made).marks
+    t_s = np.asarray(made.columns["t_s"], dtype=np.float64)
+    assert (mark["what"], mark["channel"], mark["places"], mark["whole"]) == ("spikes", "gyro_x", 2, False)
+    assert mark["from_s"][0] < t_s[500] < mark["until_s"][0]
+
+
+def test_parts_of_a_recording_are_one_examination() -> None:
+    part = examination(at_rest(spiked))
+    both = joined_examinations([part, part])
+    assert [(each.what, each.n) for each in both.findings] == [("spikes", 6)]
+    assert both.courses[0]["readings"] == 2 * part.courses[0]["readings"]
+
+
+def test_rows_marked_as_bad_are_not_examined() -> None:
+    made = at_rest(spiked)
+    valid = np.ones(len(made), dtype=np.int64)
+    valid[[500, 900, 901]] = 0
+    assert inspect_recording(replace(made, columns={**made.columns, "valid": valid})) == []
+
+
+@pytest.mark.parametrize("level_dps", [0.0, 0.1, 0.125, 0.2])
+def test_coarse_steps_at_rest_are_no_movement(level_dps: float) -> None:
+    rng = np.random.default_rng(7)
+    rates = np.round((level_dps + 0.03 * rng.normal(size=(6000, 3))) / 0.25) * 0.25
+    assert movement(rates, np.arange(6000) / 50.0).is_rest
+
+
+def test_a_clock_that_was_set_back_says_what_to_add() -> None:
+    record: Record = next(made for made in map(clean_record, range(1, 99)) if made.motion == "rest")
+    set_back = replace(record, t_s=record.t_s - 12.0 * (np.arange(len(record)) >= 2000))
+    (found,) = inspect_recording(recording_of(set_back))
+    assert found.what == "clock_step"
+    assert not found.may_leave_out
+    assert "from row 2001 on" in found.do
+    assert found.value == pytest.approx(-12.0, abs=0.05)
