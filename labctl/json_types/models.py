@@ -197,6 +197,7 @@ class FitResultJson(TypedDict):
     noise: dict[str, AxisNoiseJson]
     environment: FitEnvironment
     reference_temperature_c: float
+    shapes: NotRequired[dict[str, dict[str, Coefficient]]]  #: effect -> time constants and widths
     poses: NotRequired[PosesJson]
     joint: NotRequired[JointJson]
 

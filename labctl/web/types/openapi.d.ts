@@ -5136,6 +5136,15 @@ export interface components {
              */
             reference_temperature_c: number | null;
             /**
+             * Shapes
+             * @description For each effect that remembers temperatures: its time constants, s, and widths, K, with standard uncertainty u (null where the data do not determine it); `tau_x_s` is that of axis x, `tau_s` that of all.
+             */
+            shapes: {
+                [key: string]: {
+                    [key: string]: components["schemas"]["Coefficient"];
+                };
+            };
+            /**
              * Recording
              * @description The recording that the model was fitted to.
              */
@@ -5546,6 +5555,15 @@ export interface components {
              */
             reference_temperature_c: number | null;
             /**
+             * Shapes
+             * @description For each effect that remembers temperatures: its time constants, s, and widths, K, with standard uncertainty u (null where the data do not determine it); `tau_x_s` is that of axis x, `tau_s` that of all.
+             */
+            shapes: {
+                [key: string]: {
+                    [key: string]: components["schemas"]["Coefficient"];
+                };
+            };
+            /**
              * Recording
              * @description The recording that the model was fitted to.
              */
@@ -5624,6 +5642,15 @@ export interface components {
              * @description Zero point of temperature terms, deg C.
              */
             reference_temperature_c: number | null;
+            /**
+             * Shapes
+             * @description For each effect that remembers temperatures: its time constants, s, and widths, K, with standard uncertainty u (null where the data do not determine it); `tau_x_s` is that of axis x, `tau_s` that of all.
+             */
+            shapes: {
+                [key: string]: {
+                    [key: string]: components["schemas"]["Coefficient"];
+                };
+            };
             /**
              * Recording
              * @description The recording that the model was fitted to.
@@ -6854,6 +6881,15 @@ export interface components {
              * @description Zero point of temperature terms, deg C.
              */
             reference_temperature_c: number | null;
+            /**
+             * Shapes
+             * @description For each effect that remembers temperatures: its time constants, s, and widths, K, with standard uncertainty u (null where the data do not determine it); `tau_x_s` is that of axis x, `tau_s` that of all.
+             */
+            shapes: {
+                [key: string]: {
+                    [key: string]: components["schemas"]["Coefficient"];
+                };
+            };
             /**
              * Recording
              * @description The recording that the model was fitted to.
@@ -9076,6 +9112,15 @@ export interface components {
              * @description Zero point of temperature terms, deg C.
              */
             reference_temperature_c: number | null;
+            /**
+             * Shapes
+             * @description For each effect that remembers temperatures: its time constants, s, and widths, K, with standard uncertainty u (null where the data do not determine it); `tau_x_s` is that of axis x, `tau_s` that of all.
+             */
+            shapes: {
+                [key: string]: {
+                    [key: string]: components["schemas"]["Coefficient"];
+                };
+            };
             /**
              * Recording
              * @description The recording that the model was fitted to.
