@@ -21,7 +21,17 @@ from labctl.fitting.effects.thermal_lag import LagElement, Part, lag_elements
 from labctl.fitting.models.fitted_model import FittedModel, without
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.following import Steps
+from labctl.json_types import JsonObject
+from labctl.json_types.models import StateJson
 
+#: What `Follower.to_json` describes.
+STATE_EQUATION = (
+    "each element has a temperature at_c, at first that of the unit; a lag moves by d at_c / dt = (T - at_c) / tau, "
+    "tau = cooling_tau_s while at_c > T, else tau_s, and adds size * (at_c - T) to the output of each axis, deg/s, or "
+    "if it is_curved size * ((at_c - reference_c)^2 - (T - reference_c)^2); a play moves only to stay within "
+    "width_k / 2 of T and adds size * (T - at_c) / (width_k / 2), with bow_c = [low, high] times 4 q (1 - q), "
+    "q = (T - low) / (high - low) from 0 to 1"
+)
 #: Samples that are followed at once, so that they stay in the processor's cache.
 BLOCK = 16384
 
@@ -38,6 +48,16 @@ class Follower:
     bow: tuple[float, float] | None = None  #: lowest and highest temperature, deg C, where the size goes to 0
     part: Part = "all"  #: what of a lag makes the error
     reference_c: float = 0.0  #: of a curved lag: the temperature that the squares are taken about, deg C
+
+    def to_json(self) -> JsonObject:
+        """Return what a program needs that follows the temperature itself, as JSON."""
+        if self.kind == "play":
+            bow = list(self.bow) if self.bow else None
+            return {"kind": "play", "width_k": self.parameter, "bow_c": bow, "size": self.size.tolist()}
+        return {
+            "kind": "lag", "tau_s": self.parameter, "cooling_tau_s": self.cooling_s or self.parameter,
+            "is_curved": self.part == "curved", "reference_c": self.reference_c, "size": self.size.tolist(),
+        }  # fmt: skip
 
     @property
     def movement(self) -> tuple[str, float, float | None]:
@@ -215,3 +235,11 @@ def split_memory(fitted: FittedModel, axes: tuple[str, ...]) -> tuple[FittedMode
         else:
             part = without(part, effect)
     return rest, Memory(part, axes)
+
+
+def state_json(fitted: FittedModel) -> StateJson | None:
+    """Return what a correction by a model keeps from sample to sample, as JSON; None where it keeps nothing."""
+    _, memory = split_memory(fitted, tuple(fitted.axes))
+    if memory is None:
+        return None
+    return {"equation": STATE_EQUATION, "elements": [each.to_json() for each in memory.followers]}

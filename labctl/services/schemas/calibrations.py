@@ -239,6 +239,16 @@ class Follower(ResponseModel):
     kind: Literal["lag", "play"]
     parameter: float = Field(description="Time constant of a thermal lag, s, or width of a hysteresis (play), K.")
     unit: Literal["s", "K"]
+    cooling_s: float | None = Field(
+        default=None, description="Of a lag: time constant while the element is warmer than the thermometer, s; null: "
+        "the same.",
+    )  # fmt: skip
+    is_curved: bool = Field(
+        default=False,
+        description="Whether the error follows the difference of the squares of the temperatures about reference_c; "
+        "the sizes are then in (deg/s)/K2.",
+    )
+    reference_c: float | None = Field(default=None, description="Only for a curved lag, deg C.")
     size: dict[str, float] = Field(
         description="For each axis: error per K of temperature lag, (deg/s)/K, or error at an edge of the "
         "hysteresis, deg/s."

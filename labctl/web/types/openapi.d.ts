@@ -5277,6 +5277,22 @@ export interface components {
              */
             unit: "s" | "K";
             /**
+             * Cooling S
+             * @description Of a lag: time constant while the element is warmer than the thermometer, s; null: the same.
+             */
+            cooling_s: number | null;
+            /**
+             * Is Curved
+             * @description Whether the error follows the difference of the squares of the temperatures about reference_c; the sizes are then in (deg/s)/K2.
+             * @default false
+             */
+            is_curved: boolean;
+            /**
+             * Reference C
+             * @description Only for a curved lag, deg C.
+             */
+            reference_c: number | null;
+            /**
              * Size
              * @description For each axis: error per K of temperature lag, (deg/s)/K, or error at an edge of the hysteresis, deg/s.
              */
