@@ -17,6 +17,7 @@ from labctl.fitting.criticism.residuals import Residuals, residuals_of
 from labctl.fitting.criticism.search.refinement import refined_term
 from labctl.fitting.criticism.search.stepwise import search_stepwise
 from labctl.fitting.criticism.suspects import Suspect, suspects_of
+from labctl.fitting.criticism.thermal_family import LAG, ThermalFamily, thermal_family, with_family
 from labctl.fitting.criticism.verdict import Verdict
 from labctl.fitting.criticism.visibility import not_testable
 from labctl.fitting.data.fit_data import FitData, fit_data_of
@@ -62,6 +63,7 @@ class Criticism:
     not_testable: tuple[NotTestable, ...] = ()
     explained: float | None = None
     views: Views = field(default_factory=Views)
+    family: ThermalFamily | None = None  #: the thermal response that the verdict names
 
     @property
     def floor(self) -> NoiseFloor:
@@ -146,7 +148,9 @@ def criticise(
     comparison = compare_models(beside_held(seen, forward), forward, catalogue)
     verdict, initial, final = search_stepwise(comparison, catalogue)
     verdict = _without_large_residual(verdict, base)
-    found = Criticism(verdict, data, fit_data, base, None, comparison, final)
+    family = thermal_family(fit_data, forward, verdict)
+    verdict = with_family(verdict, family)
+    found = Criticism(verdict, data, fit_data, base, None, comparison, final, family=family)
     if not full or found.beside_missing is None:
         return found
     report_stage("listing suspects and residuals")
@@ -154,6 +158,7 @@ def criticise(
     suspected = {*verdict.named, *(s.candidate.id for s in suspects if s.candidate.log_bf > 0)}
     return replace(
         found,
+        family=_with_time_constants(family, fit_data, forward),
         direct_rms_dps=_direct_rms_dps(fit_data, model),
         suspects=suspects,
         not_testable=tuple(line for line in not_testable(comparison, catalogue) if line["effect"] not in suspected),
@@ -177,6 +182,16 @@ def best_shapes(
     seen = _leaning(data, fit_data, forward).through(response_of_terms(forward.terms))
     comparison = compare_models(beside_held(seen, forward), forward, catalogue)
     return {c.id: refined_term(comparison, c) for c in comparison.candidates if not c.smooth and c.term is not None}
+
+
+def _with_time_constants(
+    family: ThermalFamily | None, data: FitData, forward: ErrorModel
+) -> ThermalFamily | None:  # fmt: skip
+    """Return the family with the uncertainties of its time constants, as the model with it has them."""
+    if family is None:
+        return None
+    after = fit_preset(data, changed(forward, (family.response.term,)))
+    return replace(family, shapes=after.shapes.get(LAG, {}))
 
 
 def _without_large_residual(verdict: Verdict, base: FitResult | None) -> Verdict:

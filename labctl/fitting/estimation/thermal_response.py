@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -116,7 +116,7 @@ def thermal_response(data: FitData, model: ErrorModel, term: Term) -> ThermalRes
     rest = model.with_terms(tuple(t for t in model.terms if t.effect != ThermalLag.id))
     axes = [Axis(data, rest, axis) for axis in data.outputs]
     tried = [structure for structure in STRUCTURES if structure.id != "per_axis" or len(axes) > 1]
-    held_out = {structure.id: _left_out(axes, structure, stretches) for structure in (NONE, *tried)}
+    held_out = {structure.id: left_out_by(axes, structure, stretches) for structure in (NONE, *tried)}
     chosen = tried[0]
     for size in sorted({structure.size for structure in tried}):
         best = min((s for s in tried if s.size == size), key=lambda s: held_out[s.id].chi2)
@@ -161,12 +161,15 @@ class Axis:
         self.base = design.columns
         self.y = data.outputs[name] - data.true_rate_dps(name) - design.offset_dps
         self.above_k = data.channels.temperature_c(name) - rest.reference.temperature_c
-        behind = [self._behind_k(float(tau_s)) for tau_s in GRID_S]
-        warming, cooling = GRID_S[PAIRS.T]
-        both = data.channels.history.lags_two_ways_k(data.channels.columns, warming, cooling)
-        made = [LagElement("", "", part, 0.0).values(lag, self.above_k) for part in PARTS for lag in behind]
-        self.lags = np.column_stack([*made, both])
         self._folds: dict[bytes, Projected] = {}
+
+    @cached_property
+    def lags(self) -> NDArray[np.float64]:
+        """The columns of every time constant of the grid (m, .): of each part in turn, then of pairs of them."""
+        behind = [self._behind_k(float(tau_s)) for tau_s in GRID_S]
+        made = [LagElement("", "", part, 0.0).values(lag, self.above_k) for part in PARTS for lag in behind]
+        channels, (warming, cooling) = self.data.channels, GRID_S[PAIRS.T]
+        return np.column_stack([*made, channels.history.lags_two_ways_k(channels.columns, warming, cooling)])
 
     def _behind_k(self, tau_s: float, cooling_tau_s: float | None = None) -> Array:
         return self.data.channels.history.lag_k(self.data.channels.columns, tau_s, cooling_tau_s)
@@ -191,6 +194,13 @@ class Axis:
         scatter = self.data.take(seen).scatter(self.name)
         white = scatter.white_var if scatter.white_var is not None else np.ones(int(seen.sum()))
         return whitened(scatter, [self.data.noise_floor.axes[self.name].drift], white, values[seen])[0][0]
+
+    def left_over_noise(self, added: NDArray[np.float64], seen: NDArray[np.bool_]) -> Array:
+        """Return what a fit of base and added columns (m, k) leaves of the data sets of a mask, whitened."""
+        rows = self.over_noise(np.column_stack([self.base, added, self.y]), seen)
+        size = np.maximum(np.linalg.norm(rows[:, :-1], axis=0), 1e-300)
+        taken, *_ = np.linalg.lstsq(rows[:, :-1] / size, rows[:, -1], rcond=1e-9)
+        return np.asarray(rows[:, -1] - rows[:, :-1] / size @ taken)
 
     def errors(self, added: NDArray[np.float64], seen: NDArray[np.bool_], tested: NDArray[np.bool_]) -> Array:
         """Return what a fit of base and added columns (m, k) to some data sets leaves of others, deg/s."""
@@ -281,20 +291,27 @@ def _around(group: Sequence[Axis], structure: Structure, seen: NDArray[np.bool_]
     return found
 
 
-def _left_out(
+def left_out_by(
     axes: Sequence[Axis], structure: Structure, stretches: Sequence[tuple[NDArray[np.bool_], NDArray[np.bool_]]]
 ) -> LeftOut:
     """Return the errors of stretches by fits to the rest, time constants included."""
-    errors, chi2 = [], 0.0
+    found = []
     for seen, tested in stretches:
         taus_s = best_taus(axes, structure, seen)
-        for axis in axes:
-            found = axis.errors(axis.columns(structure, taus_s[axis.name]), seen, tested)
-            whole = np.zeros(len(seen))
-            whole[tested] = found
-            chi2 += float(np.sum(axis.over_noise(whole[:, None], tested) ** 2))
-            errors.append(found)
-    every = np.concatenate(errors)
+        found += [
+            (axis, tested, axis.errors(axis.columns(structure, taus_s[axis.name]), seen, tested)) for axis in axes
+        ]
+    return pooled(found)
+
+
+def pooled(errors: Sequence[tuple[Axis, NDArray[np.bool_], Array]]) -> LeftOut:
+    """Return the errors of stretches together: of an axis, the data sets that were tested, and their errors, deg/s."""
+    chi2 = 0.0
+    for axis, tested, found in errors:
+        whole = np.zeros(len(tested))
+        whole[tested] = found
+        chi2 += float(np.sum(axis.over_noise(whole[:, None], tested) ** 2))
+    every = np.concatenate([found for *_, found in errors])
     return LeftOut(float(np.sqrt(np.mean(every**2))), chi2, len(every))
 
 

@@ -74,6 +74,7 @@ def answer_of(
         depends_on=list(verdict.depends_on),
         confounded_with=list(verdict.confounded),
         remainder=verdict.remainder,
+        thermal_response=found.family.to_json() if found.family is not None else None,
         not_physical=list(verdict.not_physical),
         named_axes={name: list(axes) for name, axes in verdict.axes.items()},
         further=[list(group) for group in verdict.further],
@@ -146,7 +147,7 @@ def _shape(suspect: Suspect) -> dict[str, float]:
 def sentences(found: Criticism, experiments: Sequence[Experiment] = ()) -> list[str]:
     """Return the verdict in words, one sentence each, the answer first; what to do next is the first experiment."""
     verdict = found.verdict
-    said = [_first(found)]
+    said = [_first(found)] if found.family is None else [_first(found), found.family.sentence]
     if verdict.remainder is not None and verdict.groups:
         said.append(_remainder(verdict))
     if verdict.form == "unexplained" and verdict.confounded:

@@ -4188,6 +4188,8 @@ export interface components {
             confounded_with: string[];
             /** @description Share (0 to 1) of the residual above the noise floor that no named effect explains. */
             remainder: components["schemas"]["Remainder"] | null;
+            /** @description At rest, over several legs: the thermal response that predicts the legs left out. */
+            thermal_response: components["schemas"]["ThermalFamilyJson"] | null;
             /**
              * Not Physical
              * @description Effects that explain these data equally well, but at a size that the unit cannot have.
@@ -8534,6 +8536,27 @@ export interface components {
             formula?: string;
             /** Steady */
             steady?: boolean;
+        };
+        /**
+         * ThermalFamilyJson
+         * @description A thermal response that predicts stretches of the temperature course that it has not seen.
+         *
+         *     `time_constants` by name (`tau_x_s` of axis x, `tau_s` of all), `alike`: other effects that predict as well alone;
+         *     errors of the stretches left out without and with it, deg/s.
+         */
+        ThermalFamilyJson: {
+            /** Structure */
+            structure: string;
+            /** Time Constants */
+            time_constants: {
+                [key: string]: components["schemas"]["Coefficient"];
+            };
+            /** Alike */
+            alike: string[];
+            /** Before Rms Dps */
+            before_rms_dps: number;
+            /** After Rms Dps */
+            after_rms_dps: number;
         };
         /**
          * TimeLine
