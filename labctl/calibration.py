@@ -18,6 +18,7 @@ from labctl.certification import CalibrationWarning, Certification, read_certifi
 from labctl.errors import BadCalibrationFile
 from labctl.fitting import FitResult, FittedModel, coefficients_json
 from labctl.fitting.models.force_sensitivity import ForceSensitivity, specific_force_json
+from labctl.fitting.models.memory import state_json
 from labctl.fitting.models.paper_units import in_paper_units
 from labctl.fitting.uncertainty import AxisEvidence, BenchConditions, conditions_of
 from labctl.fitting.uncertainty.document import Covered, uncertainty_json
@@ -192,12 +193,19 @@ def build_calibration(
         "how_to_use": HOW_TO_USE,
         "hash": "",
     }
-    if (force := specific_force_json(result.fitted)) is not None:
-        document["specific_force"] = force
-    if result.poses is not None:
-        document["poses"] = result.poses
+    _add_where_known(document, result, exported)
     document["hash"] = hash_of(document)
     return Calibration(document)
+
+
+def _add_where_known(document: CalibrationJson, result: FitResult, exported: FittedModel) -> None:
+    """Add what only some calibrations have."""
+    if (force := specific_force_json(result.fitted)) is not None:
+        document["specific_force"] = force
+    if (state := state_json(exported)) is not None:
+        document["state"] = state
+    if result.poses is not None:
+        document["poses"] = result.poses
 
 
 def _uncertainty(

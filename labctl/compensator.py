@@ -19,7 +19,7 @@ from labctl.fitting.data.channels import BODY_AXES
 from labctl.fitting.data.temperature.channel import STAND_IN_C
 from labctl.fitting.data.temperature.history import TemperatureHistory
 from labctl.fitting.models.correction import Correct, correct_across, correction
-from labctl.fitting.models.memory import RunningMemory, course, split_memory
+from labctl.fitting.models.memory import MemoryState, RunningMemory, course, split_memory
 
 __all__ = [
     "MARGIN_C",
@@ -27,6 +27,7 @@ __all__ = [
     "Compensated",
     "Compensator",
     "LeftOutWarning",
+    "MemoryState",
     "Outside",
     "output_limits_dps",
 ]
@@ -66,7 +67,8 @@ class Compensator:
     corrected at the edge; rates up to `MARGIN_SHARE` of their range. The C header does the same.
 
     A lag or a hysteresis (`remembers`) is followed from sample to sample: `step` goes on from the last one, an array is
-    a course of its own. Both then need the times, `t_s`. The unit is taken to have rested at its first temperature.
+    a course of its own unless it is `continued`. Both then need the times, `t_s`. The unit is taken to have rested at
+    its first temperature, unless `start` is given the `state` of an earlier use.
 
     g-sensitivity (`force_sensitivity`) is corrected where `specific_force_g` is given: (3,) or (n, 3) g along the body
     axes x, y, z, +1 along an axis that points up at rest. Without it the answer says what was left out; `step`, which
@@ -123,9 +125,26 @@ class Compensator:
         return self._memory is not None
 
     def reset(self) -> None:
-        """Forget the temperatures that `step` has seen, as after the unit was switched off."""
+        """Forget the temperatures that were seen, as after the unit was switched off."""
         if self._running is not None:
             self._running.reset()
+
+    @property
+    def state(self) -> MemoryState | None:
+        """What `step` and continued arrays go on from; None before the first sample, and where nothing `remembers`."""
+        return self._running.state if self._running is not None else None
+
+    def start(self, state: MemoryState) -> None:
+        """Go on from the `state` of an earlier use (a warm start).
+
+        Raises BadInput where nothing `remembers`, and for the state of another calibration.
+        """
+        if self._running is None:
+            raise BadInput(
+                f"{self.calibration.serial}: its calibration has no lag and no hysteresis, so it has no state to start "
+                "from; leave start() out"
+            )
+        self._running.start(state)
 
     def compensate_output(
         self,
@@ -150,6 +169,7 @@ class Compensator:
         history: TemperatureHistory | None = None,
         specific_force_g: ArrayLike | None = None,
         cross_rates_dps: Mapping[str, ArrayLike] | None = None,
+        continued: bool = False,
     ) -> Compensated:
         """Correct rates, (n, axes) deg/s, or (n,) for one axis, at temperatures (n,), (n, axes) or one for all.
 
@@ -157,8 +177,10 @@ class Compensator:
         `needs` besides, (n,) each; `history`, of a recording, what the temperatures were between the samples too;
         `specific_force_g` is (3,) or (n, 3). `cross_rates_dps` are the rates about body axes for which the unit has no
         output, axis -> (n,) or one for all, deg/s, where another instrument measures them; without them the unit is
-        corrected as if it did not turn about these axes. Raises BadInput where a channel is missing, for a shape that
-        does not fit, for times that go back, or outside the calibrated range when that is refused.
+        corrected as if it did not turn about these axes. With `continued` a lag goes on from the sample before, of
+        `step` or of another continued array, and the next one goes on from here. Raises BadInput where a channel is
+        missing, for a shape that does not fit, for times that go back, or outside the calibrated range when that is
+        refused.
         """
         known = channels or {}
         for name in self.needs:
@@ -176,11 +198,11 @@ class Compensator:
         warm = np.asarray(self._known(temperature_c), dtype=np.float64)
         beside = self._by_force(specific_force_g, len(raw))
         if self._memory is not None:
-            remembered = (
-                course(RunningMemory(self._memory), np.asarray(known["t_s"], dtype=np.float64), warm)
-                if history is None
-                else self._memory.of_history(history, known)
-            )
+            if history is None:
+                running = self._running if continued and self._running is not None else RunningMemory(self._memory)
+                remembered = course(running, np.asarray(known["t_s"], dtype=np.float64), warm)
+            else:
+                remembered = self._memory.of_history(history, known)
             beside = remembered if beside is None else remembered + beside
         correct = self._correct if cross_rates_dps is None else self._correct_across(cross_rates_dps, len(raw))
         return self._beside(beside, raw, warm, known, given.shape, correct, has_force=specific_force_g is not None)

@@ -1,6 +1,7 @@
 """Temperature loops at rest, 2 K/min: is a hidden lag or hysteresis named, and what is left of it on a leg not seen?
 
-Cells: lags of 300, 600 and 900 s, hysteresis of 3 to 8 K, both, neither. Named right: the verdict names what is hidden,
+Cells: lags of 300, 600 and 900 s, hysteresis of 3 to 8 K, both, neither; of three axes lags of their own, of two flows,
+slower while the unit cools; a lag with self-heating. Named right: the verdict names what is hidden,
 alone or in a group of what it cannot be distinguished from. Leg: every leg left out in turn and predicted by the
 others, over the noise floor, before and after adding what was named first of each group.
 """
@@ -26,6 +27,8 @@ from studies.rest_units import DRIFT_DPS, WHITE, WINDOW_S, Hidden, unit_at_rest
 #: Campaigns of a cell.
 CAMPAIGNS = int(os.environ.get("LABCTL_REST_CAMPAIGNS", "100"))
 Z = 30.0
+#: Factors of the time constants of three axes.
+AXES = (0.7, 1.0, 1.5)
 #: Noise of the mean of a window, white and drift.
 NOISE_DPS = float(np.hypot(WHITE / np.sqrt(WINDOW_S), DRIFT_DPS))
 
@@ -49,6 +52,11 @@ def cells() -> dict[str, tuple[Hidden, frozenset[str]]]:
         **{f"lag {tau:.0f} s": (Hidden(lag_s=tau, z=Z), lag) for tau in (300.0, 600.0, 900.0)},
         **{f"hysteresis {w:.0f} K": (Hidden(width_k=w, z=Z), hysteresis) for w in (3.0, 8.0)},
         "both": (Hidden(lag_s=600.0, width_k=5.0, z=Z), lag | hysteresis),
+        "neither, 3 axes": (Hidden(of_axes=AXES), frozenset()),
+        "lag by axis": (Hidden(lag_s=400.0, of_axes=AXES, z=Z), lag),
+        "two flows": (Hidden(lag_s=60.0, second=(0.5, 1200.0), of_axes=AXES, z=Z), lag),
+        "slower to cool": (Hidden(lag_s=300.0, cooling=2.5, of_axes=AXES, z=Z), lag),
+        "lag, self-heating": (Hidden(lag_s=400.0, heating_s=1500.0, z=Z), lag | {"self_heating"}),
     }
 
 

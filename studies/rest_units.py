@@ -24,11 +24,27 @@ WHITE, DRIFT_DPS, DRIFT_TAU_S = 0.005, 5e-4, 1200.0
 
 @dataclass(frozen=True)
 class Hidden:
-    """What is hidden: time constants of a lag, s, widths of a hysteresis, K (0: none), and the size of each."""
+    """What is hidden: time constants of a lag, s, widths of a hysteresis, K (0: none), and the size of each.
+
+    `of_axes` are factors of the time constant on each axis; `second` the share and the time constant of a second flow;
+    `cooling` the factor of the time constant while the element cools; `heating_s` the time constant of self-heating.
+    """
 
     lag_s: float = 0.0
     width_k: float = 0.0
     z: float = 30.0
+    of_axes: tuple[float, ...] = (1.0,)
+    second: tuple[float, float] = (0.0, 0.0)
+    cooling: float = 1.0
+    heating_s: float = 0.0
+
+    def element_c(self, warm: Array, axis: int) -> Array | None:
+        """Return the temperature of the element of an axis, second by second; None where no lag is hidden."""
+        if not self.lag_s:
+            return None
+        first = lagged(warm, self.lag_s * self.of_axes[axis], self.cooling)
+        share, tau_s = self.second
+        return first if not share else (1 - share) * first + share * lagged(warm, tau_s * self.of_axes[axis])
 
 
 def temperatures(loops: int) -> tuple[Array, Array]:
@@ -46,12 +62,16 @@ def temperatures(loops: int) -> tuple[Array, Array]:
     return seconds, np.convolve(np.pad(sharp, 60, mode="edge"), kernel, mode="valid")
 
 
-def lagged(warm: Array, tau_s: float) -> Array:
-    """Return the temperature of an element that follows `warm`, given second by second, by Heun's rule."""
+def lagged(warm: Array, tau_s: float, cooling: float = 1.0) -> Array:
+    """Return the temperature of an element that follows `warm`, given second by second, by Heun's rule.
+
+    `cooling` is the factor of the time constant while it is warmer than `warm`.
+    """
     now, found = float(warm[0]), np.empty(len(warm))
     for k, there in enumerate(warm.tolist()):
-        slope = (there - now) / tau_s
-        now += (slope + (there - (now + slope)) / tau_s) / 2
+        tau = tau_s * cooling if there < now else tau_s
+        slope = (there - now) / tau
+        now += (slope + (there - (now + slope)) / tau) / 2
         found[k] = now
     return found
 
@@ -89,21 +109,30 @@ def sized(shape: Array, warm: Array, z: float, beside: Array | None = None) -> A
     return shape * z / float(np.linalg.norm(left))
 
 
-def unit_at_rest(seed: int, hidden: Hidden, loops: int = 2, axes: tuple[str, ...] = ("z",)) -> Recording:
+def unit_at_rest(seed: int, hidden: Hidden, loops: int = 2) -> Recording:
     """Return readings of one unit through loops, as one data set without a table's rate or a position."""
     rng = np.random.default_rng([17, seed])
+    axes = ("z",) if len(hidden.of_axes) == 1 else ("x", "y", "z")
     t_s, warm = temperatures(loops)
     readings = np.arange(0.0, t_s[-1], 1.0 / RATE_HZ)
     columns: dict[str, Array] = {"t_s": readings, "temperature_c": np.interp(readings, t_s, warm)}
     columns["temperature_c"] = columns["temperature_c"] + rng.normal(size=len(readings)) * 0.02
-    for axis in axes:
+    half_s = t_s[-1] / loops  # it is switched off and on between two loops
+    if hidden.heating_s:
+        columns["power_s"] = readings % half_s
+    for k, axis in enumerate(axes):
         u = (warm - 20.0) / 40.0
         law = rng.normal() * 0.3 + rng.normal() * 0.2 * u + rng.normal() * 0.05 * u**2
-        behind = lagged(warm, hidden.lag_s) - warm if hidden.lag_s else None
+        element_c = hidden.element_c(warm, k)
+        behind = element_c - warm if element_c is not None else None
         loop = duhem(warm, hidden.width_k) if hidden.width_k else None
         for shape, other in ((behind, loop), (loop, behind)):
             if shape is not None:
                 law = law + rng.choice([-1.0, 1.0]) * sized(shape, warm, hidden.z, other)
+        if hidden.heating_s:
+            law = law + rng.choice([-1.0, 1.0]) * sized(
+                np.exp(-(t_s % half_s) / hidden.heating_s), warm, hidden.z, behind
+            )
         noise = rng.normal(size=len(readings)) * WHITE * np.sqrt(RATE_HZ)
         columns[f"gyro_{axis}"] = np.interp(readings, t_s, law + _drift(rng, len(t_s))) + noise
     info = RecordingInfo(

@@ -13,16 +13,16 @@ from labctl.errors import BadInput
 from labctl.exports.c_code.nodes import temperature_nodes
 from labctl.exports.comments import head_lines
 from labctl.exports.force_text import size_line
-from labctl.exports.format import Format, Written
+from labctl.exports.format import Format, Loss, Written
 from labctl.exports.python_source import (
     AFTER_CORRECTION,
     BEFORE_CORRECTION,
     FORCE_CORRECTION,
     LINEAR_CORRECTION,
     OPENING,
+    STATE_CORRECTION,
     SURFACE_CORRECTION,
 )
-from labctl.exports.static_part import follower_losses
 from labctl.fitting.models.force_sensitivity import ForceSensitivity
 from labctl.fitting.models.matrix_form import linear_of
 from labctl.fitting.models.memory import split_memory
@@ -36,7 +36,7 @@ DIFFERS_DPS = 1e-9
 
 
 def write(calibration: Calibration) -> Written:
-    """Return the module; raises BadInput for a model that has no closed form or that remembers temperatures."""
+    """Return the module; raises BadInput for a model that has no closed form."""
     fitted, memory = split_memory(calibration.fitted, calibration.axes)
     tables, body = _tables(calibration)
     if tables is None:
@@ -44,7 +44,7 @@ def write(calibration: Calibration) -> Written:
             f"format {NAME}: model {calibration.fitted.model.name} has effects without a closed form "
             f"({', '.join(fitted.model.effect_ids)}); use the JSON file with labctl's Compensator"
         )
-    losses = follower_losses(memory)
+    losses: tuple[Loss, ...] = ()
     slowest, fastest = output_limits_dps(calibration)
     low, high = calibration.temperature_c
     content = {
@@ -62,11 +62,16 @@ def write(calibration: Calibration) -> Written:
         },
         **tables,
     }
+    around = AFTER_CORRECTION if fitted.model.argument == "output" else BEFORE_CORRECTION
     force, notes = calibration.force_sensitivity, []
+    if memory is not None:
+        content["state"] = [each.to_json() for each in memory.followers]
+        body += STATE_CORRECTION + around
+        notes.append("correct_with_state corrects the thermal lag or hysteresis; correct alone leaves it.")
     if force is not None:
         content["specific_force"] = _force_table(force)
-        body += FORCE_CORRECTION + (AFTER_CORRECTION if fitted.model.argument == "output" else BEFORE_CORRECTION)
-        notes = [size_line(force, "correct_with_force") + "."]
+        body += FORCE_CORRECTION + around
+        notes += [size_line(force, "correct_with_force") + "."]
     carries = "the whole correction, in double precision, for any Python from 3.8 on"
     head = "\n".join(head_lines(calibration, carries, DIFFERS_DPS, losses, notes)).replace("\\", "/").replace('"', "'")
     data = pprint.pformat(content, width=110, sort_dicts=False)

@@ -169,6 +169,63 @@ def correct_with_force(outputs_dps, temperature_c, specific_force_g):
         raise ValueError("give one output for each axis: " + ", ".join(CALIBRATION["axes"]))
 '''
 
+STATE_CORRECTION = '''
+
+class State:
+    """Where the elements are that follow the temperature: of a thermal lag, or of a hysteresis (play).
+
+    A lag moves by d at_c / dt = (temperature - at_c) / tau, exactly for a temperature that goes straight from sample to
+    sample; tau is cooling_tau_s while the element is above the temperature. Begins at the first temperature.
+    """
+
+    def __init__(self):
+        self.t_s = self.temperature_c = self.at_c = None
+
+    def errors(self, temperature_c, t_s):
+        """Move on to a sample, in order of time (s), and return what the elements add to each output, deg/s."""
+        elements, now = CALIBRATION["state"], float(temperature_c)
+        if not (math.isfinite(now) and math.isfinite(t_s)):
+            return [math.nan for _ in CALIBRATION["axes"]]
+        if self.at_c is None:
+            self.at_c = [now] * len(elements)
+        elif t_s < self.t_s:
+            raise ValueError("t_s = %.9g s is before the last sample's %.9g s" % (t_s, self.t_s))
+        else:
+            self.at_c = [self._moved(each, at, now, t_s) for each, at in zip(elements, self.at_c)]
+        self.t_s, self.temperature_c = t_s, now
+        sides = [_side(each, at, now) for each, at in zip(elements, self.at_c)]
+        sizes = zip(*(each["size"] for each in elements))
+        return [sum(size * side for size, side in zip(row, sides)) for row in sizes]
+
+    def _moved(self, element, at, now, t_s):
+        if element["kind"] == "play":
+            half = element["width_k"] / 2
+            return min(max(at, now - half), now + half)
+        ratio = (t_s - self.t_s) / element["cooling_tau_s" if now < at else "tau_s"]
+        keep = math.exp(-ratio)
+        mean = -math.expm1(-ratio) / ratio if ratio > 0 else 1.0
+        return keep * at + (mean - keep) * self.temperature_c + (1 - mean) * now
+
+
+def _side(element, at, now):
+    if element["kind"] == "lag":
+        behind = at - now
+        return behind * (at + now - 2 * element["reference_c"]) if element["is_curved"] else behind
+    side = (now - at) / (element["width_k"] / 2)
+    if element["bow_c"] is None:
+        return side
+    low, high = element["bow_c"]
+    share = min(max((now - low) / max(high - low, 1e-9), 0.0), 1.0)
+    return side * 4 * share * (1 - share)
+
+
+def correct_with_state(state, outputs_dps, temperature_c, t_s):
+    """Return the same as correct, with lag and hysteresis corrected; a State for each unit, samples in order."""
+    errors, outputs = state.errors(temperature_c, t_s), [float(value) for value in outputs_dps]
+    if len(outputs) != len(errors):
+        raise ValueError("give one output for each axis: " + ", ".join(CALIBRATION["axes"]))
+'''
+
 BEFORE_CORRECTION = """    return correct([output - error for output, error in zip(outputs, errors)], temperature_c)
 """
 

@@ -88,11 +88,13 @@ def follower_losses(memory: Memory | None) -> tuple[Loss, ...]:
         size = float(np.abs(each.size).max())
         if each.kind == "play":
             what = "hysteresis of the bias"
+        elif each.part == "curved":
+            about = f"for each K from {each.reference_c:g} deg C"
+            what = f"curved thermal lag of the bias, at {WARMING_K_MIN:g} K/min, {about}"
+            size *= 2 * max(each.parameter, each.cooling_s or 0.0) / 60 * WARMING_K_MIN
         else:
-            what, size = (
-                f"thermal lag of the bias, at {WARMING_K_MIN:g} K/min",
-                size * each.parameter / 60 * WARMING_K_MIN,
-            )
+            what = f"thermal lag of the bias, at {WARMING_K_MIN:g} K/min"
+            size *= max(each.parameter, each.cooling_s or 0.0) / 60 * WARMING_K_MIN
         found[what] = found.get(what, 0.0) + size
     return tuple(Loss(what, size) for what, size in found.items())
 

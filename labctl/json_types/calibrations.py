@@ -16,6 +16,7 @@ from labctl.json_types.models import (
     FittedModelJson,
     LeftOut,
     SpecificForceJson,
+    StateJson,
     ValidityJson,
 )
 from labctl.json_types.poses import PosesJson
@@ -88,6 +89,7 @@ class CalibrationJson(TypedDict):
     papers: dict[str, object]
     left_out: list[LeftOut]
     specific_force: NotRequired[SpecificForceJson]
+    state: NotRequired[StateJson]  #: what a correction keeps from sample to sample; absent where it keeps nothing
     error: ErrorFiguresJson
     noise: dict[str, AxisNoiseJson]
     environment: FitEnvironment

@@ -6,6 +6,7 @@ from typing import Literal, NotRequired
 
 from typing_extensions import TypedDict
 
+from labctl.json_types import JsonObject
 from labctl.json_types.findings import FindingJson
 from labctl.json_types.joint import JointJson
 from labctl.json_types.poses import PosesJson
@@ -197,8 +198,16 @@ class FitResultJson(TypedDict):
     noise: dict[str, AxisNoiseJson]
     environment: FitEnvironment
     reference_temperature_c: float
+    shapes: NotRequired[dict[str, dict[str, Coefficient]]]  #: effect -> time constants and widths
     poses: NotRequired[PosesJson]
     joint: NotRequired[JointJson]
+
+
+class StateJson(TypedDict):
+    """Elements that follow the temperature, and the equation that each moves by; sizes are in the order of the axes."""
+
+    equation: str
+    elements: list[JsonObject]
 
 
 class LeftOut(TypedDict):

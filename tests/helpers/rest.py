@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -30,6 +31,26 @@ def follow(warm: np.ndarray, tau_s: float) -> np.ndarray:
         now += (there - now) * -np.expm1(-1.0 / RATE_HZ / tau_s)
         found[k] = now
     return found
+
+
+def flowing(
+    laws: dict[str, Callable[[np.ndarray], np.ndarray]], *, minutes: float = 160.0, seed: int = 1, dps_k: float = 2e-3
+) -> Recording:
+    """Return readings of a unit at rest, axis -> a law from the temperature to that of its element, reading by reading.
+
+    Each K between the two makes an error of `dps_k`, deg/s.
+    """
+    rng = np.random.default_rng(seed)
+    t_s, warm = loop_course(minutes)
+    columns: dict[str, np.ndarray] = {"dataset": np.ones(len(t_s), dtype=np.int64), "t_s": t_s, "temperature_c": warm}
+    for k, (axis, law) in enumerate(laws.items()):
+        bias = 0.1 * (k + 1) + 2e-3 * warm - 1e-5 * (k + 1) * warm**2 + dps_k * (law(warm) - warm)
+        columns[f"gyro_{axis}"] = bias + rng.normal(0, NOISE_DPS, len(t_s))
+    about = {"serial": "REST-2", "technology": "mems", "sample_rate_hz": RATE_HZ, "axes": tuple(laws)}
+    info = RecordingInfo.model_validate(
+        {"kind": "samples", "motion": "rest", "started_at": datetime(2026, 1, 5, tzinfo=UTC), **about}
+    )
+    return Recording(info, checked(Path("samples"), info, columns))
 
 
 def at_rest(

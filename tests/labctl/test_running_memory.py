@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import subprocess
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from labctl.calibration import Calibration
-from labctl.compensator import Compensator
+from labctl.calibration import Calibration, build_calibration
+from labctl.compensator import Compensator, MemoryState
 from labctl.errors import BadInput
 from labctl.exports import export_calibration
 from labctl.exports.c_header import c_name
 from labctl.fitting import fit, fit_data_of
+from labctl.fitting.effects import Term
+from labctl.fitting.estimation.fit import fit_preset
+from labctl.fitting.models.presets import changed, preset_for
 from labctl.recording import to_points
 from tests.helpers.calibrations import calibrated
 from tests.helpers.rest import NOISE_DPS, at_rest, loop_course
@@ -41,6 +47,104 @@ int main(void) {{
 @pytest.fixture(scope="module")
 def lagging() -> Calibration:
     return calibrated(at_rest(("z",), lag_s=400.0), effects=BOTH)
+
+
+@pytest.fixture(scope="module")
+def flows() -> dict[str, Calibration]:
+    """Return calibrations with heat flows of every kind: their shape is set, whatever their recording shows."""
+    recording = at_rest(("z",), lag_s=400.0)
+    shapes = {
+        "two flows": {"tau_s": 60.0, "second_tau_s": 1500.0},
+        "two ways": {"tau_z_s": 150.0, "cooling_tau_z_s": 900.0},
+        "curved": {"tau_s": 300.0, "curved": 1.0},
+        "curved, two ways": {"tau_s": 300.0, "cooling_tau_s": 700.0, "curved": 1.0},
+    }
+    data = fit_data_of(to_points(recording))
+    model, _ = preset_for(None, EFFECTS[:2]).build(data)
+    return {
+        name: build_calibration(
+            recording.info, fit_preset(data, changed(model, (Term("thermal_lag", None, shape),))), version=1,
+            parent=None, issued_at=recording.info.started_at, provenance={},
+        )
+        for name, shape in shapes.items()
+    }  # fmt: skip
+
+
+KINDS = ["two flows", "two ways", "curved", "curved, two ways"]
+
+
+def trace(n: int = 400) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return times at uneven distances, temperatures beyond the calibrated ones too, one not a number, and outputs."""
+    rng = np.random.default_rng(4)
+    t_s = np.cumsum(rng.uniform(0.01, 30.0, n))
+    warm = 30.0 + 45.0 * np.sin(t_s / 700.0) + rng.normal(0, 0.1, n)
+    warm[7] = np.nan
+    return t_s, warm, rng.normal(0, 0.2, n)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("is_even", [False, True])
+def test_samples_one_by_one_in_blocks_and_in_one_array_are_corrected_alike(
+    flows: dict[str, Calibration], kind: str, is_even: bool
+) -> None:
+    t_s, warm, raw = trace()
+    if is_even:
+        t_s = 1e5 + 0.01 * np.arange(len(t_s))
+    whole = Compensator(flows[kind]).compensate(raw, warm, {"t_s": t_s}).rate_dps
+    running, blocks = Compensator(flows[kind]), Compensator(flows[kind])
+    stepped = [float(running.step(raw[k : k + 1], warm[k], t_s[k])[0][0]) for k in range(len(t_s))]
+    cuts = np.split(np.arange(len(t_s)), [1, 8, 100, 101, 390])
+    parts = [blocks.compensate(raw[b], warm[b], {"t_s": t_s[b]}, continued=True).rate_dps for b in cuts]
+    assert stepped == pytest.approx(whole, abs=1e-12, nan_ok=True)
+    assert np.concatenate(parts) == pytest.approx(whole, abs=1e-12, nan_ok=True)
+
+
+def test_another_process_goes_on_from_the_state(flows: dict[str, Calibration]) -> None:
+    t_s, warm, raw = trace()
+    first = Compensator(flows["two flows"])
+    assert first.state is None
+    first.compensate(raw[:200], warm[:200], {"t_s": t_s[:200]}, continued=True)
+    assert first.state is not None
+    document = json.loads(json.dumps(asdict(first.state)))
+    second = Compensator(flows["two flows"])
+    second.start(MemoryState(document["t_s"], document["temperature_c"], tuple(document["at_c"])))
+    given = raw[200:], warm[200:], {"t_s": t_s[200:]}
+    later = second.compensate(*given, continued=True).rate_dps
+    assert later == pytest.approx(first.compensate(*given, continued=True).rate_dps, abs=1e-12)
+    assert later != pytest.approx(Compensator(flows["two flows"]).compensate(*given).rate_dps, abs=1e-6)
+    with pytest.raises(BadInput, match="this calibration has 2 followers"):
+        second.start(MemoryState(0.0, 20.0, (20.0,)))
+    with pytest.raises(BadInput, match="before"):
+        second.compensate(raw[:2], warm[:2], {"t_s": t_s[:2]}, continued=True)
+    with pytest.raises(BadInput, match="no state to start from"):
+        Compensator(calibrated(at_rest(("z",)), effects=["bias"])).start(MemoryState(0.0, 20.0, ()))
+
+
+def test_a_calibration_file_says_its_state_equation(flows: dict[str, Calibration], lagging: Calibration) -> None:
+    state = flows["two ways"].document["state"]
+    assert "d at_c / dt = (T - at_c) / tau" in state["equation"]
+    (element,) = state["elements"]
+    assert (element["tau_s"], element["cooling_tau_s"]) == (150.0, 900.0)
+    kinds = [element["kind"] for element in lagging.document["state"]["elements"]]
+    assert kinds[0] == "lag"
+    assert set(kinds[1:]) == {"play"}
+    assert "state" not in calibrated(at_rest(("z",)), effects=["bias"]).document
+
+
+@pytest.mark.parametrize("kind", [*KINDS, "lag and hysteresis"])
+def test_an_exported_python_module_keeps_the_same_state(
+    flows: dict[str, Calibration], lagging: Calibration, kind: str
+) -> None:
+    calibration = flows.get(kind, lagging)
+    module: dict[str, Any] = {}
+    exec(export_calibration(calibration.to_bytes(), "python")[0], module)
+    t_s, warm, raw = trace()
+    state = module["State"]()
+    found = [module["correct_with_state"](state, [w], c, t)[0][0] for w, c, t in zip(raw, warm, t_s, strict=True)]
+    expected = Compensator(calibration).compensate(raw, warm, {"t_s": t_s}).rate_dps
+    assert found == pytest.approx(expected, abs=1e-12, nan_ok=True)
+    with pytest.raises(ValueError, match="before the last sample"):
+        module["correct_with_state"](state, [0.0], 20.0, 0.0)
 
 
 def test_the_time_constant_of_a_lag_is_found_and_kept() -> None:
@@ -86,8 +190,12 @@ def test_a_sample_without_its_time_or_from_before_is_refused(lagging: Calibratio
 
 
 @pytest.mark.needs_cc
+@pytest.mark.parametrize("kind", [*KINDS, "lag and hysteresis"])
 @pytest.mark.parametrize(("real", "tolerance"), [("double", 1e-12), ("float", 2e-5)])
-def test_c_remembers_what_python_does(lagging: Calibration, tmp_path: Path, real: str, tolerance: float) -> None:
+def test_c_remembers_what_python_does(
+    flows: dict[str, Calibration], lagging: Calibration, tmp_path: Path, kind: str, real: str, tolerance: float
+) -> None:
+    lagging = flows.get(kind, lagging)
     assert Compensator(lagging).remembers
     name = c_name(lagging.serial)
     (tmp_path / "calibration.h").write_bytes(export_calibration(lagging.to_bytes(), "c")[0])
@@ -96,11 +204,7 @@ def test_c_remembers_what_python_does(lagging: Calibration, tmp_path: Path, real
     assert compiler is not None
     command = [compiler, "-std=c99", "-Wall", "-Wextra", "-Werror", f"-DLABCTL_REAL={real}", "-O1", "main.c"]
     subprocess.run([*command, "-o", "main", "-lm"], cwd=tmp_path, check=True, capture_output=True)
-    rng = np.random.default_rng(4)
-    t_s = np.cumsum(rng.uniform(0.01, 30.0, 400))
-    warm = 30.0 + 45.0 * np.sin(t_s / 700.0)  # beyond the calibrated temperatures too
-    warm[7] = np.nan
-    raw = rng.normal(0, 0.2, 400)
+    t_s, warm, raw = trace()
     lines = "\n".join(f"{t:.17g} {c:.17g} {w:.17g}" for t, c, w in zip(t_s, warm, raw, strict=True))
     out = subprocess.run([tmp_path / "main"], input=lines, text=True, check=True, capture_output=True).stdout
     table = np.array([[float(word) for word in line.split()] for line in out.splitlines()])

@@ -47,6 +47,12 @@ def print_fit(answer: FitResponse) -> None:
             shown = rounded_to_uncertainty(value, u)
             rows.add_row(name, unit, shown.value + shown.power, shown.u + shown.power if shown.u else "-")
         console.print(rows)
+    for effect, quantities in answer.shapes.items():
+        rows = table(effect, "quantity", "unit", "value", "u", numbers=2)
+        for name, entry in quantities.items():
+            shown = rounded_to_uncertainty(entry["value"], entry["u"])
+            rows.add_row(name, entry["unit"], shown.value + shown.power, shown.u + shown.power if shown.u else "-")
+        console.print(rows)
     if answer.poses is not None:
         print_poses(answer.poses)
 

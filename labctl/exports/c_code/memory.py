@@ -10,14 +10,19 @@ from labctl.fitting.numeric.arrays import Array
 
 BODY = """
 /* State: {count} filters of the temperature, of a thermal lag (time constant, s) or a hysteresis (width of a
- * play, K). Call {name}_begin once, and {name}_step for every sample in order of time, t_s in s; the unit is taken to
- * have rested at its first temperature. A temperature that goes straight from sample to sample is followed exactly,
- * however far they are apart. {name}_correct alone is right where the temperature has not changed for long, but for the
- * side of a hysteresis. Link with the C library's mathematics (-lm). */
+ * play, K). A lag moves by d at_c / dt = (temperature - at_c) / tau, tau that of {name}_cooling while it is above the
+ * temperature, and adds size * (at_c - temperature) to the output, or size times the difference of the squares about
+ * {name}_reference_c. Call {name}_begin once, and {name}_step for every sample in order of time, t_s in s; the unit is
+ * taken to have rested at its first temperature. A temperature that goes straight from sample to sample is followed
+ * exactly, however far they are apart. {name}_correct alone is right where the temperature has not changed for long,
+ * but for the side of a hysteresis. Link with the C library's mathematics (-lm). */
 #define {name}_FOLLOWERS {count}
 typedef struct {{ int begun; double t_s, temperature_c, at_c[{name}_FOLLOWERS]; }} {name}_state;
 static const int {name}_is_lag[{name}_FOLLOWERS] = {is_lag};
 static const double {name}_follower[{name}_FOLLOWERS] = {parameters};
+static const double {name}_cooling[{name}_FOLLOWERS] = {cooling}; /* of a lag: time constant from above, s */
+static const int {name}_is_curved[{name}_FOLLOWERS] = {is_curved};
+static const double {name}_reference_c[{name}_FOLLOWERS] = {references};
 static const double {name}_bow_c[{name}_FOLLOWERS][2] = {bows};
 static const double {name}_size[{name}_FOLLOWERS][{name}_AXES] = {sizes};
 
@@ -33,7 +38,8 @@ static inline int {name}_step(
     for (f = 0; known && f < {name}_FOLLOWERS; f++) {{
         double parameter = {name}_follower[f], at = now, side;
         if (state->begun && {name}_is_lag[f]) {{
-            double ratio = (t_s - state->t_s) / parameter, keep = exp(-ratio);
+            double tau = now < state->at_c[f] ? {name}_cooling[f] : parameter;
+            double ratio = (t_s - state->t_s) / tau, keep = exp(-ratio);
             double mean = ratio > 0 ? -expm1(-ratio) / ratio : 1;
             at = keep * state->at_c[f] + (mean - keep) * state->temperature_c + (1 - mean) * now;
         }} else if (state->begun) {{
@@ -41,6 +47,7 @@ static inline int {name}_step(
         }}
         state->at_c[f] = at;
         side = {name}_is_lag[f] ? at - now : (now - at) / (parameter / 2);
+        if ({name}_is_curved[f]) side *= at + now - 2 * {name}_reference_c[f];
         if ({name}_bow_c[f][1] > {name}_bow_c[f][0]) {{
             double share = (now - {name}_bow_c[f][0]) / ({name}_bow_c[f][1] - {name}_bow_c[f][0]);
             share = fmin(fmax(share, 0), 1);
@@ -70,6 +77,9 @@ def memory_body(name: str, memory: Memory, *, is_direct: bool) -> str:
         count=len(followers),
         is_lag="{" + ", ".join(str(int(follower.kind == "lag")) for follower in followers) + "}",
         parameters=c_table(np.array([follower.parameter for follower in followers])),
+        cooling=c_table(np.array([follower.cooling_s or follower.parameter for follower in followers])),
+        is_curved="{" + ", ".join(str(int(follower.part == "curved")) for follower in followers) + "}",
+        references=c_table(np.array([follower.reference_c for follower in followers])),
         bows=c_table(bows),
         sizes=c_table(_sizes(memory)),
         left="w[a]" if is_direct else "(LABCTL_REAL)((double)w[a] - error[a])",

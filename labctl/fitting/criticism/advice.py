@@ -55,10 +55,15 @@ class Exported:
         return self.after_dps < (1.0 - self.least_gain) * self.before_dps
 
 
-def advice_for(data: FitData, model: ErrorModel, terms: Sequence[Term]) -> tuple[Advice, ...]:
-    """Return for each effect, in its shape, whether to add it to a model, and why; each beside those before it."""
+def advice_for(
+    data: FitData, model: ErrorModel, terms: Sequence[Term], beside: Sequence[Term] = ()
+) -> tuple[Advice, ...]:
+    """Return for each effect, in its shape, whether to add it to a model, and why; each beside those before it.
+
+    The terms `beside` are in the model already.
+    """
     found: list[Advice] = []
-    beside: list[Term] = []
+    beside = list(beside)
     for term in terms:
         report_stage(f"checking what a calibration with {term.effect} would do")
         checked = exported_errors(data, model, tuple(beside), term)

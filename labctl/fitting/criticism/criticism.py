@@ -21,6 +21,7 @@ from labctl.fitting.criticism.search.refinement import refined_term
 from labctl.fitting.criticism.search.stepwise import search_stepwise
 from labctl.fitting.criticism.slow_process import slow_process, with_hypothesis, without_harm
 from labctl.fitting.criticism.suspects import Suspect, suspects_of
+from labctl.fitting.criticism.thermal_family import LAG, ThermalFamily, thermal_family, with_family
 from labctl.fitting.criticism.verdict import FAR, Verdict
 from labctl.fitting.criticism.visibility import not_testable
 from labctl.fitting.data.fit_data import FitData, fit_data_of
@@ -68,6 +69,7 @@ class Criticism:
     slow: SlowProcess | None = None  #: of a record at rest
     explained: float | None = None
     views: Views = field(default_factory=Views)
+    family: ThermalFamily | None = None  #: the thermal response that the verdict names
 
     @property
     def floor(self) -> NoiseFloor:
@@ -155,7 +157,10 @@ def criticise(
     comparison = compare_models(beside_held(seen, forward), forward, catalogue)
     verdict, initial, final = search_stepwise(comparison, catalogue)
     verdict = _without_large_residual(_beyond_noise(verdict, initial), base)
-    found = _checked(Criticism(verdict, data, fit_data, base, None, comparison, final), forward, full=full)
+    family = thermal_family(fit_data, forward, verdict)
+    verdict = with_family(verdict, family)
+    named = Criticism(verdict, data, fit_data, base, None, comparison, final, family=family)
+    found = _checked(named, forward, full=full)
     verdict = found.verdict
     if not full or found.beside_missing is None:
         return found
@@ -164,6 +169,7 @@ def criticise(
     suspected = {*verdict.named, *(s.candidate.id for s in suspects if s.candidate.log_bf > 0)}
     return replace(
         found,
+        family=_with_time_constants(family, fit_data, forward),
         direct_rms_dps=_direct_rms_dps(fit_data, model),
         suspects=suspects,
         not_testable=tuple(line for line in not_testable(comparison, catalogue) if line["effect"] not in suspected),
@@ -196,8 +202,12 @@ def _checked(found: Criticism, forward: ErrorModel, *, full: bool) -> Criticism:
         return found
     verdict = with_quantization(verdict, found.data, found.residuals)
     slow = slow_process(comparison, found.residuals)
-    leaders = [term for group in verdict.groups if (term := _to_check(comparison, verdict, group)) is not None]
-    advice = advice_for(found.fit_data, forward, leaders) if full or slow is not None else ()
+    family = found.family
+    others = [group for group in verdict.groups if family is None or group[0] != LAG]
+    leaders = [term for group in others if (term := _to_check(comparison, verdict, group)) is not None]
+    beside = () if family is None else (family.response.term,)
+    advice = advice_for(found.fit_data, forward, leaders, beside) if full or slow is not None else ()
+    advice = advice if family is None else (family.advice, *advice)
     verdict = with_hypothesis(without_harm(verdict, advice, slow, comparison), comparison, slow)
     advice = (*advice, NO_CORRECTION) if verdict.named == (QUANTIZATION,) else advice
     kept = tuple(each for each in advice if each["effect"] in verdict.named)
@@ -226,6 +236,16 @@ def _beyond_noise(verdict: Verdict, initial: Comparison) -> Verdict:
     if not doubtful:
         return verdict
     return replace(verdict, form="unexplained", further=(), not_physical=tuple(c.id for c in doubtful))
+
+
+def _with_time_constants(
+    family: ThermalFamily | None, data: FitData, forward: ErrorModel
+) -> ThermalFamily | None:  # fmt: skip
+    """Return the family with the uncertainties of its time constants, as the model with it has them."""
+    if family is None:
+        return None
+    after = fit_preset(data, changed(forward, (family.response.term,)))
+    return replace(family, shapes=after.shapes.get(LAG, {}))
 
 
 def _without_large_residual(verdict: Verdict, base: FitResult | None) -> Verdict:

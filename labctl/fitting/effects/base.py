@@ -157,6 +157,10 @@ class Effect(ABC):
         """Return a term whose columns have the shape of a fit: axis -> its first coefficient, at the nodes' mean."""
         return term
 
+    def states_shape(self, term: Term) -> bool:
+        """Return whether a term has a value of a quantity that its shape is found by (a time constant, a width)."""
+        return any(p.name in term.parameters for p in self.parameters if p.logarithmic)
+
     def kept(self, term: Term, history: TemperatureHistory) -> Term:
         """Return a term with what its columns take from a recording and a calibration file has to keep."""
         return term

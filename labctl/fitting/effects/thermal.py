@@ -10,6 +10,7 @@ import numpy as np
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.data.temperature.history import TemperatureHistory
 from labctl.fitting.effects.base import Column, Effect, Parameter, Reference, Rows, Span, Term, by_parameter
+from labctl.fitting.effects.thermal_lag import ThermalLag
 from labctl.json_types.models import Origin
 
 
@@ -42,36 +43,6 @@ class TemperatureRate(Effect):
         """Return a long slope, for a noisy thermometer, a short one, for a fast gyro, and the gradient if known."""
         slopes = by_parameter(self.id, of_gradient=np.array([0.0]), over_s=np.array([60.0, 300.0]))
         return slopes + ([Term(self.id, None, {"of_gradient": 1.0})] if span.has("chamber_c") else [])
-
-
-class ThermalLag(Effect):
-    """Thermal lag between the sensing part and the thermometer."""
-
-    id = "thermal_lag"
-    remembers = True
-    term = "Thermal lag (sensing element behind the thermometer)"
-    sentence = (
-        "The sensing element follows the thermometer with a delay, so the correction is made for another temperature."
-    )
-    by_temperature = True
-    origin: ClassVar[Origin] = "sensor"
-    rows: ClassVar[Rows] = "all"
-    shows_at_rest = True
-    needs = ("t_s",)
-    parameters = (Parameter("tau_s", "s", 60.0, 3600.0, logarithmic=True),)
-    ranges: ClassVar = {"fog": (0.0, 0.02), "mems": (0.0, 0.1), "piezo": (0.0, 0.6)}
-    experiment = "two ramp speeds: an error due to lag grows with the speed, an error due to hysteresis does not"
-    draws = ("legs", "time")
-
-    def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
-        return [
-            Column(
-                "thermal_lag", "deg/s/K", channels.history.lag_k(channels.columns, term.parameters.get("tau_s", 600.0))
-            )
-        ]
-
-    def options(self, span: Span) -> list[Term]:
-        return by_parameter(self.id, tau_s=np.geomspace(150.0, 3600.0, 7))
 
 
 class ThermalHysteresis(Effect):

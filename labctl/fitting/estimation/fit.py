@@ -24,6 +24,7 @@ from labctl.fitting.estimation.of_poses import of_poses
 from labctl.fitting.estimation.published.tables import from_coefficients
 from labctl.fitting.estimation.requirements import require_enough_data
 from labctl.fitting.estimation.result import FitResult
+from labctl.fitting.estimation.shape_uncertainty import shapes_of
 from labctl.fitting.estimation.shapes import with_shapes
 from labctl.fitting.estimation.validity import valid_rates_dps
 from labctl.fitting.models.error_model import ErrorModel, is_exported
@@ -83,6 +84,7 @@ def fit_preset(data: FitData, preset: Preset) -> FitResult:
         _environment(data, found.turning),
         residual,
         left_out_dps=_left_out_dps(fitted, data),
+        shapes=shapes_of(used, fitted, found.solutions),
         joint=joint_findings(data, model, preset, found),
         mountings=mountings_of(data.channels),
         angles_rad={axis: each.angles_rad for axis, each in found.nuisance.items() if each.angles_rad},

@@ -40,6 +40,8 @@ class FitResult:
     left_out_dps: Mapping[str, float] = field(default_factory=dict)  #: effect that is not exported -> its RMS, deg/s
     joint: JointJson | None = None  #: what several recordings say together; None for a single one
     mountings: Mapping[str, float] = field(default_factory=dict)  #: position -> its share in the slopes over the rate
+    #: Effect -> name -> value, u and unit of the time constants and widths of what remembers.
+    shapes: Mapping[str, dict[str, Coefficient]] = field(default_factory=dict)
     #: Output -> name -> angle of the mountings, rad, as far as they are separated from the misalignments.
     angles_rad: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
@@ -70,6 +72,8 @@ class FitResult:
         }
         if "held" in whole:
             found["model"]["held"] = whole["held"]
+        if self.shapes:
+            found["shapes"] = dict(self.shapes)
         if self.poses is not None:
             found["poses"] = self.poses
         if self.joint is not None:

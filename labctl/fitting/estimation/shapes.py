@@ -2,7 +2,8 @@
 
 A lag's time constant and a hysteresis' width enter a model nonlinearly. For given shapes the coefficients are a
 weighted least-squares fit; the shapes are those that leave the least, at the noise that the recording shows beside its
-rich surface. Where a model has several, each is found beside the others: alone, a hysteresis takes part of a lag.
+rich surface. Where a model has several, each is found beside the others: alone, a hysteresis takes part of a lag. How
+many time constants a lag has is chosen by stretches of the temperature course that are left out (`thermal_response`).
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ import numpy as np
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.effects import Effect, Parameter, Span, Term, kind_of
 from labctl.fitting.estimation.axis_design import axis_design
+from labctl.fitting.estimation.thermal_response import STRUCTURES, has_lag, thermal_response
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.presets import Preset, Rows
 from labctl.fitting.numeric.arrays import Array
@@ -38,12 +40,14 @@ def with_shapes(data: FitData, preset: Preset, *, all_of_them: bool = False) -> 
     """
     model, _ = preset.build(data)
     remembering = [term for term in model.terms if quantities(kind_of(term))]
-    open_ = [term for term in remembering if not set(term.parameters) & {p.name for p in quantities(kind_of(term))}]
-    if not (open_ or (all_of_them and len(remembering) > 1)):
+    open_ = [term for term in remembering if not kind_of(term).states_shape(term)]
+    again = all_of_them and (len(remembering) > 1 or has_lag(model) is not None)
+    if not (open_ or again):
         return preset
     if any(data.channels.missing(kind_of(term).channels) for term in remembering):
         return preset  # the fit says what is missing
-    shapes = {t.effect: t for t in _found(data, model, [t.effect for t in (remembering if all_of_them else open_)])}
+    effects = [term.effect for term in (remembering if all_of_them else open_)]
+    shapes = {t.effect: t for t in _with_structure(data, model, _found(data, model, effects))}
     if not shapes:
         return preset
 
@@ -53,6 +57,24 @@ def with_shapes(data: FitData, preset: Preset, *, all_of_them: bool = False) -> 
         return made.with_terms(tuple(terms)), rows
 
     return Preset(preset.name, build, preset.inner_only)
+
+
+def _with_structure(data: FitData, model: ErrorModel, found: Sequence[Term]) -> Sequence[Term]:
+    """Return terms in their best shapes with the heat flows of the lag among them that the recording shows."""
+    shaped = {term.effect: term for term in found}
+    model = model.with_terms(tuple(shaped.get(term.effect, term) for term in model.terms))
+    lag = has_lag(model)
+    if lag is None or lag.effect not in shaped or lag.effect in model.held.effects:
+        return found
+    response = thermal_response(data, model, lag)
+    if response is None or response.structure is STRUCTURES[0]:
+        return found
+    shaped[lag.effect] = response.term
+    others = [effect for effect in shaped if effect != lag.effect]
+    if others:  # beside another lag they have other shapes
+        model = model.with_terms(tuple(shaped.get(term.effect, term) for term in model.terms))
+        shaped |= {term.effect: term for term in _found(data, model, others)}
+    return list(shaped.values())
 
 
 @single_threaded

@@ -10,7 +10,7 @@ import numpy as np
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.models.matrix_form import Linear, linear_of
-from labctl.fitting.models.polynomial_surface import Surface, surface_of
+from labctl.fitting.models.polynomial_surface import Surface, bias_surface_of, surface_of
 from labctl.fitting.models.sine_form import sine_form_of
 from labctl.fitting.numeric.arrays import Array
 
@@ -37,7 +37,7 @@ def correct_across(
 
 def correction(fitted: FittedModel, axes: tuple[str, ...]) -> Correct:
     """Return the fastest exact way to apply a model: (rates (n, axes), temperatures) -> rates (n, axes)."""
-    surface: Surface | None = surface_of(fitted, axes)
+    surface: Surface | None = surface_of(fitted, axes) or bias_surface_of(fitted, axes)
     if surface is not None:
         return lambda raw, warm, _: surface.correct(raw, warm)
     linear: Linear | None = linear_of(fitted, axes)

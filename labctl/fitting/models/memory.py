@@ -8,16 +8,32 @@ to this one, whatever lies between them in time; a play is carried along only at
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import BODY_AXES, Channels
-from labctl.fitting.data.temperature.history import LoggedColumns, TemperatureHistory, lag_shares, rounded_plays
+from labctl.fitting.data.temperature.history import LoggedColumns, TemperatureHistory, rounded_plays
 from labctl.fitting.effects import Term, kind_of
+from labctl.fitting.effects.thermal_lag import LagElement, Part, lag_elements
 from labctl.fitting.models.fitted_model import FittedModel, without
 from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.numeric.following import Steps
+from labctl.json_types import JsonObject
+from labctl.json_types.models import StateJson
+
+#: What `Follower.to_json` describes.
+STATE_EQUATION = (
+    "each element has a temperature at_c, at first that of the unit; a lag moves by d at_c / dt = (T - at_c) / tau, "
+    "tau = cooling_tau_s while at_c > T, else tau_s, and adds size * (at_c - T) to the output of each axis, deg/s, or "
+    "if it is_curved size * ((at_c - reference_c)^2 - (T - reference_c)^2); a play moves only to stay within "
+    "width_k / 2 of T and adds size * (T - at_c) / (width_k / 2), with bow_c = [low, high] times 4 q (1 - q), "
+    "q = (T - low) / (high - low) from 0 to 1"
+)
+#: Samples that are followed at once, so that they stay in the processor's cache.
+BLOCK = 16384
 
 
 @dataclass(frozen=True)
@@ -26,26 +42,45 @@ class Follower:
 
     kind: Literal["lag", "play"]
     parameter: float  #: time constant, s, or width, K
-    size: Array  #: (axes,) error, deg/s: of a lag for each K behind, of a play at its edge
+    #: Of a lag: the time constant while the element is warmer than the thermometer, s; None: the same.
+    cooling_s: float | None
+    size: Array  #: (axes,) error, deg/s: of a lag for each K behind (K2 where it is curved), of a play at its edge
     bow: tuple[float, float] | None = None  #: lowest and highest temperature, deg C, where the size goes to 0
+    part: Part = "all"  #: what of a lag makes the error
+    reference_c: float = 0.0  #: of a curved lag: the temperature that the squares are taken about, deg C
 
-    def moved(self, at_c: float, before_c: float, now_c: float, step_s: float) -> float:
-        """Return where the follower is when the temperature has gone from `before_c` to `now_c` in `step_s`, deg C."""
-        if self.kind == "lag":
-            keep, last, new = lag_shares(step_s, self.parameter)
-            return keep * at_c + last * before_c + new * now_c
-        half = self.parameter / 2
-        return min(max(at_c, now_c - half), now_c + half)
+    def to_json(self) -> JsonObject:
+        """Return what a program needs that follows the temperature itself, as JSON."""
+        if self.kind == "play":
+            bow = list(self.bow) if self.bow else None
+            return {"kind": "play", "width_k": self.parameter, "bow_c": bow, "size": self.size.tolist()}
+        return {
+            "kind": "lag", "tau_s": self.parameter, "cooling_tau_s": self.cooling_s or self.parameter,
+            "is_curved": self.part == "curved", "reference_c": self.reference_c, "size": self.size.tolist(),
+        }  # fmt: skip
 
-    def state(self, at_c: float, now_c: float) -> float:
-        """Return what the size is multiplied by: K behind the temperature, or the side of the play from -1 to 1."""
+    @property
+    def movement(self) -> tuple[str, float, float | None]:
+        """What determines where it is: two that agree in this are always at the same place."""
+        return self.kind, self.parameter, self.cooling_s
+
+    def moved(self, steps: Steps, at_c: float) -> Array:
+        """Return where it is after each step, (n,) deg C, from `at_c`."""
+        if self.kind == "play":
+            return steps.played(self.parameter, at_c)
+        if self.cooling_s is None:
+            return steps.lagged(self.parameter, at_c)
+        return steps.lagged_two_ways(self.parameter, self.cooling_s, at_c)
+
+    def state(self, at_c: Array, now_c: Array) -> Array:
+        """Return what the size is multiplied by, (n,): K behind the temperature, or the side of the play, -1 to 1."""
         if self.kind == "lag":
-            return at_c - now_c
+            return LagElement("", "", self.part, self.parameter).values(at_c - now_c, now_c - self.reference_c)
         side = (now_c - at_c) / (self.parameter / 2)
         if self.bow is None:
             return side
-        share = min(max((now_c - self.bow[0]) / max(self.bow[1] - self.bow[0], 1e-9), 0.0), 1.0)
-        return side * 4 * share * (1 - share)
+        share = np.clip((now_c - self.bow[0]) / max(self.bow[1] - self.bow[0], 1e-9), 0.0, 1.0)
+        return np.asarray(side * 4 * share * (1 - share))
 
 
 @dataclass(frozen=True)
@@ -55,26 +90,42 @@ class Memory:
     part: FittedModel
     axes: tuple[str, ...]
 
-    @property
+    @cached_property
     def followers(self) -> list[Follower]:
         """The elements that follow the temperature, in the order of the model's effects."""
         return [follower for term in self.part.model.terms for follower in self._of(term)]
 
     def _of(self, term: Term) -> list[Follower]:
-        size = np.array([self._size(term, axis) for axis in self.axes])
         if term.effect == "thermal_lag":
-            return [Follower("lag", term.parameters.get("tau_s", 600.0), size)]
+            return self._lags(term)
+        size = np.array([self._size(term.effect, axis, "leg") for axis in self.axes])
         width_k = term.parameters.get("width_k", 3.0)
         bow = None
         if term.parameters.get("bowed", 0.0):
             bow = (term.parameters.get("low_c", 0.0), term.parameters.get("high_c", 1.0))
         if term.parameters.get("rounded", 0.0):
-            return [Follower("play", width, share * size, bow) for width, share in rounded_plays(width_k)]
-        return [Follower("play", width_k, size, bow)]
+            return [Follower("play", width, None, share * size, bow) for width, share in rounded_plays(width_k)]
+        return [Follower("play", width_k, None, size, bow)]
 
-    def _size(self, term: Term, axis: str) -> float:
+    def _lags(self, term: Term) -> list[Follower]:
+        """Return the elements of a lag; axes that share a time constant share an element."""
+        sizes: dict[tuple[float, float | None, Part], Array] = {}
+        for k, axis in enumerate(self.axes):
+            for element in lag_elements(term, axis):
+                of_axes = sizes.setdefault(
+                    (element.tau_s, element.cooling_tau_s, element.part), np.zeros(len(self.axes))
+                )
+                of_axes[k] += self._size(term.effect, axis, element.column)
+        about = self.part.model.reference.temperature_c
+        return [
+            Follower("lag", tau_s, cooling_s, size, None, part, about if part == "curved" else 0.0)
+            for (tau_s, cooling_s, part), size in sizes.items()
+        ]
+
+    def _size(self, effect: str, axis: str, column: str) -> float:
         fit = self.part.axes[axis]
-        return float(fit.values[fit.effects.index(term.effect), 0]) if term.effect in fit.effects else 0.0
+        owned = (k for k, (owner, name) in enumerate(zip(fit.effects, fit.names, strict=True)) if owner == effect)
+        return next((float(fit.values[k, 0]) for k in owned if fit.names[k] == column), 0.0)
 
     def of_history(self, history: TemperatureHistory, columns: LoggedColumns) -> Array:
         """Return the error of each row of a recording whose history is known, (n, axes) deg/s."""
@@ -83,40 +134,75 @@ class Memory:
         return np.column_stack([self.part.error_dps(channels, axis) for axis in self.axes])
 
 
+@dataclass(frozen=True)
+class MemoryState:
+    """Where the followers of a unit are: what one process hands over to the next."""
+
+    t_s: float  #: time of the last sample, s
+    temperature_c: float  #: its temperature, deg C
+    at_c: tuple[float, ...]  #: of each follower, deg C
+
+
 class RunningMemory:
     """The followers of a unit in use: where each of them is. The first sample finds them at its temperature."""
 
     def __init__(self, memory: Memory) -> None:
         self._followers = memory.followers
-        self._none = np.zeros(len(memory.axes))
-        self.reset()
+        self._sizes = np.array([follower.size for follower in self._followers])
+        self.state: MemoryState | None = None  #: None before the first sample
 
     def reset(self) -> None:
         """Forget all, as after the unit was switched off for long."""
-        self._at: list[float] = []
-        self._t_s, self._now_c = 0.0, 0.0
+        self.state = None
+
+    def start(self, state: MemoryState) -> None:
+        """Go on from a state that another process has handed over; raises BadInput for one of another calibration."""
+        values = (state.t_s, state.temperature_c, *state.at_c)
+        if len(state.at_c) != len(self._followers) or not np.all(np.isfinite(values)):
+            raise BadInput(
+                f"state with {len(state.at_c)} followers at {list(state.at_c)} deg C, t_s = {state.t_s:g} s, "
+                f"temperature {state.temperature_c:g} deg C: this calibration has {len(self._followers)} followers, "
+                "and all values must be finite; hand over the `state` of a compensator of the same calibration"
+            )
+        self.state = state
 
     @property
     def last_s(self) -> float | None:
         """The time of the last sample, s; None before the first."""
-        return self._t_s if self._at else None
+        return self.state.t_s if self.state is not None else None
 
     def error_dps(self, t_s: float, temperature_c: float) -> Array:
         """Return the error at a sample, (axes,) deg/s, in order of time; one that is no number moves nothing."""
-        if not (np.isfinite(t_s) and np.isfinite(temperature_c)):
-            return np.full_like(self._none, np.nan)
-        if self._at:
-            step = t_s - self._t_s
-            self._at = [
-                f.moved(at, self._now_c, temperature_c, step) for f, at in zip(self._followers, self._at, strict=True)
-            ]
-        else:
-            self._at = [temperature_c] * len(self._followers)
-        self._t_s, self._now_c = t_s, temperature_c
-        total = self._none.copy()
-        for follower, at in zip(self._followers, self._at, strict=True):
-            total += follower.size * follower.state(at, temperature_c)
-        return total
+        return self.errors_dps(np.array([t_s]), np.array([temperature_c]))[0]
+
+    def errors_dps(self, t_s: Array, temperature_c: Array) -> Array:
+        """Return the errors at samples (n,) in order of time, (n, axes) deg/s, and move on to the last of them.
+
+        A sample that is no number moves nothing.
+        """
+        known = np.isfinite(t_s) & np.isfinite(temperature_c)
+        if not known.all():
+            found = np.full((len(t_s), self._sizes.shape[1]), np.nan)
+            found[known] = self.errors_dps(t_s[known], temperature_c[known])
+            return found
+        found = np.empty((len(t_s), self._sizes.shape[1]))
+        for begin in range(0, len(t_s), BLOCK):
+            block = slice(begin, begin + BLOCK)
+            found[block] = self._block(t_s[block], temperature_c[block])
+        return found
+
+    def _block(self, t_s: Array, warm: Array) -> Array:
+        state = self.state or MemoryState(float(t_s[0]), float(warm[0]), (float(warm[0]),) * len(self._followers))
+        steps = Steps.of(t_s, warm, state.t_s, state.temperature_c)
+        moved: dict[tuple[str, float, float | None], Array] = {}
+        rows = np.empty((len(self._followers), len(warm)))
+        for k, (each, at_c) in enumerate(zip(self._followers, state.at_c, strict=True)):
+            if each.movement not in moved:
+                moved[each.movement] = each.moved(steps, at_c)
+            rows[k] = each.state(moved[each.movement], warm)
+        ends = tuple(float(moved[each.movement][-1]) for each in self._followers)
+        self.state = MemoryState(float(t_s[-1]), float(warm[-1]), ends)
+        return rows.T @ self._sizes
 
 
 def course(running: RunningMemory, t_s: Array, temperature_c: Array) -> Array:
@@ -124,13 +210,14 @@ def course(running: RunningMemory, t_s: Array, temperature_c: Array) -> Array:
 
     Raises BadInput for times that go back.
     """
-    if np.any(np.diff(t_s) < 0):
-        row = int(np.argmax(np.diff(t_s) < 0)) + 1
-        raise BadInput(
-            f"sample {row + 1}: t_s = {t_s[row]:.9g} s is before {t_s[row - 1]:.9g} s; give them in order of time"
-        )
+    last = running.last_s
+    back = np.diff(t_s, prepend=t_s[:1] if last is None else last) < 0
+    if np.any(back):
+        row = int(np.argmax(back))
+        before = t_s[row - 1] if row else last
+        raise BadInput(f"sample {row + 1}: t_s = {t_s[row]:.9g} s is before {before:.9g} s; give them in order of time")
     warm = temperature_c.mean(axis=1) if temperature_c.ndim == 2 else np.broadcast_to(temperature_c, t_s.shape)
-    return np.array([running.error_dps(t, c) for t, c in zip(t_s.tolist(), warm.tolist(), strict=True)])
+    return running.errors_dps(t_s, np.asarray(warm))
 
 
 def split_memory(fitted: FittedModel, axes: tuple[str, ...]) -> tuple[FittedModel, Memory | None]:
@@ -148,3 +235,11 @@ def split_memory(fitted: FittedModel, axes: tuple[str, ...]) -> tuple[FittedMode
         else:
             part = without(part, effect)
     return rest, Memory(part, axes)
+
+
+def state_json(fitted: FittedModel) -> StateJson | None:
+    """Return what a correction by a model keeps from sample to sample, as JSON; None where it keeps nothing."""
+    _, memory = split_memory(fitted, tuple(fitted.axes))
+    if memory is None:
+        return None
+    return {"equation": STATE_EQUATION, "elements": [each.to_json() for each in memory.followers]}

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.fitting.models.fitted_model import FittedModel
+from labctl.fitting.models.temperature import Constant
 from labctl.fitting.numeric.arrays import Array
 
 #: Samples that are worked on together: every array of the scheme stays in the first- and second-level cache.
@@ -66,3 +67,23 @@ def surface_of(fitted: FittedModel, axes: tuple[str, ...]) -> Surface | None:
             c[i, j] = value
         found.append(c)
     return Surface(np.stack(found), fitted.model.reference.temperature_c)
+
+
+#: Effects that no rate changes: a polynomial of temperature, right for an argument of either kind.
+OF_TEMPERATURE = {"bias", "bias_temperature"}
+
+
+def bias_surface_of(fitted: FittedModel, axes: tuple[str, ...]) -> Surface | None:
+    """Return the polynomial of temperature of a model that is a bias and nothing else; None for any other."""
+    model = fitted.model
+    if not isinstance(model.temperature, Constant) or not set(model.effect_ids) <= OF_TEMPERATURE or model.held.axes:
+        return None
+    powers = [
+        {int(name.removeprefix("bias_t")) if name != "bias" else 0: float(values[0]) for name, values in found}
+        for found in (zip(fitted.axes[axis].names, fitted.axes[axis].values, strict=True) for axis in axes)
+    ]
+    c = np.zeros((len(axes), 1, 1 + max(1, *(max(each, default=0) for each in powers))))
+    for axis, each in enumerate(powers):
+        for power, value in each.items():
+            c[axis, 0, power] = value
+    return Surface(c, model.reference.temperature_c)

@@ -13,6 +13,8 @@ def remembered_by(calibration: Calibration) -> list[Follower]:
     return [
         Follower(
             kind=each.kind, parameter=each.parameter, unit="s" if each.kind == "lag" else "K",
+            cooling_s=each.cooling_s, is_curved=each.part == "curved",
+            reference_c=each.reference_c if each.part == "curved" else None,
             size=dict(zip(calibration.axes, each.size.tolist(), strict=True)),
         )
         for each in (memory.followers if memory is not None else ())

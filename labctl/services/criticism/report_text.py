@@ -82,6 +82,7 @@ def answer_of(
         depends_on=list(verdict.depends_on),
         confounded_with=list(verdict.confounded),
         remainder=verdict.remainder,
+        thermal_response=found.family.to_json() if found.family is not None else None,
         not_physical=list(verdict.not_physical),
         named_axes={name: list(axes) for name, axes in verdict.axes.items()},
         further=[list(group) for group in verdict.further],
@@ -158,7 +159,9 @@ def _shape(suspect: Suspect) -> dict[str, float]:
 def sentences(found: Criticism, experiments: Sequence[Experiment] = ()) -> list[str]:
     """Return the verdict in words, one sentence each, the answer first; what to do next is the first experiment."""
     verdict = found.verdict
-    said = [not_logged(found) or doubtful(found) or _first(found), *what_to_log(found), *coarse_steps(found)]
+    family = [] if found.family is None else [found.family.sentence]
+    first = not_logged(found) or doubtful(found) or _first(found)
+    said = [first, *family, *what_to_log(found), *coarse_steps(found)]
     if verdict.remainder is not None and verdict.groups:
         said.append(_remainder(verdict))
     if verdict.form == "unexplained" and verdict.confounded:

@@ -12,6 +12,7 @@ from labctl.json_types.joint import JointJson
 from labctl.json_types.models import (
     AxisCoefficients,
     AxisNoiseJson,
+    Coefficient,
     FitEnvironment,
     HeldJson,
     LeftOut,
@@ -163,6 +164,11 @@ class FittedResponse(ResponseModel):
         description="Which thermometer was used; whether the Earth's rate was subtracted.",
     )
     reference_temperature_c: float | None = Field(default=None, description="Zero point of temperature terms, deg C.")
+    shapes: dict[str, dict[str, Coefficient]] = Field(
+        default_factory=dict,
+        description="For each effect that remembers temperatures: its time constants, s, and widths, K, with standard "
+        "uncertainty u (null where the data do not determine it); `tau_x_s` is that of axis x, `tau_s` that of all.",
+    )
     recording: int | None = Field(default=None, description="The recording that the model was fitted to.")
     poses: PosesJson | None = Field(
         default=None,
@@ -233,6 +239,16 @@ class Follower(ResponseModel):
     kind: Literal["lag", "play"]
     parameter: float = Field(description="Time constant of a thermal lag, s, or width of a hysteresis (play), K.")
     unit: Literal["s", "K"]
+    cooling_s: float | None = Field(
+        default=None, description="Of a lag: time constant while the element is warmer than the thermometer, s; null: "
+        "the same.",
+    )  # fmt: skip
+    is_curved: bool = Field(
+        default=False,
+        description="Whether the error follows the difference of the squares of the temperatures about reference_c; "
+        "the sizes are then in (deg/s)/K2.",
+    )
+    reference_c: float | None = Field(default=None, description="Only for a curved lag, deg C.")
     size: dict[str, float] = Field(
         description="For each axis: error per K of temperature lag, (deg/s)/K, or error at an edge of the "
         "hysteresis, deg/s."

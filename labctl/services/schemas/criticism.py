@@ -19,6 +19,7 @@ from labctl.json_types.criticism import (
     ResidualMap,
     SlowProcess,
     Suspect,
+    ThermalFamilyJson,
     WorstDataSet,
 )
 from labctl.json_types.joint import JointJson
@@ -108,6 +109,9 @@ class CriticismResponse(ResponseModel):
     )
     remainder: Remainder | None = Field(
         default=None, description="Share (0 to 1) of the residual above the noise floor that no named effect explains."
+    )
+    thermal_response: ThermalFamilyJson | None = Field(
+        default=None, description="At rest, over several legs: the thermal response that predicts the legs left out."
     )
     not_physical: list[str] = Field(
         default_factory=list,

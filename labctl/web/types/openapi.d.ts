@@ -4257,6 +4257,8 @@ export interface components {
             confounded_with: string[];
             /** @description Share (0 to 1) of the residual above the noise floor that no named effect explains. */
             remainder: components["schemas"]["Remainder"] | null;
+            /** @description At rest, over several legs: the thermal response that predicts the legs left out. */
+            thermal_response: components["schemas"]["ThermalFamilyJson"] | null;
             /**
              * Not Physical
              * @description Effects that explain these data equally well, but at a size that the unit cannot have.
@@ -5241,6 +5243,15 @@ export interface components {
              */
             reference_temperature_c: number | null;
             /**
+             * Shapes
+             * @description For each effect that remembers temperatures: its time constants, s, and widths, K, with standard uncertainty u (null where the data do not determine it); `tau_x_s` is that of axis x, `tau_s` that of all.
+             */
+            shapes: {
+                [key: string]: {
+                    [key: string]: components["schemas"]["Coefficient"];
+                };
+            };
+            /**
              * Recording
              * @description The recording that the model was fitted to.
              */
@@ -5372,6 +5383,22 @@ export interface components {
              * @enum {string}
              */
             unit: "s" | "K";
+            /**
+             * Cooling S
+             * @description Of a lag: time constant while the element is warmer than the thermometer, s; null: the same.
+             */
+            cooling_s: number | null;
+            /**
+             * Is Curved
+             * @description Whether the error follows the difference of the squares of the temperatures about reference_c; the sizes are then in (deg/s)/K2.
+             * @default false
+             */
+            is_curved: boolean;
+            /**
+             * Reference C
+             * @description Only for a curved lag, deg C.
+             */
+            reference_c: number | null;
             /**
              * Size
              * @description For each axis: error per K of temperature lag, (deg/s)/K, or error at an edge of the hysteresis, deg/s.
@@ -5656,6 +5683,15 @@ export interface components {
              */
             reference_temperature_c: number | null;
             /**
+             * Shapes
+             * @description For each effect that remembers temperatures: its time constants, s, and widths, K, with standard uncertainty u (null where the data do not determine it); `tau_x_s` is that of axis x, `tau_s` that of all.
+             */
+            shapes: {
+                [key: string]: {
+                    [key: string]: components["schemas"]["Coefficient"];
+                };
+            };
+            /**
              * Recording
              * @description The recording that the model was fitted to.
              */
@@ -5734,6 +5770,15 @@ export interface components {
              * @description Zero point of temperature terms, deg C.
              */
             reference_temperature_c: number | null;
+            /**
+             * Shapes
+             * @description For each effect that remembers temperatures: its time constants, s, and widths, K, with standard uncertainty u (null where the data do not determine it); `tau_x_s` is that of axis x, `tau_s` that of all.
+             */
+            shapes: {
+                [key: string]: {
+                    [key: string]: components["schemas"]["Coefficient"];
+                };
+            };
             /**
              * Recording
              * @description The recording that the model was fitted to.
@@ -7026,6 +7071,15 @@ export interface components {
              * @description Zero point of temperature terms, deg C.
              */
             reference_temperature_c: number | null;
+            /**
+             * Shapes
+             * @description For each effect that remembers temperatures: its time constants, s, and widths, K, with standard uncertainty u (null where the data do not determine it); `tau_x_s` is that of axis x, `tau_s` that of all.
+             */
+            shapes: {
+                [key: string]: {
+                    [key: string]: components["schemas"]["Coefficient"];
+                };
+            };
             /**
              * Recording
              * @description The recording that the model was fitted to.
@@ -8677,6 +8731,27 @@ export interface components {
             steady?: boolean;
         };
         /**
+         * ThermalFamilyJson
+         * @description A thermal response that predicts stretches of the temperature course that it has not seen.
+         *
+         *     `time_constants` by name (`tau_x_s` of axis x, `tau_s` of all), `alike`: other effects that predict as well alone;
+         *     errors of the stretches left out without and with it, deg/s.
+         */
+        ThermalFamilyJson: {
+            /** Structure */
+            structure: string;
+            /** Time Constants */
+            time_constants: {
+                [key: string]: components["schemas"]["Coefficient"];
+            };
+            /** Alike */
+            alike: string[];
+            /** Before Rms Dps */
+            before_rms_dps: number;
+            /** After Rms Dps */
+            after_rms_dps: number;
+        };
+        /**
          * TimeLine
          * @description The same against time, or against the order of the data sets where no time is known, with where power came.
          *
@@ -9269,6 +9344,15 @@ export interface components {
              * @description Zero point of temperature terms, deg C.
              */
             reference_temperature_c: number | null;
+            /**
+             * Shapes
+             * @description For each effect that remembers temperatures: its time constants, s, and widths, K, with standard uncertainty u (null where the data do not determine it); `tau_x_s` is that of axis x, `tau_s` that of all.
+             */
+            shapes: {
+                [key: string]: {
+                    [key: string]: components["schemas"]["Coefficient"];
+                };
+            };
             /**
              * Recording
              * @description The recording that the model was fitted to.

@@ -6,24 +6,23 @@ lag, hysteresis) is computed once over the whole run and interpolated at the tim
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_banded
 from scipy.special import roots_genlaguerre
 
 from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.numeric.following import Steps, lag_shares
 from labctl.recording import Recording
 from labctl.recording.columns import WITHIN_S
 
 #: Logged columns by name, (n,) each.
 LoggedColumns = Mapping[str, NDArray[np.generic]]
-#: What an effect asks of a temperature course (k,) with one parameter, (k,).
-CourseFunction = Callable[[Array, float], Array]
+#: What an effect asks of a temperature course (k,) with parameters, (k,).
+CourseFunction = Callable[..., Array]
 #: Spacing of a resampled temperature course, s.
 SPACING_S = 10.0
 #: Windows whose middles are no further apart than this many of their lengths follow one another.
@@ -60,7 +59,7 @@ class TemperatureHistory:
     thermometer: bool = True  #: whether anything says how warm the unit was
     middle_s: float = 0.0  #: middle of the times within a recording, s: a clock may count from 1970
     #: What was computed of the courses, by function and its parameter: every axis asks for the same.
-    _known: dict[tuple[CourseFunction, float], dict[int, Array]] = field(default_factory=dict, repr=False)
+    _known: dict[tuple[CourseFunction, tuple[float, ...]], dict[int, Array]] = field(default_factory=dict, repr=False)
 
     def numbers(self, name: str) -> tuple[int, ...]:
         """Return the numbers of the runs ("run") or mountings ("mounting") of the recording, rising."""
@@ -70,9 +69,26 @@ class TemperatureHistory:
         """Return the rate of change of the temperature, (n,) K/min: slope of a line over `over_s` seconds."""
         return self._evaluate(columns, _slope, over_s)
 
-    def lag_k(self, columns: LoggedColumns, tau_s: float) -> Array:
-        """Return by how much a first-order follower with time constant `tau_s` lags the thermometer, (n,) K."""
-        return self._evaluate(columns, _lag, tau_s)
+    def lag_k(self, columns: LoggedColumns, tau_s: float, cooling_tau_s: float | None = None) -> Array:
+        """Return by how much a first-order follower with time constant `tau_s` lags the thermometer, (n,) K.
+
+        Where another one is given for cooling, it holds while the follower is the warmer of the two.
+        """
+        if cooling_tau_s is None or cooling_tau_s == tau_s:
+            return self._evaluate(columns, _lag, tau_s)
+        return self._evaluate(columns, _lag_two_ways, tau_s, cooling_tau_s)
+
+    def lags_two_ways_k(self, columns: LoggedColumns, taus_s: Array, cooling_taus_s: Array) -> NDArray[np.float64]:
+        """Return the same for many pairs of time constants (p,) at once, (n, p) K."""
+        t_s = np.asarray(columns["t_s"], dtype=np.float64)
+        run = np.asarray(columns["run"]) if "run" in columns else np.ones(len(t_s), dtype=np.int64)
+        found = np.zeros((len(t_s), len(taus_s)))
+        for number, course in self.courses.items():
+            here = run == number
+            if here.any():
+                lags = _lags_two_ways(course.temperature_c, taus_s, cooling_taus_s)
+                found[here] = np.column_stack([course.at(lag, t_s[here]) for lag in lags.T])
+        return found
 
     def hysteresis_state(self, columns: LoggedColumns, width_k: float, *, rounded: bool = False) -> Array:
         """Return the state of a play hysteresis of width `width_k`, (n,), 1: approached from below, -1: from above.
@@ -86,32 +102,21 @@ class TemperatureHistory:
             found += share * self._evaluate(columns, _play, width)
         return found
 
-    def _evaluate(self, columns: LoggedColumns, function: CourseFunction, parameter: float) -> Array:
+    def _evaluate(self, columns: LoggedColumns, function: CourseFunction, *parameters: float) -> Array:
         """Return a function of each run's temperature course, (k,) to (k,), at the times of the rows, (n,)."""
         if not self.courses:
             return np.zeros(len(next(iter(columns.values()), ())))
         t_s = np.asarray(columns["t_s"], dtype=np.float64)
         run = np.asarray(columns["run"]) if "run" in columns else np.ones(len(t_s), dtype=np.int64)
-        known = self._known.setdefault((function, parameter), {})
+        known = self._known.setdefault((function, parameters), {})
         found = np.zeros(len(t_s))
         for number, course in self.courses.items():
             here = run == number
             if here.any():
                 if number not in known:
-                    known[number] = function(course.temperature_c, parameter)
+                    known[number] = function(course.temperature_c, *parameters)
                 found[here] = course.at(known[number], t_s[here])
         return found
-
-
-def lag_shares(step_s: float, tau_s: float) -> tuple[float, float, float]:
-    """Return the weights of follower, last and new temperature in the value of a first-order follower after a step.
-
-    Exact for a temperature that changes linearly through the step, however long it is.
-    """
-    ratio = step_s / tau_s
-    keep = math.exp(-ratio)
-    mean = -math.expm1(-ratio) / ratio if ratio > 0 else 1.0
-    return keep, mean - keep, 1.0 - mean
 
 
 def rounded_plays(width_k: float) -> list[tuple[float, float]]:
@@ -138,12 +143,31 @@ def _slope(temperature_c: Array, over_s: float) -> Array:
 
 def _lag(temperature_c: Array, tau_s: float) -> Array:
     """Return follower minus temperature, (k,) K, in equilibrium at the start; straight lines between temperatures."""
-    keep, last, new = lag_shares(SPACING_S, tau_s)
-    band = np.array([np.ones(len(temperature_c)), np.full(len(temperature_c), -keep)])
-    pull = new * temperature_c
-    pull[1:] += last * temperature_c[:-1]
-    pull[0] = temperature_c[0]
-    return np.asarray(solve_banded((1, 0), band, pull) - temperature_c)
+    return Steps.even(temperature_c, SPACING_S).lagged(tau_s, float(temperature_c[0])) - temperature_c
+
+
+def _lag_two_ways(temperature_c: Array, warming_s: float, cooling_s: float) -> Array:
+    """Return the same of a follower with one time constant while it is the colder one, and another, (k,) K."""
+    steps = Steps.even(temperature_c, SPACING_S)
+    return steps.lagged_two_ways(warming_s, cooling_s, float(temperature_c[0])) - temperature_c
+
+
+def _lags_two_ways(temperature_c: Array, warming_s: Array, cooling_s: Array) -> NDArray[np.float64]:
+    """Return followers minus temperature for pairs of time constants (p,), (k, p) K.
+
+    The time constant of a step is chosen by the temperature at its end and the follower at its start.
+    """
+    shares = np.array([[lag_shares(SPACING_S, float(tau)) for tau in taus] for taus in (warming_s, cooling_s)])
+    warming, cooling = shares.transpose(0, 2, 1)
+    found = np.empty((len(temperature_c), len(warming_s)))
+    at = np.full(len(warming_s), temperature_c[0])
+    found[0] = 0.0
+    for k in range(1, len(temperature_c)):
+        now = temperature_c[k]
+        keep, last, new = np.where(now >= at, warming, cooling)
+        at = keep * at + last * temperature_c[k - 1] + new * now
+        found[k] = at - now
+    return found
 
 
 def _play(temperature_c: Array, width_k: float) -> Array:

@@ -100,18 +100,21 @@ function remembered({ remembers, axes }) {
       [
         {
           title: "Element",
-          cell: (row) => (row.kind === "lag" ? "lag behind the temperature" : "hysteresis (play)"),
+          cell: (row) =>
+            row.kind === "play" ? "hysteresis (play)" : `${row.is_curved ? "curved " : ""}lag behind the temperature`,
         },
         {
           title: "Time constant or width",
           number: true,
-          cell: (row) => `${number(row.parameter)} ${row.unit}`,
+          cell: (row) =>
+            `${number(row.parameter)} ${row.unit}${row.cooling_s ? `, cooling ${number(row.cooling_s)} s` : ""}`,
         },
         ...Object.keys(axes).map((axis) => ({
           title: `Axis ${axis}`,
           number: true,
           /** @param {(typeof remembers)[number]} row */
-          cell: (row) => `${number(row.size[axis])} ${row.kind === "lag" ? "deg/s/K" : "deg/s"}`,
+          cell: (row) =>
+            `${number(row.size[axis])} ${row.kind === "play" ? "deg/s" : row.is_curved ? "deg/s/K2" : "deg/s/K"}`,
         })),
       ],
       remembers,
