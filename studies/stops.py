@@ -18,6 +18,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -38,6 +39,8 @@ CRITICISMS = os.environ.get("LABCTL_STUDY_CRITICISMS", "0") == "1"
 SEED = int(os.environ.get("LABCTL_STUDY_SEED", "29"))
 #: The table is stopped within this, or the one who asked reads NOT STOPPED within `SAID_S`, s.
 TOLD_S, SAID_S = (2.0, 5.0) if BUSY == 0 else (5.0, 5.0)
+#: A page that has no answer to its stop says NOT STOPPED after this, s (`pages/stop.js`; `page_stops` has a browser).
+PAGE_SAYS_S = 3.0
 #: How long the load runs before the first fault, s: the clients of `criticisms_of` have then asked.
 LOADED_S = 3.0 if BUSY or CRITICISMS else 0.0
 #: How long the table is watched after the stop, while what died is started again, s.
@@ -153,11 +156,20 @@ def _ask_by_signal(service: Service, _campaign: int) -> bool:
 
 
 def _ask_page(service: Service, campaign: int) -> bool:
-    try:
-        answer = httpx.post(f"{service.url}/api/campaigns/{campaign}/abort", json={"reason": "study"}, timeout=4.5)
-    except httpx.HTTPError:
-        return True
-    return NOT_STOPPED in answer.text
+    """Ask as a page does, which says NOT STOPPED where a request fails, and while one is not answered in time."""
+    answered = threading.Event()
+    texts: list[str] = []
+
+    def post() -> None:
+        try:
+            answer = httpx.post(f"{service.url}/api/campaigns/{campaign}/abort", json={"reason": "study"}, timeout=4.5)
+            texts.append(answer.text)
+        except httpx.HTTPError:
+            texts.append(NOT_STOPPED)
+        answered.set()
+
+    threading.Thread(target=post, daemon=True).start()
+    return not answered.wait(PAGE_SAYS_S) or NOT_STOPPED in texts[0]
 
 
 def _ask_command(service: Service, _campaign: int) -> bool:
