@@ -39,7 +39,7 @@ CRITICISMS = os.environ.get("LABCTL_STUDY_CRITICISMS", "0") == "1"
 SEED = int(os.environ.get("LABCTL_STUDY_SEED", "29"))
 #: The table is stopped within this, or the one who asked reads NOT STOPPED within `SAID_S`, s.
 TOLD_S, SAID_S = (2.0, 5.0) if BUSY == 0 else (5.0, 5.0)
-#: A page that has no answer to its stop says NOT STOPPED after this, s (`core/stop/state.js`; `page_stops` has a browser).
+#: A page that has no answer to its stop says NOT STOPPED after this, s (`core/stop/state.js`).
 PAGE_SAYS_S = 3.0
 #: How long the load runs before the first fault, s: the clients of `criticisms_of` have then asked.
 LOADED_S = 3.0 if BUSY or CRITICISMS else 0.0
