@@ -113,19 +113,19 @@ class Steps:
 
 
 def _from(values: Array | float, begin: int) -> Array | float:
-    return values if isinstance(values, float) else values[begin:]
+    return values[begin:] if isinstance(values, np.ndarray) else values
 
 
 def _followed(keep: Array | float, pull: Array, at_c: float) -> Array:
     """Return x with x_k = keep_k x_(k-1) + pull_k, (n,), from `at_c`; writes over `pull`."""
     band = np.empty((2, len(pull)), order="F")
     band[0] = 1.0
-    if isinstance(keep, float):
-        band[1] = -keep
-        pull[0] += keep * at_c
-    else:
+    if isinstance(keep, np.ndarray):
         band[1, :-1] = -keep[1:]
         pull[0] += keep[0] * at_c
+    else:
+        band[1] = -keep
+        pull[0] += keep * at_c
     found, _ = dtbtrs(band, pull[:, None], uplo="L", diag="U", overwrite_b=True)
     return np.asarray(found[:, 0])
 

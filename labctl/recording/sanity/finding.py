@@ -37,7 +37,7 @@ class Finding:
             "unit": self.unit, "expected": self.expected, "do": self.do, "text": self.text, "part": self.part,
         }  # fmt: skip
         if self.n is not None:
-            found |= {"channel": self.channel, "n": self.n, "may_leave_out": self.may_leave_out}
+            found["channel"], found["n"], found["may_leave_out"] = self.channel, self.n, self.may_leave_out
         return found
 
 

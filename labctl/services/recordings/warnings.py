@@ -22,11 +22,4 @@ def finding_of(warning: DataWarning) -> Finding:
 
 def as_json(warning: DataWarning) -> FindingJson:
     """Return a warning as it is kept with a version."""
-    found: FindingJson = {
-        "what": warning.what, "severity": warning.severity, "where": warning.where, "said": warning.said,
-        "value": warning.value, "unit": warning.unit, "expected": warning.expected, "do": warning.do,
-        "text": warning.text, "part": warning.part,
-    }  # fmt: skip
-    if warning.n is not None:
-        found |= {"channel": warning.channel, "n": warning.n, "may_leave_out": warning.may_leave_out}
-    return found
+    return finding_of(warning).to_json()
