@@ -39,9 +39,7 @@ class ReadingBuffer:
                 raise BadInput(f"{serial}: the stream has no {', '.join(absent)}; poses need rates and specific forces")
             self._columns = {name: np.zeros(FIRST, dtype=_type(name)) for name in given}
         if set(given) != set(self._columns) or any(len(values) != n for values in given.values()):
-            raise BadInput(
-                f"{serial}: a block of readings has other columns than those before it, or of unequal length"
-            )
+            raise BadInput(f"{serial}: a block has other columns than those before it, or of unequal length")
         if n == 0:
             return
         times = np.asarray(given["t_s"], dtype=np.float64)

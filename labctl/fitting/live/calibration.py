@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.errors import BadInput, NotEnoughData
+from labctl.errors import BadInput, LabctlError, NotEnoughData
 from labctl.fitting.estimation.fit import fit
 from labctl.fitting.estimation.result import FitResult
 from labctl.fitting.live.buffer import ReadingBuffer
@@ -29,6 +29,8 @@ from labctl.recording import Recording, RecordingInfo
 
 #: Poses that are named in one message.
 MOST_NAMED = 6
+#: Between these sizes lies the specific force at rest, by an accelerometer before its calibration, g.
+LEAST_G, MOST_G = 0.7, 1.4
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,10 @@ class LiveCalibration:
         Raises BadInput for a column that is missing, and for times that do not rise.
         """
         self._buffer.add(columns)
+        self.add_unread(lost=lost, damaged=damaged)
+
+    def add_unread(self, *, lost: int = 0, damaged: int = 0) -> None:
+        """Count readings that are missing, and lines or frames that could not be read."""
         self._lost, self._damaged = self._lost + lost, self._damaged + damaged
 
     def __len__(self) -> int:
@@ -97,15 +103,21 @@ class LiveCalibration:
         goes_on = since_s <= cut_s + GAP * readings.spacing_s
         long = rests.duration_s + 2 * cut_s >= self.target.rest_s
         still_s = float(rests.duration_s[-1]) + cut_s + since_s if goes_on else 0.0
-        return _Rests(unit(rests.accel_g[long]), len(rests), still_s)
+        size = np.linalg.norm(rests.accel_g, axis=1)
+        if len(size) and not LEAST_G <= np.median(size) <= MOST_G:
+            raise NotEnoughData(
+                f"the specific force at rest is {np.median(size):.3g} g where gravity is 1 g: check unit and scale of "
+                "the accelerometer"
+            )
+        return _Rests(unit(rests.accel_g[long & (size > LEAST_G)]), len(rests), still_s)
 
     def _fit(self, recording: Recording) -> tuple[FitResult | None, str]:
         try:
             return fit(recording, POSES), ""
-        except NotEnoughData as error:
+        except (LabctlError, ArithmeticError, ValueError) as error:  # the latter two: of matrices that have no inverse
             return None, self._plain(error)
 
-    def _plain(self, error: NotEnoughData) -> str:
+    def _plain(self, error: Exception) -> str:
         return str(error).removeprefix(f"{self.info.serial}: ")
 
     def _state(self, recording: Recording, found: _Rests, why: str) -> LiveState:
@@ -114,9 +126,9 @@ class LiveCalibration:
         coefficients = () if result is None else tuple(coefficients_of(result, target))
         turns = 0 if result is None or result.poses is None else result.poses["moves"]["used"]
         absent = [each.name for each, has in zip(DIRECTIONS[: target.poses], covers, strict=False) if not has]
-        missing = [text for text in (_poses_text(absent, target), why or refused) if text]
+        missing = [text for text in (_poses_text(absent, target), why or (refused if len(found.up) else "")) if text]
         missing += [
-            f"U of {each.name} of {each.axis} is {each.expanded:.2g} {each.unit}, above its limit of {each.limit:g}"
+            f"U of {each.name} of {each.axis} is {each.expanded:.2g}, above its limit of {each.limit:g} ({each.unit})"
             for each in coefficients
             if not each.is_met
         ]
@@ -130,7 +142,7 @@ class LiveCalibration:
             float(np.asarray(t_s, dtype=np.float64)[-1]) if len(t_s) else 0.0, len(recording), self._lost,
             self._damaged, found.still_s, found.count,
             tuple(each.name for each, has in zip(DIRECTIONS[: target.poses], covers, strict=False) if has),
-            target.poses, coefficients, tuple(missing), request if missing else None,
+            target.poses, coefficients, tuple(missing), request,
             turns_left(coefficients, turns), result,
         )  # fmt: skip
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -41,7 +43,7 @@ def needs_of_turns(up: NDArray[np.float64]) -> Array:
     An axis about which the unit has not turned yet comes first.
     """
     turned = np.zeros(3)
-    for before, after in zip(up[:-1], up[1:], strict=True):
+    for before, after in pairwise(up):
         axis, angle_deg = turn_between(before, after)
         turned += axis**2 * angle_deg
     return np.asarray(1.0 / (turned + 90.0))
