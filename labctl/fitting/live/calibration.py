@@ -134,9 +134,8 @@ class LiveCalibration:
         ]
         needs = needs_of_fit(coefficients) if coefficients else needs_of_turns(found.up)
         here: Array | None = found.up[-1] if len(found.up) else None
-        request = PoseRequest(
-            next_pose(covers, target.poses, here, needs), target.rest_s, missing[0] if missing else ""
-        )
+        pose = next_pose(covers, target.poses, here, needs)
+        request = PoseRequest(pose, target.rest_s) if missing else None
         t_s = recording.columns["t_s"]
         return LiveState(
             float(np.asarray(t_s, dtype=np.float64)[-1]) if len(t_s) else 0.0, len(recording), self._lost,

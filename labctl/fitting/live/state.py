@@ -24,7 +24,6 @@ class PoseRequest:
 
     pose: Direction
     rest_s: float
-    why: str
 
     @property
     def text(self) -> str:

@@ -66,7 +66,7 @@ class GyroSource:
             raise BadInput(
                 f"{self.name}: driver {self._settings.driver} gives no {', '.join(absent)}; a live calibration "
                 "compares the turns of all three axes with gravity, so the stream needs gyros and accelerometers about "
-                "x, y and z. A unit without accelerometers is turned by known angles instead: labctl campaign start by-hand"
+                "x, y and z. Turn a unit without accelerometers by known angles: labctl campaign start by-hand"
             )
 
     def read(self, duration_s: float) -> Block:
