@@ -10,7 +10,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.fitting.live import LiveState
+from labctl.fitting.live import PoseRequest
 
 Array = NDArray[np.float64]
 TURN_S, RATE_HZ = 2.0, 100.0
@@ -32,9 +32,9 @@ class TurnedUnit:
         self._rests_since_s = 0.0
         self._asked: Array | None = None
 
-    def see(self, state: LiveState) -> None:
+    def see(self, request: PoseRequest | None) -> None:
         """Read what is asked for; a hand does not meet it exactly."""
-        self._asked = None if state.request is None else np.array(state.request.pose.up)
+        self._asked = None if request is None else np.array(request.pose.up)
 
     def block(self, duration_s: float) -> dict[str, NDArray[np.generic]]:
         """Return the readings of the next seconds."""

@@ -12,7 +12,6 @@ from labctl.cli.options import BenchName, Database, Json
 from labctl.cli.output import print_json
 
 if TYPE_CHECKING:
-    from instruments.clock import Clock
     from labctl.services.live.source import LiveSource
 
 Unit = Annotated[
@@ -46,6 +45,14 @@ LineColumns = Annotated[
 ]
 Rate = Annotated[
     float | None, typer.Option("--rate", metavar="HZ", help="Readings per second, for lines without a time.")
+]
+Speed = Annotated[
+    float | None,
+    typer.Option(
+        "--speed",
+        metavar="X",
+        help="Speed of a simulated bench, as a multiple of real time; default: as fast as the computer can.",
+    ),
 ]
 Latitude = Annotated[
     float | None,
@@ -83,6 +90,7 @@ def live(
     columns: LineColumns = None,
     rate_hz: Rate = None,
     latitude_deg: Latitude = None,
+    speed: Speed = None,
     target_u: LargestU = 1e-3,
     target_bias_dps: LargestBiasU = None,
     poses: Poses = 18,
@@ -95,24 +103,25 @@ def live(
 
     The readings become a recording, also when you end it with Ctrl-C; a version is fitted when the target is reached.
     """
-    from instruments.clock import SystemClock
     from labctl.cli.interrupts import ending_is_an_interrupt
     from labctl.cli.printing.live import LivePrinter, print_live
     from labctl.fitting.live import Target
-    from labctl.services.live.assessor import BackgroundAssessor
+    from labctl.services.live.assessor import BackgroundAssessor, InlineAssessor
     from labctl.services.live.calibrate import calibrate_live, usual_folder
 
     printer = LivePrinter()
     with one_clear_line():
-        target, clock = Target(target_u, target_bias_dps, poses, rest_s), SystemClock()
+        target = Target(target_u, target_bias_dps, poses, rest_s)
         if lines is not None:
-            source = _line_source(serial, lines, columns, rate_hz, latitude_deg, clock)
+            source = _line_source(serial, lines, columns, rate_hz, latitude_deg, speed)
         else:
-            source = _gyro_source(serial, bench, driver, port, option or [], latitude_deg, clock)
-        folder = out or usual_folder(database, source.serial, f"{clock.utc():%Y%m%dT%H%M%SZ}")
+            source = _gyro_source(serial, bench, driver, port, option or [], latitude_deg, speed)
+        # a simulated stream waits for an assessment; a real one goes on
+        assessor = InlineAssessor() if source.is_simulated else BackgroundAssessor()
+        folder = out or usual_folder(database, source.serial, f"{source.clock.utc():%Y%m%dT%H%M%SZ}")
         try:
             answer = calibrate_live(
-                database, source, target, BackgroundAssessor(), folder, keep_folder=out is not None,
+                database, source, target, assessor, folder, keep_folder=out is not None,
                 show=printer.show, say=printer.say, attended=ending_is_an_interrupt(),
             )  # fmt: skip
         finally:
@@ -126,16 +135,21 @@ def live(
 
 
 def _line_source(
-    serial: str | None, lines: str, columns: str | None, rate_hz: float | None, latitude_deg: float | None, clock: Clock
-) -> LiveSource:
+    serial: str | None, lines: str, columns: str | None, rate_hz: float | None, latitude_deg: float | None,
+    speed: float | None,
+) -> LiveSource:  # fmt: skip
+    from instruments.clock import SystemClock
     from labctl.errors import BadInput
     from labctl.recording import RecordingInfo
     from labctl.recording.line_stream import LineDecoder
     from labctl.services.live.line_feed import feed_of
     from labctl.services.live.line_source import LineSource
 
+    if speed is not None:
+        raise BadInput(f"--speed {speed:g}: lines arrive as they are sent; leave the option out")
     if serial is None:
         raise BadInput("the lines do not say which unit it is; give its serial number: labctl live SERIAL --lines ...")
+    clock = SystemClock()
     info = RecordingInfo(
         serial=serial, axes=("x", "y", "z"), kind="samples", motion="poses", started_at=clock.utc(),
         latitude_deg=latitude_deg, sample_rate_hz=rate_hz, notes="turned by hand, live",
@@ -146,9 +160,10 @@ def _line_source(
 
 def _gyro_source(
     serial: str | None, bench: str | None, driver: str | None, port: str | None, options: list[str],
-    latitude_deg: float | None, clock: Clock,
+    latitude_deg: float | None, speed: float | None,
 ) -> LiveSource:  # fmt: skip
     from labctl.errors import BadInput
+    from labctl.services.campaigns.preparation import clock_for
     from labctl.services.live.gyro_source import GyroSource, bench_of_driver
     from labctl.services.planning.loading import load_bench
 
@@ -157,7 +172,9 @@ def _gyro_source(
             "name the stream of the unit by one of --bench FILE, --driver NAME with --port, or --lines SOURCE"
         )
     if bench is not None:
-        return GyroSource(load_bench(bench), serial, clock)
+        loaded = load_bench(bench)
+        return GyroSource(loaded, serial, clock_for(loaded, speed))
     if serial is None or port is None or driver is None:
         raise BadInput("--driver needs the serial number of the unit and its --port: labctl live SERIAL --driver ...")
-    return GyroSource(bench_of_driver(driver, port, serial, options, latitude_deg), serial, clock)
+    made = bench_of_driver(driver, port, serial, options, latitude_deg)
+    return GyroSource(made, serial, clock_for(made, speed))

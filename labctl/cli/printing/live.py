@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from labctl.services.schemas.live import LiveResponse
 
 
+#: So long nothing is said of what the readings lack, s.
+BEGINNING_S = 5.0
+
+
 class LivePrinter:
     """Prints on standard error: a line after each rest, the next request, and on a terminal how long it rests."""
 
@@ -60,7 +64,7 @@ def _progress(state: LiveState) -> str:
         parts.append(
             f"largest U: {worst.name} of {worst.axis}, {_with_unit(worst.expanded, worst.unit)} (limit {worst.limit:g})"
         )
-    elif not state.covered:
+    elif not state.covered and state.t_s > BEGINNING_S:
         parts.append(state.missing[-1])
     if state.turns_left:
         parts.append(f"about {state.turns_left} more turns")

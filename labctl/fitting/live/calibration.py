@@ -16,12 +16,11 @@ from labctl.errors import BadInput, LabctlError, NotEnoughData
 from labctl.fitting.estimation.fit import fit
 from labctl.fitting.estimation.result import FitResult
 from labctl.fitting.live.buffer import ReadingBuffer
-from labctl.fitting.live.directions import DIRECTIONS, covered
+from labctl.fitting.live.directions import DIRECTIONS, Direction, covered
 from labctl.fitting.live.guidance import needs_of_turns, next_pose
-from labctl.fitting.live.state import LiveState, PoseRequest, coefficients_of, needs_of_fit, turns_left
+from labctl.fitting.live.state import LiveCoefficient, LiveState, PoseRequest, coefficients_of, needs_of_fit, turns_left
 from labctl.fitting.live.target import Target
 from labctl.fitting.models.presets import POSES
-from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.poses.at_rest.rests import LEAST_IN_WINDOW, MARGIN, WINDOW_S, find_rests
 from labctl.fitting.poses.readings import GAP, PoseReadings, readings_of
 from labctl.fitting.poses.triad import unit
@@ -62,6 +61,8 @@ class LiveCalibration:
             None,
             "",
         )  #: rests long enough, the fit, why there is none
+
+        self._asked: tuple[int, Direction | None] = (0, None)  #: long rests when the pose was chosen, and the pose
 
     def add(self, columns: Mapping[str, NDArray[np.generic]], *, lost: int = 0, damaged: int = 0) -> None:
         """Take in a block of readings: the columns of a recording, (n,) each, in order of time.
@@ -132,10 +133,7 @@ class LiveCalibration:
             for each in coefficients
             if not each.is_met
         ]
-        needs = needs_of_fit(coefficients) if coefficients else needs_of_turns(found.up)
-        here: Array | None = found.up[-1] if len(found.up) else None
-        pose = next_pose(covers, target.poses, here, needs)
-        request = PoseRequest(pose, target.rest_s) if missing else None
+        request = PoseRequest(self._pose(found.up, covers, coefficients), target.rest_s) if missing else None
         t_s = recording.columns["t_s"]
         return LiveState(
             float(np.asarray(t_s, dtype=np.float64)[-1]) if len(t_s) else 0.0, len(recording), self._lost,
@@ -144,6 +142,17 @@ class LiveCalibration:
             target.poses, coefficients, tuple(missing), request,
             turns_left(coefficients, turns), result,
         )  # fmt: skip
+
+    def _pose(
+        self, up: NDArray[np.float64], covers: tuple[bool, ...], coefficients: tuple[LiveCoefficient, ...]
+    ) -> Direction:
+        """Return the pose to ask for: another one only after another rest that is long enough."""
+        rests, pose = self._asked
+        if pose is None or rests != len(up):
+            needs = needs_of_fit(coefficients) if coefficients else needs_of_turns(up)
+            pose = next_pose(covers, self.target.poses, up[-1] if len(up) else None, needs)
+            self._asked = (len(up), pose)
+        return pose
 
 
 def _poses_text(absent: list[str], target: Target) -> str:

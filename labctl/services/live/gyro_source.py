@@ -12,7 +12,9 @@ from instruments.bench import open_bench
 from instruments.bench_config import BenchFile
 from instruments.clock import Clock
 from instruments.interfaces.gyro import Readings
+from instruments.simulation import lay_simulated
 from labctl.errors import BadInput
+from labctl.fitting.live import PoseRequest
 from labctl.recording import RecordingInfo
 from labctl.recording.columns import BY_NAME
 from labctl.services.benches.standards import standards_of
@@ -37,7 +39,8 @@ class GyroSource:
         self._bench_file = bench.model_copy(update={"table": None, "chamber": None, "gyros": (self._settings,)})
         self._bench = open_bench(self._bench_file.model_copy(update={"references": ()}), clock)
         self._gyro = self._bench.gyros[self._settings.name]
-        self._clock = clock
+        self.clock = clock
+        self.is_simulated = bench.is_simulated
         self._first_s: float | None = None
         self.serial = self._settings.serial
         self.name = f"{self._settings.name} on {self._settings.port or self._settings.host}"
@@ -53,7 +56,7 @@ class GyroSource:
         conventions = {k: v for k, v in settings.datasheet_conventions.items() if k in identity.datasheet}
         return RecordingInfo.model_validate({
             "serial": identity.serial, "model": identity.model, "axes": gyro.axes, "kind": "samples",
-            "motion": "poses", "started_at": self._clock.utc(), "latitude_deg": self._bench_file.latitude_deg,
+            "motion": "poses", "started_at": self.clock.utc(), "latitude_deg": self._bench_file.latitude_deg,
             "sample_rate_hz": gyro.sample_rate_hz, "max_rate_dps": gyro.limits.max_rate_dps,
             "technology": identity.technology or None, "datasheet": dict(identity.datasheet),
             "datasheet_conventions": conventions,
@@ -84,6 +87,11 @@ class GyroSource:
             if channel.name in BY_NAME:
                 found[channel.name] = channel.value(readings.raw[channel.name])
         return found | {"valid": readings.valid.astype(np.int64)}
+
+    def ask(self, request: PoseRequest | None) -> None:
+        """Have the simulated person of a simulated bench do it; at a real one a person reads it."""
+        if self._bench.simulation is not None and request is not None:
+            lay_simulated(self._bench.simulation, self.clock, request.pose.up)
 
     def stop(self) -> None:
         """Close the ports."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from instruments.clock import Clock
 from labctl.errors import BadInput
+from labctl.fitting.live import PoseRequest
 from labctl.recording import RecordingInfo
 from labctl.recording.line_stream import LineDecoder
 from labctl.services.live.line_feed import LineFeed
@@ -16,16 +17,18 @@ SILENCE_S, FIRST_WITHIN_S = 10.0, 60.0
 class LineSource:
     """Lines of a feed, decoded. `info` is what is known of the unit; its time of start is filled in."""
 
+    is_simulated = False
+
     def __init__(self, feed: LineFeed, decoder: LineDecoder, info: RecordingInfo, clock: Clock) -> None:
-        self._feed, self._decoder, self._info, self._clock = feed, decoder, info, clock
+        self._feed, self._decoder, self._info, self.clock = feed, decoder, info, clock
         self.name, self.serial = feed.name, info.serial
         self._last_s, self._begun = 0.0, False
 
     def start(self) -> RecordingInfo:
         """Open the feed; raises BadInput."""
         self._feed.open()
-        self._last_s = self._clock.now_s()
-        return self._info.model_copy(update={"started_at": self._clock.utc()})
+        self._last_s = self.clock.now_s()
+        return self._info.model_copy(update={"started_at": self.clock.utc()})
 
     def read(self, duration_s: float) -> Block:
         """Return the readings of the lines that arrive in `duration_s`.
@@ -33,7 +36,7 @@ class LineSource:
         Raises StreamEnded at the end, after SILENCE_S without a reading, and where the lines cannot be used any more;
         BadInput where the first cannot.
         """
-        self._clock.sleep(duration_s)
+        self.clock.sleep(duration_s)
         data = self._feed.take()
         if data is None:
             raise StreamEnded(f"{self.name} has ended")
@@ -43,7 +46,7 @@ class LineSource:
             if not self._begun:
                 raise
             raise StreamEnded(str(error)) from error
-        now_s = self._clock.now_s()
+        now_s = self.clock.now_s()
         if len(found):
             self._last_s, self._begun = now_s, True
         elif now_s - self._last_s > (SILENCE_S if self._begun else FIRST_WITHIN_S):
@@ -53,6 +56,9 @@ class LineSource:
     def _silence(self, silence_s: float, example: str) -> str:
         seen = f"; what arrived is no reading: {example}" if example else ""
         return f"{self.name} gave no reading for {silence_s:.0f} s{seen}; check the sender"
+
+    def ask(self, request: PoseRequest | None) -> None:
+        """Leave it to the person at the unit."""
 
     def stop(self) -> None:
         """Close the feed."""

@@ -76,6 +76,7 @@ def _run(
         if not len(calibration) or (state := assessor.state(calibration)) is None:
             continue
         show(state)
+        source.ask(state.request)
         # the state may be older than the readings: what counts is the fit to all of them, as they are stored
         if state.done and (last := assessor.last(calibration)).done:
             show(last)

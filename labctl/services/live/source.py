@@ -9,6 +9,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from instruments.clock import Clock
+from labctl.fitting.live import PoseRequest
 from labctl.recording import RecordingInfo
 
 
@@ -34,6 +36,8 @@ class LiveSource(Protocol):
 
     name: str  #: the stream as a message names it
     serial: str  #: of the unit
+    clock: Clock
+    is_simulated: bool
 
     def start(self) -> RecordingInfo:
         """Open the stream; returns the head of its recording. Raises LabctlError, InstrumentError."""
@@ -45,6 +49,10 @@ class LiveSource(Protocol):
         Raises StreamEnded when the stream has ended or gives no reading any more, BadInput where its lines cannot be
         used, and InstrumentError.
         """
+        ...
+
+    def ask(self, request: PoseRequest | None) -> None:
+        """Take what the person at the unit is asked for; only a simulated person reads it here."""
         ...
 
     def stop(self) -> None:

@@ -36,7 +36,7 @@ def run(seed: int, target: Target) -> Run:
         states.append(live.assess())
         if states[-1].done:
             break
-        unit.see(states[-1])
+        unit.see(states[-1].request)
     return Run(unit, live, states)
 
 

@@ -14,7 +14,7 @@ import pytest
 from instruments.clock import VirtualClock
 from instruments.errors import LinkError
 from labctl.errors import BadInput, StoreError
-from labctl.fitting.live import LiveState, Target
+from labctl.fitting.live import PoseRequest, Target
 from labctl.recording import RecordingInfo, read_recording
 from labctl.recording.line_stream import LineDecoder
 from labctl.services.live import calibrate
@@ -35,7 +35,8 @@ TARGET = Target(u=1.5e-3, poses=18)
 class TurnedSource:
     """A stream of a turned unit, which ends by an error after some blocks."""
 
-    name, serial = "simulated", INFO.serial
+    name, serial, is_simulated = "simulated", INFO.serial, True
+    clock = VirtualClock()
 
     def __init__(self, seed: int, ends_after: int = 1000, error: BaseException | None = None) -> None:
         self.unit = TurnedUnit(seed)
@@ -51,6 +52,9 @@ class TurnedSource:
         self._left -= 1
         return Block(self.unit.block(2 * duration_s))
 
+    def ask(self, request: PoseRequest | None) -> None:
+        self.unit.see(request)
+
     def stop(self) -> None:
         self.stopped = True
 
@@ -63,12 +67,8 @@ class Bench:
         self.said: list[str] = []
 
     def run(self, source: TurnedSource | LineSource, *, keep_folder: bool = False) -> LiveResponse:
-        def show(state: LiveState) -> None:
-            if isinstance(source, TurnedSource):
-                source.unit.see(state)
-
         return calibrate_live(
-            self.database, source, TARGET, InlineAssessor(), self.folder, keep_folder=keep_folder, show=show,
+            self.database, source, TARGET, InlineAssessor(), self.folder, keep_folder=keep_folder, show=lambda _: None,
             say=self.said.append, attended=nullcontext(),
         )  # fmt: skip
 
