@@ -10,8 +10,10 @@ import pytest
 
 from instruments.clock import VirtualClock
 from labctl.errors import BadInput
+from labctl.fitting.live import LiveCalibration, LiveState
 from labctl.services.live.gyro_source import GyroSource, bench_of_driver
 from labctl.services.live.line_feed import DescriptorFeed, TcpFeed, feed_of
+from labctl.services.planning.loading import load_bench
 
 
 def test_a_pipe_gives_what_has_arrived_and_its_end() -> None:
@@ -67,3 +69,48 @@ def test_a_simulated_gyro_by_driver_and_port() -> None:
     force = np.column_stack([block.columns[f"accel_{axis}_g"] for axis in "xyz"])
     assert np.linalg.norm(force, axis=1) == pytest.approx(np.ones(len(block)), abs=0.05)
     assert block.columns["valid"].all()
+
+
+@pytest.fixture(scope="module")
+def simulated() -> tuple[LiveCalibration, LiveState, np.ndarray]:
+    """Return a live calibration of the shipped bench through its driver, and what is true of its unit."""
+    clock = VirtualClock()
+    source = GyroSource(load_bench("poses-sim"), None, clock)
+    live = LiveCalibration(source.start())
+    while True:
+        block = source.read(0.5)
+        live.add(block.columns, lost=block.lost, damaged=block.damaged)
+        state = live.assess()
+        source.ask(state.request)
+        if state.done or clock.now_s() > 300:
+            break
+    simulation = source._bench.simulation
+    assert simulation is not None
+    truth = simulation.world.gyro("imu").truth.k(25.0) - np.eye(3)
+    source.stop()
+    return live, state, truth
+
+
+def test_the_simulated_person_completes_it(simulated: tuple[LiveCalibration, LiveState, np.ndarray]) -> None:
+    live, state, _ = simulated
+    assert state.done
+    assert (state.lost, state.damaged) == (0, 0)
+    assert live.info.latitude_deg == 42.28
+    assert state.fit is not None
+    assert state.fit.poses is not None
+    assert state.fit.poses["moves"]["used"] >= state.fit.poses["moves"]["count"] - 1
+
+
+def test_the_truth_of_the_simulated_unit_is_inside_u(
+    simulated: tuple[LiveCalibration, LiveState, np.ndarray],
+) -> None:
+    _, state, truth = simulated
+    z = []
+    for each in state.coefficients:
+        if each.limit is not None:
+            i = "xyz".index(each.axis)
+            j = i if each.name == "scale_factor" else "xyz".index(each.name[-1])
+            z.append((each.value - truth[i, j]) / each.expanded)
+    assert len(z) == 9
+    assert np.max(np.abs(z)) < 1.5
+    assert np.mean(np.abs(z) <= 1) >= 7 / 9
