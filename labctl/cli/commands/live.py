@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from labctl.cli.error_reporting import one_clear_line
+from labctl.cli.interrupts import ending_is_an_interrupt
 from labctl.cli.options import BenchName, Database, Json
 from labctl.cli.output import print_json
 
@@ -103,7 +104,6 @@ def live(
 
     The readings become a recording, also when you end it with Ctrl-C; a version is fitted when the target is reached.
     """
-    from labctl.cli.interrupts import ending_is_an_interrupt
     from labctl.cli.printing.live import LivePrinter, print_live
     from labctl.fitting.live import Target
     from labctl.services.live.assessor import BackgroundAssessor, InlineAssessor
@@ -112,12 +112,12 @@ def live(
     printer = LivePrinter()
     with one_clear_line():
         target = Target(target_u, target_bias_dps, poses, rest_s)
-        if lines is not None:
-            source = _line_source(serial, lines, columns, rate_hz, latitude_deg, speed)
-        else:
-            source = _gyro_source(serial, bench, driver, port, option or [], latitude_deg, speed)
-        # a simulated stream waits for an assessment; a real one goes on
-        assessor = InlineAssessor() if source.is_simulated else BackgroundAssessor()
+        source = (
+            _gyro_source(serial, bench, driver, port, option or [], latitude_deg, speed)
+            if lines is None
+            else _line_source(serial, lines, columns, rate_hz, latitude_deg, speed)
+        )
+        assessor = InlineAssessor() if source.is_simulated else BackgroundAssessor()  # a real stream goes on meanwhile
         folder = out or usual_folder(database, source.serial, f"{source.clock.utc():%Y%m%dT%H%M%SZ}")
         try:
             answer = calibrate_live(
@@ -126,10 +126,7 @@ def live(
             )  # fmt: skip
         finally:
             printer.close()
-    if as_json:
-        print_json(answer)
-    else:
-        print_live(answer)
+    (print_json if as_json else print_live)(answer)
     if answer.fit is None:
         raise typer.Exit(1)
 

@@ -36,10 +36,12 @@ class ReadingBuffer:
         serial = self._info.serial
         if not self._columns:
             if absent := [name for name in needed(self._info) if name not in given]:
-                raise BadInput(f"{serial}: the stream has no {', '.join(absent)}; poses need rates and specific forces")
+                raise BadInput(
+                    f"{serial}: the stream has no {', '.join(absent)}; add rates and specific forces of all three axes"
+                )
             self._columns = {name: np.zeros(FIRST, dtype=_type(name)) for name in given}
         if set(given) != set(self._columns) or any(len(values) != n for values in given.values()):
-            raise BadInput(f"{serial}: a block has other columns than those before it, or of unequal length")
+            raise BadInput(f"{serial}: a block has other columns than those before it; send the same columns each time")
         if n == 0:
             return
         times = np.asarray(given["t_s"], dtype=np.float64)

@@ -50,7 +50,7 @@ class LiveCalibration:
     def __init__(self, info: RecordingInfo, target: Target | None = None) -> None:
         if info.motion != "poses" or info.kind != "samples":
             raise BadInput(
-                f"{info.serial}: a live calibration is by readings in poses, not {info.kind} of motion {info.motion!r}"
+                f"{info.serial}: a live calibration is by readings in poses; give kind = 'samples' and motion = 'poses'"
             )
         self.info = info
         self.target = target or Target()

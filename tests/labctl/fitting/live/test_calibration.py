@@ -136,7 +136,7 @@ def test_specific_force_in_another_unit_is_said(whole: Run) -> None:
 def test_readings_that_cannot_be_used_are_refused() -> None:
     unit, live = TurnedUnit(1), LiveCalibration(INFO)
     block = unit.block(0.1)
-    with pytest.raises(BadInput, match="HAND-1: the stream has no accel_z_g; poses need rates and specific forces"):
+    with pytest.raises(BadInput, match="HAND-1: the stream has no accel_z_g; add rates and specific forces"):
         live.add({name: values for name, values in block.items() if name != "accel_z_g"})
     live.add(block, lost=2)
     with pytest.raises(BadInput, match=r"HAND-1: t_s does not rise after 0\.09"):
@@ -145,7 +145,7 @@ def test_readings_that_cannot_be_used_are_refused() -> None:
         live.add({**unit.block(0.1), "supply_v": np.zeros(10)})
     live.add_unread(damaged=3)
     assert (len(live), live.assess().lost, live.assess().damaged) == (10, 2, 3)
-    with pytest.raises(BadInput, match="not samples of motion 'rates'"):
+    with pytest.raises(BadInput, match="give kind = 'samples' and motion = 'poses'"):
         LiveCalibration(INFO.model_copy(update={"motion": "rates"}))
 
 
