@@ -5,7 +5,7 @@ Simulators are imported inside the functions: a process that drives real instrum
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -57,6 +57,14 @@ def simulated_unit_handler(simulation: Simulation, clock: Clock) -> UnitHandler:
     from instruments.simulators.devices.unit_handler import SimulatedUnitHandler
 
     return SimulatedUnitHandler(simulation.world, clock)
+
+
+def lay_simulated(simulation: Simulation, clock: Clock, up: Sequence[float]) -> None:
+    """Have the person at a simulated bench turn its units until direction `up` (3,) of the body points up.
+
+    Returns at once; a person who is at it does nothing else.
+    """
+    simulation.world.lay(clock.now_s(), up)
 
 
 def serve_simulation(

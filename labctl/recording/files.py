@@ -90,12 +90,7 @@ def write_recording(recording: Recording, folder: Path, file_format: FileFormat 
     with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}-") as made:
         whole = Path(made) / "recording"
         whole.mkdir()
-        optional = ("standards", "thermometer", "unread", "left_out")
-        unstated = {name for name in optional if not getattr(recording.info, name)}
-        if recording.info.date_known:
-            unstated.add("date_known")
-        head = recording.info.model_dump(mode="json", exclude_none=True, exclude=unstated)
-        (whole / HEAD).write_bytes(tomli_w.dumps(head).encode())
+        (whole / HEAD).write_bytes(head_of(recording.info))
         write_table(recording.columns, whole / f"{recording.info.kind}.{file_format}")
         if recording.environment is not None:
             write_table(recording.environment, whole / f"{ENVIRONMENT}.{file_format}")
@@ -107,6 +102,14 @@ def write_recording(recording: Recording, folder: Path, file_format: FileFormat 
         shutil.move(whole, folder)
         _sync(folder.parent)
     return [file.name for file in files]
+
+
+def head_of(info: RecordingInfo) -> bytes:
+    """Return the content of recording.toml; what is not known is left out."""
+    unstated = {name for name in ("standards", "thermometer", "unread", "left_out") if not getattr(info, name)}
+    if info.date_known:
+        unstated.add("date_known")
+    return tomli_w.dumps(info.model_dump(mode="json", exclude_none=True, exclude=unstated)).encode()
 
 
 def _sync(path: Path) -> None:

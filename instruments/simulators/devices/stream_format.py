@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import zlib
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +30,10 @@ class SimulatedStream:
         self._rate_hz = self._unit.sample_rate_hz
         self._nominal_hz = settings.sample_rate_hz or self._rate_hz
         self._most = setup.port_buffer_bytes // SHORT_MESSAGE_BYTES
+        simulation = self._world.settings  # of the unit's own noise no number is taken
+        self._rng = np.random.default_rng(
+            [simulation.seed, simulation.noise_seed, zlib.crc32(setup.gyro.serial.encode())]
+        )
         self._sent = 0  #: index of the newest message sent
 
     def receive(self, data: bytes, t_s: float) -> None:
@@ -70,13 +75,15 @@ class SimulatedStream:
     def _shown(self, index: NDArray[np.int64]) -> tuple[StreamField, ...]:
         """Return the fields, after the world was sampled for these messages."""
         sample = self._unit.sample(index / self._rate_hz)
-        gravity = self._world.gravity(len(index))
+        force = self._world.gravity(index / self._rate_hz)
+        if self._unit.truth.accel_noise_g > 0:
+            force = force + self._unit.truth.accel_noise_g * self._rng.standard_normal(force.shape)
         self._values: dict[str, NDArray[np.float64]] = {"temperature_c": sample.temperature_c[:, 0]}
         for column, axis in enumerate(self._axes):
             self._values[f"gyro_{axis}"] = sample.rate_dps[:, column]
             self._values[f"temperature_{axis}_c"] = sample.temperature_c[:, column]
         for column, body_axis in enumerate("xyz"):
-            self._values[f"accel_{body_axis}_g"] = gravity[:, column]
+            self._values[f"accel_{body_axis}_g"] = force[:, column]
         self._values["supply_v"] = sample.supply_v
         return self._format.fields
 

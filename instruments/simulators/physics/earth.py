@@ -46,6 +46,15 @@ class EarthRotation:
     latitude_deg: float | None
     north_deg: float
 
+    @property
+    def laboratory_dps(self) -> Array:
+        """The rotation of the Earth, (3,) deg/s: two level directions, and up."""
+        if self.latitude_deg is None:
+            return np.zeros(3)
+        latitude, heading = np.radians(self.latitude_deg), np.radians(self.north_deg)
+        level = EARTH_DPS * np.cos(latitude)
+        return np.array([level * np.cos(heading), level * np.sin(heading), EARTH_DPS * np.sin(latitude)])
+
     def body_rates(self, frame: BodyFrame, table_dps: Array, angle_deg: Array) -> Array:
         """Return the inertial rate in body axes, (n, 3) deg/s, at table rates and table angles (n,)."""
         rates = np.zeros((len(table_dps), 3))

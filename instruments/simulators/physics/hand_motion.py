@@ -63,7 +63,7 @@ class HandMotion:
             if not isinstance(value, int | float) or not (value > 0 or (name == "u_deg" and value == 0)):
                 raise ValueError(f"[simulation] hand.{name} = {value!r}; give a number above 0")
             known[name] = float(value)
-        self._u_deg, self._rate_dps, self._reaction_s = known["u_deg"], known["rate_dps"], known["reaction_s"]
+        self._u_deg, self.rate_dps, self.reaction_s = known["u_deg"], known["rate_dps"], known["reaction_s"]
         self._mistakes = [str(each) for each in cast("Sequence[object]", mistakes)]  #: made first, one in each turn
         self._below = below
         self._rng = np.random.default_rng(seed)
@@ -74,13 +74,13 @@ class HandMotion:
         """Begin a turn that was asked for at a time; returns the axis that is up while it is done."""
         mistake = self._mistakes.pop(0) if self._mistakes else ""
         spread, off = self._rng.standard_normal(2)
-        begin_s = t_s + self._reaction_s * max(1.0 + REACTION_SPREAD * float(spread), 0.1)
+        begin_s = t_s + self.reaction_s * max(1.0 + REACTION_SPREAD * float(spread), 0.1)
         angle_deg = turn_deg + self._u_deg * float(off)
         angle_deg *= {"short": SHORT_SHARE, "direction": -1.0, "nothing": 0.0}.get(mistake, 1.0)
-        rate_dps = FAST_DPS if mistake == "fast" else self._rate_dps
+        rate_dps = FAST_DPS if mistake == "fast" else self.rate_dps
         swing = _Swing(begin_s, max(abs(angle_deg) / rate_dps, 0.5), angle_deg)
         self._swings.append(swing)
-        self._busy_until_s = swing.end_s + 0.5 * self._reaction_s
+        self._busy_until_s = swing.end_s + 0.5 * self.reaction_s
         if mistake == "nudge":
             self._swings.append(_Swing(self._busy_until_s + NUDGE_AFTER_S, NUDGE_S, NUDGE_DEG))
         if mistake == "axis":

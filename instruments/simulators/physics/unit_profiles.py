@@ -39,6 +39,7 @@ class UnitTruth:
     warm_up: Callable[[Array], Array] | None = field(default=None)  #: (seconds since power-on (n,)) -> (n,) deg/s
     sample_clock_ppm: float = 0.0  #: by how much more readings come than the bench file says
     ageing: Ageing | None = None  #: None: the unit stays as it is
+    accel_noise_g: float = 0.0  #: of a reading of its accelerometers, where its stream has them
 
     def k(self, temperature_c: float) -> Array:
         """Return K at a temperature, (axes, 3): K[output, input]."""

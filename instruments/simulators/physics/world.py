@@ -6,7 +6,7 @@ Its formulas are its own: no effect that is fitted to simulated data shares a fo
 from __future__ import annotations
 
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
@@ -26,6 +26,7 @@ from instruments.simulators.physics.motion import TableMotion
 from instruments.simulators.physics.profile_motion import ProfileMotion
 from instruments.simulators.physics.servo_motion import ServoMotion
 from instruments.simulators.physics.thermal import Body, Heat
+from instruments.simulators.physics.tumbling import Tumbling
 from instruments.simulators.physics.unit_profiles import UnitTruth, make_unit, usual_rate_hz
 
 Array = NDArray[np.float64]
@@ -72,6 +73,7 @@ class World:
         self.hand = HandMotion(settings.hand, self.table, [settings.seed, settings.noise_seed, zlib.crc32(b"hand")])
         self.servo: ServoMotion | None = None  #: instead of the stepper, on a bench with a servo table
         self._profile: ProfileMotion | None = None
+        self.tumbling: Tumbling | None = None  #: instead of all others, once a person has turned the units to a pose
         self._encoder_noise_deg = number(settings.table, "encoder_noise_deg", 0.0)
         self._encoder_late_s = number(settings.table, "encoder_late_s", 0.0)
         self._encoder_rng = np.random.default_rng([settings.seed, settings.noise_seed, zlib.crc32(b"encoder")])
@@ -151,6 +153,19 @@ class World:
         """Have the hand turn every unit by an angle, deg, about body axis `position`, which points up."""
         self.position = Position.of(self.hand.turn(t_s, position, turn_deg))
 
+    def lay(self, t_s: float, up: Sequence[float]) -> None:
+        """Have a person turn the units until direction `up` (3,) of the body points up; they lie as mounted before."""
+        if self.tumbling is None:
+            seed = [self.settings.seed, self.settings.noise_seed, zlib.crc32(b"poses")]
+            self.tumbling = Tumbling(self.gravity(np.zeros(1))[0], self.hand.rate_dps, self.hand.reaction_s, seed)
+        self.tumbling.lay(t_s, up)
+
+    def tumbled_rates(self, t_s: Array, period_s: float) -> Array:
+        """Return the inertial rate in body axes, (n, 3) deg/s, of units that a person turns from pose to pose."""
+        assert self.tumbling is not None
+        earth = np.einsum("nji,j->ni", self.tumbling.attitudes(t_s), self._earth.laboratory_dps)
+        return np.asarray(self.tumbling.rates_dps(t_s, period_s) + earth)
+
     def power(self, t_s: float, on: bool) -> None:
         """Switch the power of every unit."""
         if on and self.powered_on_s is None:
@@ -166,9 +181,11 @@ class World:
         rates = self._earth.body_rates(frame, table_dps / (1.0 + self.errors.rate), angle_deg)
         return felt(rates, frame, self._lean_rad)
 
-    def gravity(self, n: int) -> Array:
-        """Return the specific force in body axes, (n, 3) g: one g up."""
-        return BodyFrame.of(self.position).gravity(n)
+    def gravity(self, t_s: Array) -> Array:
+        """Return the specific force in body axes at times (n,), (n, 3) g: one g up."""
+        if self.tumbling is not None:
+            return np.asarray(self.tumbling.attitudes(t_s)[:, 2])
+        return BodyFrame.of(self.position).gravity(len(t_s))
 
 
 def _memory_of(hidden: list[HiddenEffect]) -> tuple[Array, Array]:
@@ -202,7 +219,8 @@ class SimulatedGyro:
         world, truth, n = self.world, self.truth, len(t_s)
         period = 1.0 / self.sample_rate_hz
         table_dps, angle = self._felt(t_s, period)
-        body = world.body_rates(table_dps, angle)
+        tumbled = world.tumbling is not None
+        body = world.tumbled_rates(t_s, period) if tumbled else world.body_rates(table_dps, angle)
         sensor = world.heat.sensor_c(self.settings.name, t_s)
         gain, offset = truth.gain(sensor), truth.offset(sensor)
         if truth.ageing is not None:
@@ -243,7 +261,7 @@ class SimulatedGyro:
             body_dps=body,
             own_dps=body[:, self._rows],
             rows=self._rows,
-            g=world.gravity(len(t_s)),
+            g=world.gravity(t_s),
             sensor_c=sensor,
             start_c=world.start_c,
             deep_c=world.heat.deep_c(self.settings.name, t_s),

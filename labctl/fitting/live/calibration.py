@@ -1,0 +1,162 @@
+"""The live calibration: readings go in as they come, and `assess` says what they determine by now.
+
+The figures are those of the fit that a stored recording gets (`labctl.fitting.estimation.fit`), over all readings so
+far; it is made anew whenever another rest has become long enough.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.errors import BadInput, LabctlError, NotEnoughData
+from labctl.fitting.estimation.fit import fit
+from labctl.fitting.estimation.result import FitResult
+from labctl.fitting.live.buffer import ReadingBuffer
+from labctl.fitting.live.directions import DIRECTIONS, Direction, covered
+from labctl.fitting.live.guidance import needs_of_turns, next_pose
+from labctl.fitting.live.state import LiveCoefficient, LiveState, PoseRequest, coefficients_of, needs_of_fit, turns_left
+from labctl.fitting.live.target import Target
+from labctl.fitting.models.presets import POSES
+from labctl.fitting.poses.at_rest.rests import LEAST_IN_WINDOW, MARGIN, WINDOW_S, find_rests
+from labctl.fitting.poses.readings import GAP, PoseReadings, readings_of
+from labctl.fitting.poses.triad import unit
+from labctl.recording import Recording, RecordingInfo
+
+#: Poses that are named in one message.
+MOST_NAMED = 6
+#: Between these sizes lies the specific force at rest, by an accelerometer before its calibration, g.
+LEAST_G, MOST_G = 0.7, 1.4
+
+
+@dataclass(frozen=True)
+class _Rests:
+    """The rests of the readings so far."""
+
+    up: NDArray[np.float64]  #: (k, 3) direction of the specific force in each rest that is long enough
+    count: int  #: of all
+    still_s: float  #: of the last, where it still goes on; else 0
+
+
+class LiveCalibration:
+    """Readings so far, and the last fit to them. One thread may add while another assesses, each by itself.
+
+    Raises BadInput for a recording that is not of every reading in poses.
+    """
+
+    def __init__(self, info: RecordingInfo, target: Target | None = None) -> None:
+        if info.motion != "poses" or info.kind != "samples":
+            raise BadInput(
+                f"{info.serial}: a live calibration is by readings in poses; give kind = 'samples' and motion = 'poses'"
+            )
+        self.info = info
+        self.target = target or Target()
+        self._buffer = ReadingBuffer(info)
+        self._lost = self._damaged = 0
+        self._fitted: tuple[int, FitResult | None, str] = (
+            0,
+            None,
+            "",
+        )  #: rests long enough, the fit, why there is none
+
+        self._asked: tuple[int, Direction | None] = (0, None)  #: long rests when the pose was chosen, and the pose
+
+    def add(self, columns: Mapping[str, NDArray[np.generic]], *, lost: int = 0, damaged: int = 0) -> None:
+        """Take in a block of readings: the columns of a recording, (n,) each, in order of time.
+
+        Raises BadInput for a column that is missing, and for times that do not rise.
+        """
+        self._buffer.add(columns)
+        self.add_unread(lost=lost, damaged=damaged)
+
+    def add_unread(self, *, lost: int = 0, damaged: int = 0) -> None:
+        """Count readings that are missing, and lines or frames that could not be read."""
+        self._lost, self._damaged = self._lost + lost, self._damaged + damaged
+
+    def __len__(self) -> int:
+        return len(self._buffer)
+
+    @property
+    def recording(self) -> Recording:
+        """All readings so far as a recording."""
+        return self._buffer.recording()
+
+    def assess(self, *, finally_: bool = False) -> LiveState:
+        """Return what the readings so far determine; `finally_`: by a fit to all of them, whatever came last."""
+        recording = self._buffer.recording()
+        try:
+            readings = readings_of(recording)
+            found = self._rests(readings)
+            why = ""
+        except NotEnoughData as error:
+            found, why = _Rests(np.zeros((0, 3)), 0, 0.0), self._plain(error)
+        if not why and (len(found.up) != self._fitted[0] or finally_):
+            self._fitted = (len(found.up), *self._fit(recording))
+        return self._state(recording, found, why)
+
+    def _rests(self, readings: PoseReadings) -> _Rests:
+        rests = find_rests(readings)
+        cut_s = MARGIN * max(WINDOW_S, LEAST_IN_WINDOW * readings.spacing_s)  # of both ends, by `find_rests`
+        since_s = float(readings.t_s[-1] - readings.t_s[rests.end[-1] - 1]) if len(rests) else np.inf
+        goes_on = since_s <= cut_s + GAP * readings.spacing_s
+        long = rests.duration_s + 2 * cut_s >= self.target.rest_s
+        still_s = float(rests.duration_s[-1]) + cut_s + since_s if goes_on else 0.0
+        size = np.linalg.norm(rests.accel_g, axis=1)
+        if len(size) and not LEAST_G <= np.median(size) <= MOST_G:
+            raise NotEnoughData(
+                f"the specific force at rest is {np.median(size):.3g} g where gravity is 1 g: check unit and scale of "
+                "the accelerometer"
+            )
+        return _Rests(unit(rests.accel_g[long & (size > LEAST_G)]), len(rests), still_s)
+
+    def _fit(self, recording: Recording) -> tuple[FitResult | None, str]:
+        try:
+            return fit(recording, POSES), ""
+        except (LabctlError, ArithmeticError, ValueError) as error:  # the latter two: of matrices that have no inverse
+            return None, self._plain(error)
+
+    def _plain(self, error: Exception) -> str:
+        return str(error).removeprefix(f"{self.info.serial}: ")
+
+    def _state(self, recording: Recording, found: _Rests, why: str) -> LiveState:
+        target, (_, result, refused) = self.target, self._fitted
+        covers = covered(found.up)
+        coefficients = () if result is None else tuple(coefficients_of(result, target))
+        turns = 0 if result is None or result.poses is None else result.poses["moves"]["used"]
+        absent = [each.name for each, has in zip(DIRECTIONS[: target.poses], covers, strict=False) if not has]
+        missing = [text for text in (_poses_text(absent, target), why or (refused if len(found.up) else "")) if text]
+        missing += [
+            f"U of {each.name} of {each.axis} is {each.expanded:.2g}, above its limit of {each.limit:g} ({each.unit})"
+            for each in coefficients
+            if not each.is_met
+        ]
+        request = PoseRequest(self._pose(found.up, covers, coefficients), target.rest_s) if missing else None
+        t_s = recording.columns["t_s"]
+        return LiveState(
+            float(np.asarray(t_s, dtype=np.float64)[-1]) if len(t_s) else 0.0, len(recording), self._lost,
+            self._damaged, found.still_s, found.count,
+            tuple(each.name for each, has in zip(DIRECTIONS[: target.poses], covers, strict=False) if has),
+            target.poses, coefficients, tuple(missing), request,
+            turns_left(coefficients, turns), result,
+        )  # fmt: skip
+
+    def _pose(
+        self, up: NDArray[np.float64], covers: tuple[bool, ...], coefficients: tuple[LiveCoefficient, ...]
+    ) -> Direction:
+        """Return the pose to ask for: another one only after another rest that is long enough."""
+        rests, pose = self._asked
+        if pose is None or rests != len(up):
+            needs = needs_of_fit(coefficients) if coefficients else needs_of_turns(up)
+            pose = next_pose(covers, self.target.poses, up[-1] if len(up) else None, needs)
+            self._asked = (len(up), pose)
+        return pose
+
+
+def _poses_text(absent: list[str], target: Target) -> str:
+    if not absent:
+        return ""
+    named = "; ".join(absent[:MOST_NAMED]) + ("; ..." if len(absent) > MOST_NAMED else "")
+    return f"{len(absent)} of {target.poses} poses are missing, by the axes that point up: {named}"

@@ -1,0 +1,98 @@
+"""A live calibration from its stream to the database: a recording in any case, and a version when it is complete."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from contextlib import AbstractContextManager
+from pathlib import Path
+
+from labctl.config import default_database
+from labctl.errors import LabctlError
+from labctl.fitting.live import Target
+from labctl.fitting.models.presets import POSES
+from labctl.services.commands.open import execute
+from labctl.services.commands.registry import FIT, IMPORT_RECORDING
+from labctl.services.commands.requests import RecordingFolder, ToUnit
+from labctl.services.live.assessor import Assessor
+from labctl.services.live.session import Ending, Show, run_live
+from labctl.services.live.source import LiveSource
+from labctl.services.live.spool import Spool
+from labctl.services.schemas.calibrations import FitRequest, FitResponse
+from labctl.services.schemas.live import LiveCoefficientResponse, LiveResponse
+from labctl.store import is_url
+
+#: Says one sentence to the person at the terminal.
+Say = Callable[[str], None]
+
+
+def calibrate_live(
+    database: str | None, source: LiveSource, target: Target, assessor: Assessor, folder: Path, *, keep_folder: bool,
+    show: Show, say: Say, attended: AbstractContextManager[None],
+) -> LiveResponse:  # fmt: skip
+    """Calibrate by a stream, then import its recording and, where the target is reached, fit it.
+
+    `folder` holds the readings meanwhile; it is removed once they are in the database, unless it is to be kept.
+    `attended` is entered for the time of the stream: what a signal does then. Raises LabctlError, InstrumentError;
+    where readings were taken, `say` has said where they are.
+    """
+    spool = Spool(folder)
+    try:
+        with attended:
+            ending = run_live(source, target, spool, assessor, show, say)
+        imported = execute(database, IMPORT_RECORDING, RecordingFolder(folder))
+    except BaseException:
+        if spool.readings:
+            say(f"the {spool.readings} readings so far are kept; import them with `labctl import {folder}`")
+        raise
+    finally:
+        assessor.close()
+    if not keep_folder:
+        shutil.rmtree(folder, ignore_errors=True)
+    fitted: FitResponse | None = None
+    refused = ""
+    if ending.state.done:
+        request = FitRequest(recordings=[imported.recording], model=POSES, effects=[])
+        try:
+            fitted = execute(database, FIT, ToUnit(imported.serial, request))
+        except LabctlError as error:
+            refused = str(error)
+    return _answer(imported.serial, ending, imported.recording, fitted, refused)
+
+
+def usual_folder(database: str | None, serial: str, stamp: str) -> Path:
+    """Return where the readings of a live calibration are until they are in the database: beside it."""
+    location = database or default_database()
+    if is_url(location):
+        from platformdirs import user_data_path  # noqa: PLC0415  the command line starts in a tenth of a second
+
+        return Path(user_data_path("labctl")) / f"live-{serial}-{stamp}"
+    return Path(location).absolute().parent / f"live-{serial}-{stamp}"
+
+
+def _answer(serial: str, ending: Ending, recording: int, fitted: FitResponse | None, refused: str) -> LiveResponse:
+    state = ending.state
+    return LiveResponse(
+        serial=serial,
+        complete=state.done,
+        ended=ending.reason,
+        text=ending.text,
+        recording=recording,
+        readings=state.readings,
+        lost=state.lost,
+        damaged=state.damaged,
+        duration_s=state.t_s,
+        rests=state.rests,
+        poses=list(state.covered),
+        poses_asked=state.wanted,
+        coefficients=[
+            LiveCoefficientResponse(
+                axis=each.axis, name=each.name, value=each.value, expanded=each.expanded, unit=each.unit,
+                limit=each.limit,
+            )
+            for each in state.coefficients
+        ],
+        missing=list(state.missing),
+        fit=fitted,
+        refused=refused,
+    )  # fmt: skip

@@ -1,0 +1,122 @@
+"""A stream by the driver of a gyro: of a bench file, or of a driver with its options."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from instruments.bench import open_bench
+from instruments.bench_config import BenchFile
+from instruments.clock import Clock
+from instruments.interfaces.gyro import Readings
+from instruments.simulation import lay_simulated
+from labctl.errors import BadInput
+from labctl.fitting.live import PoseRequest
+from labctl.recording import RecordingInfo
+from labctl.recording.columns import BY_NAME
+from labctl.services.benches.standards import standards_of
+from labctl.services.live.source import Block
+from labctl.services.planning.loading import with_drivers
+
+#: Limits of a unit that is named by driver and port alone: no table turns it.
+USUAL_RATE_DPS = 2000.0
+
+
+class GyroSource:
+    """One gyro of a bench. Table and chamber of the bench are not touched."""
+
+    def __init__(self, bench: BenchFile, serial: str | None, clock: Clock) -> None:
+        """Choose a gyro by its serial number, default the first. Raises BadInput for an unknown one."""
+        chosen = [each for each in bench.gyros if serial in (None, each.serial)]
+        if not chosen:
+            known = ", ".join(each.serial for each in bench.gyros)
+            raise BadInput(f"{serial}: bench {bench.name} has no such unit; choose one of {known}")
+        self._settings = chosen[0]
+        # the simulated world and the seed of a unit do not depend on the other units of the bench
+        self._bench_file = bench.model_copy(update={"table": None, "chamber": None, "gyros": (self._settings,)})
+        self._bench = open_bench(self._bench_file.model_copy(update={"references": ()}), clock)
+        self._gyro = self._bench.gyros[self._settings.name]
+        self.clock = clock
+        self.is_simulated = bench.is_simulated
+        self._first_s: float | None = None
+        self.serial = self._settings.serial
+        self.name = f"{self._settings.name} on {self._settings.port or self._settings.host}"
+
+    def start(self) -> RecordingInfo:
+        """Start the stream; raises InstrumentError, BadInput for a unit without an accelerometer."""
+        gyro, settings = self._gyro, self._settings
+        self._require_force([channel.name for channel in gyro.channels])
+        if self._bench.simulation is not None:
+            self._bench.unit_handler.power(True)
+        identity = gyro.identify()
+        gyro.start()
+        conventions = {k: v for k, v in settings.datasheet_conventions.items() if k in identity.datasheet}
+        return RecordingInfo.model_validate({
+            "serial": identity.serial, "model": identity.model, "axes": gyro.axes, "kind": "samples",
+            "motion": "poses", "started_at": self.clock.utc(), "latitude_deg": self._bench_file.latitude_deg,
+            "sample_rate_hz": gyro.sample_rate_hz, "max_rate_dps": gyro.limits.max_rate_dps,
+            "technology": identity.technology or None, "datasheet": dict(identity.datasheet),
+            "datasheet_conventions": conventions,
+            "output": {axis: dict(unit) for axis, unit in identity.output.items()},
+            "standards": standards_of(self._bench_file), "notes": "turned by hand, live",
+        })  # fmt: skip
+
+    def _require_force(self, channels: Sequence[str]) -> None:
+        if absent := [name for axis in "xyz" for name in (f"gyro_{axis}", f"accel_{axis}_g") if name not in channels]:
+            raise BadInput(
+                f"{self.name}: driver {self._settings.driver} gives no {', '.join(absent)}; a live calibration "
+                "compares the turns of all three axes with gravity, so the stream needs gyros and accelerometers about "
+                "x, y and z. Turn a unit without accelerometers by known angles: labctl campaign start by-hand"
+            )
+
+    def read(self, duration_s: float) -> Block:
+        """Read the gyro; raises InstrumentError, also where it has gone silent."""
+        readings = self._gyro.read(duration_s)
+        if not len(readings):
+            return Block(lost=readings.lost, damaged=readings.damaged)
+        if self._first_s is None:
+            self._first_s = float(readings.t_s[0])
+        return Block(self._columns(readings), readings.lost, readings.damaged)
+
+    def _columns(self, readings: Readings) -> dict[str, NDArray[np.generic]]:
+        found: dict[str, NDArray[np.generic]] = {"t_s": readings.t_s - (self._first_s or 0.0)}
+        for channel in self._gyro.channels:
+            if channel.name in BY_NAME:
+                found[channel.name] = channel.value(readings.raw[channel.name])
+        return found | {"valid": readings.valid.astype(np.int64)}
+
+    def ask(self, request: PoseRequest | None) -> None:
+        """Have the simulated person of a simulated bench do it; at a real one a person reads it."""
+        if self._bench.simulation is not None and request is not None:
+            lay_simulated(self._bench.simulation, self.clock, request.pose.up)
+
+    def stop(self) -> None:
+        """Close the ports."""
+        self._bench.close()
+
+
+def bench_of_driver(
+    driver: str, port: str, serial: str, options: Sequence[str], latitude_deg: float | None
+) -> BenchFile:
+    """Return a bench of one gyro: its driver, its port, and options KEY=VALUE of the driver's section.
+
+    Raises BadInput for an option, BadBench for a setting that the driver does not take.
+    """
+    section: dict[str, object] = {
+        "name": "unit", "driver": driver, "port": port, "serial": serial, "axes": ["x", "y", "z"],
+        "max_rate_dps": USUAL_RATE_DPS,
+    }  # fmt: skip
+    for option in options:
+        key, sign, value = option.partition("=")
+        if not sign or not key.strip():
+            raise BadInput(f"--option {option!r}: write KEY=VALUE, such as sample_rate_hz=100")
+        section[key.strip()] = value.strip()
+    try:
+        bench = BenchFile.model_validate({"name": "live", "latitude_deg": latitude_deg, "gyros": [section]})
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise BadInput(f"{'.'.join(map(str, first['loc'][2:])) or 'options'}: {first['msg']}; correct it") from error
+    return with_drivers(bench)

@@ -1,0 +1,65 @@
+"""A stream of lines, such as a ROS topic: JSON or CSV."""
+
+from __future__ import annotations
+
+from instruments.clock import Clock
+from labctl.errors import BadInput
+from labctl.fitting.live import PoseRequest
+from labctl.recording import RecordingInfo
+from labctl.recording.line_stream import LineDecoder
+from labctl.services.live.line_feed import LineFeed
+from labctl.services.live.source import Block, StreamEnded
+
+#: A stream without a reading for so long has ended, s; before the first it may take longer to begin.
+SILENCE_S, FIRST_WITHIN_S = 10.0, 60.0
+
+
+class LineSource:
+    """Lines of a feed, decoded. `info` is what is known of the unit; its time of start is filled in."""
+
+    is_simulated = False
+
+    def __init__(self, feed: LineFeed, decoder: LineDecoder, info: RecordingInfo, clock: Clock) -> None:
+        self._feed, self._decoder, self._info, self.clock = feed, decoder, info, clock
+        self.name, self.serial = feed.name, info.serial
+        self._last_s, self._begun = 0.0, False
+
+    def start(self) -> RecordingInfo:
+        """Open the feed; raises BadInput."""
+        self._feed.open()
+        self._last_s = self.clock.now_s()
+        return self._info.model_copy(update={"started_at": self.clock.utc()})
+
+    def read(self, duration_s: float) -> Block:
+        """Return the readings of the lines that arrive in `duration_s`.
+
+        Raises StreamEnded at the end, after SILENCE_S without a reading, and where the lines cannot be used any more;
+        BadInput where the first cannot.
+        """
+        self.clock.sleep(duration_s)
+        data = self._feed.take()
+        if data is None:
+            raise StreamEnded(f"{self.name} has ended")
+        try:
+            found = self._decoder.feed(data)
+        except BadInput as error:
+            if not self._begun:
+                raise
+            raise StreamEnded(str(error)) from error
+        now_s = self.clock.now_s()
+        if len(found):
+            self._last_s, self._begun = now_s, True
+        elif now_s - self._last_s > (SILENCE_S if self._begun else FIRST_WITHIN_S):
+            raise StreamEnded(self._silence(now_s - self._last_s, found.example))
+        return Block(found.columns if len(found) else {}, 0, found.damaged, found.example)
+
+    def _silence(self, silence_s: float, example: str) -> str:
+        seen = f"; what arrived is no reading: {example}" if example else ""
+        return f"{self.name} gave no reading for {silence_s:.0f} s{seen}; check the sender"
+
+    def ask(self, request: PoseRequest | None) -> None:
+        """Leave it to the person at the unit."""
+
+    def stop(self) -> None:
+        """Close the feed."""
+        self._feed.close()

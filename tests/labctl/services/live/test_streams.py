@@ -1,0 +1,116 @@
+"""Streams by wire: a pipe, a TCP server, and a simulated gyro by its driver."""
+
+from __future__ import annotations
+
+import os
+import socket
+
+import numpy as np
+import pytest
+
+from instruments.clock import VirtualClock
+from labctl.errors import BadInput
+from labctl.fitting.live import LiveCalibration, LiveState
+from labctl.services.live.gyro_source import GyroSource, bench_of_driver
+from labctl.services.live.line_feed import DescriptorFeed, TcpFeed, feed_of
+from labctl.services.planning.loading import load_bench
+
+
+def test_a_pipe_gives_what_has_arrived_and_its_end() -> None:
+    read_end, write_end = os.pipe()
+    feed = DescriptorFeed(read_end, "pipe")
+    feed.open()
+    try:
+        assert feed.take() == b""
+        os.write(write_end, b"1,2\n3")
+        assert feed.take() == b"1,2\n3"
+        os.write(write_end, b",4\n")
+    finally:
+        os.close(write_end)
+    assert feed.take() == b",4\n"
+    assert feed.take() is None
+    os.close(read_end)
+
+
+def test_a_server_gives_what_it_has_sent_and_its_end() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        feed = TcpFeed(f"tcp://127.0.0.1:{server.getsockname()[1]}")
+        feed.open()
+        peer, _ = server.accept()
+        assert feed.take() == b""
+        with peer:
+            peer.sendall(b"1,2\n")
+        data = b""
+        while (part := feed.take()) is not None:  # ends with the connection
+            data += part
+        assert data == b"1,2\n"
+        feed.close()
+        feed.close()
+
+
+def test_a_server_that_is_not_there_is_said() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+    with pytest.raises(BadInput, match=rf"--lines tcp://127.0.0.1:{port}: cannot connect .* check address"):
+        feed_of(f"tcp://127.0.0.1:{port}").open()
+
+
+def test_a_simulated_gyro_by_driver_and_port() -> None:
+    bench = bench_of_driver(
+        "stream-format", "sim://stream-format/unit", "MTI-7", ["format=xsens-mti", "sample_rate_hz=100"], 48.0
+    )
+    source = GyroSource(bench, "MTI-7", VirtualClock())
+    info = source.start()
+    block = source.read(0.5)
+    source.stop()
+    assert (info.serial, info.motion, info.kind, info.latitude_deg) == ("MTI-7", "poses", "samples", 48.0)
+    assert 45 <= len(block) <= 55
+    assert block.columns["t_s"][0] == 0
+    force = np.column_stack([block.columns[f"accel_{axis}_g"] for axis in "xyz"])
+    assert np.linalg.norm(force, axis=1) == pytest.approx(np.ones(len(block)), abs=0.05)
+    assert block.columns["valid"].all()
+
+
+@pytest.fixture(scope="module")
+def simulated() -> tuple[LiveCalibration, LiveState, np.ndarray]:
+    """Return a live calibration of the shipped bench through its driver, and what is true of its unit."""
+    clock = VirtualClock()
+    source = GyroSource(load_bench("poses-sim"), None, clock)
+    live = LiveCalibration(source.start())
+    while True:
+        block = source.read(0.5)
+        live.add(block.columns, lost=block.lost, damaged=block.damaged)
+        state = live.assess()
+        source.ask(state.request)
+        if state.done or clock.now_s() > 300:
+            break
+    simulation = source._bench.simulation
+    assert simulation is not None
+    truth = simulation.world.gyro("imu").truth.k(25.0) - np.eye(3)
+    source.stop()
+    return live, state, truth
+
+
+def test_the_simulated_person_completes_it(simulated: tuple[LiveCalibration, LiveState, np.ndarray]) -> None:
+    live, state, _ = simulated
+    assert state.done
+    assert (state.lost, state.damaged) == (0, 0)
+    assert live.info.latitude_deg == 42.28
+    assert state.fit is not None
+    assert state.fit.poses is not None
+    assert state.fit.poses["moves"]["used"] >= state.fit.poses["moves"]["count"] - 1
+
+
+def test_the_truth_of_the_simulated_unit_is_inside_u(
+    simulated: tuple[LiveCalibration, LiveState, np.ndarray],
+) -> None:
+    _, state, truth = simulated
+    z = []
+    for each in state.coefficients:
+        if each.limit is not None:
+            i = "xyz".index(each.axis)
+            j = i if each.name == "scale_factor" else "xyz".index(each.name[-1])
+            z.append((each.value - truth[i, j]) / each.expanded)
+    assert len(z) == 9
+    assert np.max(np.abs(z)) < 1.5
+    assert np.mean(np.abs(z) <= 1) >= 7 / 9
