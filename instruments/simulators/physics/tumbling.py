@@ -25,10 +25,10 @@ def rotations(axis: Array, angles_rad: Array) -> Array:
 
 def between(first: Array, second: Array) -> tuple[Array, float]:
     """Return the axis (3,) and the angle, rad, of the shortest turn from one direction (3,) to another."""
-    axis = np.cross(first, second)
+    axis = np.asarray(np.cross(first, second), dtype=np.float64)
     size = float(np.linalg.norm(axis))
     if size < 1e-9:  # opposite or equal: any axis square to it
-        axis = np.cross(first, np.eye(3)[int(np.argmin(np.abs(first)))])
+        axis = np.asarray(np.cross(first, np.eye(3)[int(np.argmin(np.abs(first)))]), dtype=np.float64)
         size_of_any = float(np.linalg.norm(axis))
         return axis / size_of_any, 0.0 if float(first @ second) > 0 else np.pi
     return axis / size, float(np.arctan2(size, first @ second))
