@@ -228,7 +228,7 @@ def _load(service: Service) -> Iterator[None]:
     """Keep the computer busy beside a service, and the service with criticisms.
 
     The busy processes have a session of their own: the system shares its processors between sessions (sched(7),
-    autogroup), and this one, which reads the log of the table and looks at the clock, is not to be late.
+    autogroup), and this one, which reads the log of the table and the clock, is not to be late.
     """
     busy = [subprocess.Popen([sys.executable, "-c", LOAD, str(BUSY)], start_new_session=True)] if BUSY else []
     try:

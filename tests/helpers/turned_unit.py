@@ -5,8 +5,6 @@ The body turns about an axis that is fixed in it, from rest to rest with the lea
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -71,7 +69,7 @@ class TurnedUnit:
         self._turn = (t_s, axis / np.linalg.norm(axis), float(angle), self._up)
 
 
-def columns_of(name: str, values: Array) -> Mapping[str, NDArray[np.generic]]:
+def columns_of(name: str, values: Array) -> dict[str, NDArray[np.generic]]:
     """Return the columns (n,) of three axes."""
     return {name.format(axis): values[:, k] for k, axis in enumerate("xyz")}
 

@@ -30,8 +30,8 @@ def between(first: Array, second: Array) -> tuple[Array, float]:
     if size < 1e-9:  # opposite or equal: any axis square to it
         axis = np.asarray(np.cross(first, np.eye(3)[int(np.argmin(np.abs(first)))]), dtype=np.float64)
         size_of_any = float(np.linalg.norm(axis))
-        return axis / size_of_any, 0.0 if float(first @ second) > 0 else np.pi
-    return axis / size, float(np.arctan2(size, first @ second))
+        return np.asarray(axis / size_of_any, dtype=np.float64), 0.0 if float(first @ second) > 0 else float(np.pi)
+    return np.asarray(axis / size, dtype=np.float64), float(np.arctan2(size, first @ second))
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,7 @@ class LivePrinter:
     def __init__(self) -> None:
         self._printed: tuple[object, ...] = ()
         self._line_is_open = False
+        self._said: set[str] = set()
 
     def show(self, state: LiveState) -> None:
         """Show a state; nothing is printed where nothing has changed."""
@@ -35,6 +36,10 @@ class LivePrinter:
             stderr.print(_progress(state))
             if asked:
                 stderr.print(f"next: {asked}")
+        for text in state.left_out:
+            if text not in self._said:
+                self._said.add(text)
+                self.say(text)
         if stderr.is_terminal:
             self._clear()
             wanted_s = state.request.rest_s if state.request is not None else 0.0

@@ -18,7 +18,15 @@ from labctl.fitting.estimation.result import FitResult
 from labctl.fitting.live.buffer import ReadingBuffer
 from labctl.fitting.live.directions import DIRECTIONS, Direction, covered
 from labctl.fitting.live.guidance import needs_of_turns, next_pose
-from labctl.fitting.live.state import LiveCoefficient, LiveState, PoseRequest, coefficients_of, needs_of_fit, turns_left
+from labctl.fitting.live.state import (
+    LiveCoefficient,
+    LiveState,
+    PoseRequest,
+    coefficients_of,
+    left_out_of,
+    needs_of_fit,
+    turns_left,
+)
 from labctl.fitting.live.target import Target
 from labctl.fitting.models.presets import POSES
 from labctl.fitting.poses.at_rest.rests import LEAST_IN_WINDOW, MARGIN, WINDOW_S, find_rests
@@ -140,7 +148,7 @@ class LiveCalibration:
             self._damaged, found.still_s, found.count,
             tuple(each.name for each, has in zip(DIRECTIONS[: target.poses], covers, strict=False) if has),
             target.poses, coefficients, tuple(missing), request,
-            turns_left(coefficients, turns), result,
+            turns_left(coefficients, turns), () if result is None else left_out_of(result), result,
         )  # fmt: skip
 
     def _pose(

@@ -64,6 +64,7 @@ class LiveState:
     missing: tuple[str, ...]  #: what is missing, in words; empty when the calibration is complete
     request: PoseRequest | None  #: None when the calibration is complete
     turns_left: int | None  #: turns until every U is within its limit, if it goes on falling with their number
+    left_out: tuple[str, ...]  #: turns that the last fit could not use, and why, in order of time
     fit: FitResult | None
 
     @property
@@ -85,6 +86,14 @@ def coefficients_of(result: FitResult, target: Target) -> Iterator[LiveCoefficie
         for name, value, u, unit in zip(found.names, found.values[:, 0], found.u[:, 0], found.units, strict=True):
             limit = target.u if name.startswith(_LIMITED) else target.bias_dps if name == "bias" else None
             yield LiveCoefficient(axis, name, float(value), NORMAL_K * float(u), unit, limit)
+
+
+def left_out_of(result: FitResult) -> tuple[str, ...]:
+    """Return the turns that a fit in poses could not use, and why, in words."""
+    moves = () if result.poses is None else result.poses["moves"]["left_out"]
+    return tuple(
+        f"the turn from {each['from_s']:.0f} s to {each['until_s']:.0f} s is not used: {each['why']}" for each in moves
+    )
 
 
 def needs_of_fit(coefficients: tuple[LiveCoefficient, ...]) -> Array:

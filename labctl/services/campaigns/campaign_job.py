@@ -40,7 +40,7 @@ class CampaignJob:
     def _stop_if_stuck(self) -> None:
         """Stop the table from here where the engine does not, because what it writes down first waits for its database.
 
-        Whoever asked for the stop: a person, a signal, the lease of the bench that is lost.
+        The stop may come from a person, a signal, or the lease of the bench, lost to another.
         """
         self.control.wait_for_end()
         table = self.prepared.bench.table

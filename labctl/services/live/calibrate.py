@@ -93,6 +93,7 @@ def _answer(serial: str, ending: Ending, recording: int, fitted: FitResponse | N
             for each in state.coefficients
         ],
         missing=list(state.missing),
+        left_out=list(state.left_out),
         fit=fitted,
         refused=refused,
     )  # fmt: skip

@@ -42,6 +42,7 @@ class LiveResponse(ResponseModel):
         description="By the fit to all readings; empty where they do not allow one."
     )
     missing: list[str] = Field(description="What is missing, in words; empty when the calibration is complete.")
+    left_out: list[str] = Field(description="Turns that the fit could not use, and why.")
     fit: FitResponse | None = Field(
         description="The new calibration version; null: the calibration is not complete, or the fit was refused."
     )

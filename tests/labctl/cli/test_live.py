@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import signal
 from pathlib import Path
 
 import pytest
@@ -12,6 +14,7 @@ from labctl.fitting.live import PoseRequest
 from labctl.fitting.live.directions import DIRECTIONS
 from labctl.services.live import line_feed
 from tests.helpers.lab import Lab
+from tests.helpers.processes import WAIT_S, begin, kill, labctl
 from tests.helpers.turned_unit import TurnedUnit
 
 NAMES = ("t_s", *(f"gyro_{a}" for a in "xyz"), *(f"accel_{a}_g" for a in "xyz"))
@@ -98,3 +101,21 @@ def test_wrong_use_is_one_clear_line(lab: Lab, arguments: tuple[str, ...], said:
     assert said in found.stderr
     assert found.stderr.count("\n") == 1
     assert not lab.database.exists()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_it_and_keeps_what_was_read(tmp_path: Path, number: signal.Signals) -> None:
+    process = begin(labctl(tmp_path / "lab.sqlite", "live", "--bench", "poses-sim", "--speed", "20", "--json"))
+    try:
+        assert process.stderr is not None
+        while "1 of 18 poses" not in (line := process.stderr.readline()):  # one pose is covered
+            assert line
+        process.send_signal(number)
+        out, _ = process.communicate(timeout=WAIT_S)
+    finally:
+        kill(process)
+    answer = json.loads(out)
+    assert process.returncode == 1
+    assert (answer["ended"], answer["complete"], answer["recording"]) == ("interrupted", False, 1)
+    assert answer["readings"] > 200
+    assert list(tmp_path.glob("live-*")) == []

@@ -120,6 +120,22 @@ def test_a_limit_of_the_bias_is_asked_for_too(whole: Run) -> None:
     assert state.request is not None
 
 
+def test_a_turn_that_cannot_be_used_is_said_with_the_reason(whole: Run) -> None:
+    columns = {name: values for name, values in whole.live.recording.columns.items() if name != "dataset"}
+    rate = np.asarray(columns["gyro_x"], dtype=np.float64)
+    largest = float(np.abs(rate).max())
+    columns["gyro_x"] = np.clip(rate, -0.9 * largest, 0.9 * largest)
+    live = LiveCalibration(INFO, Target(u=1.5e-3))
+    live.add(columns)
+    state = live.assess()
+    assert state.left_out
+    saturated = [text for text in state.left_out if "s is not used: gyro_x is saturated at " in text]
+    assert saturated
+    assert saturated[0].startswith("the turn from ")
+    assert saturated[0].endswith("deg/s: turn the unit more slowly")
+    assert whole.states[-1].left_out == ()
+
+
 def test_specific_force_in_another_unit_is_said(whole: Run) -> None:
     wrong = LiveCalibration(INFO)
     columns = {name: values for name, values in whole.live.recording.columns.items() if name != "dataset"}
