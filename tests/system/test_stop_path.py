@@ -174,7 +174,7 @@ def test_a_frozen_web_process_keeps_no_stop_from_the_table(service: ServiceProce
 def test_with_a_supervisor_that_stands_still_and_no_web_process_the_bench_process_answers(
     service: ServiceProcess, simulator: Simulator
 ) -> None:
-    """The supervisor would start a web process again; until it does, another process has to take a stop at the address."""
+    """The supervisor would start a web process again; until then, another process has to take a stop at the address."""
     campaign = turning(service, simulator)
     os.kill(service.process.pid, signal.SIGSTOP)
     os.kill(service.web_pid, signal.SIGKILL)
