@@ -12,6 +12,7 @@ import typer
 from labctl.acting_user import Actor, acting
 from labctl.cli.command_log import log_of_command
 from labctl.cli.commands import (
+    accelerometer,
     audit,
     bench,
     calibrations,
@@ -70,6 +71,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "import": recordings.import_,
     "allan": noise.allan,
     "orientation": noise.orientation,
+    "accelerometer": accelerometer.accelerometer,
     "magnetometer": magnetometer.magnetometer,
     "fit": calibrations.fit,
     "effects": effects.effects,
