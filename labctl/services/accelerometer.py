@@ -107,6 +107,11 @@ def _joined(parts: Sequence[PoseReadings]) -> PoseReadings:
                 f"{part.info.serial}: latitude {part.info.latitude_deg} deg, but {whole.info.latitude_deg} deg of "
                 f"{whole.info.serial}; calibrate files of one place together"
             )
+        if part.gyro_dps.any() != whole.gyro_dps.any():
+            raise BadInput(
+                f"{part.info.serial} and {whole.info.serial}: one is a recording with a gyro, the other a table "
+                "without; calibrate recordings together, or tables"
+            )
         breaks = part.breaks.copy()
         breaks[0] = True
         later = part.t_s - part.t_s[0] + whole.t_s[-1] + 1.0

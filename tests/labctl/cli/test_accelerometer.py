@@ -12,6 +12,8 @@ from click.testing import Result
 from typer.testing import CliRunner
 
 from labctl.cli.app import app
+from labctl.recording.files import write_recording
+from studies.poses_simulation import Session, simulate_session
 from tests.helpers.poses_at_rest import BIAS_G, ERRORS, RATE_HZ, poses, readings_in, write_readings
 
 
@@ -83,3 +85,14 @@ def test_what_is_wrong_is_said_once(tmp_path: Path) -> None:
     assert "not found" in run("nothing.csv", status=2).stderr
     write_readings(tmp_path / "b.csv", readings[::-1])
     assert "row 2: the time does not increase" in run(str(tmp_path / "b.csv"), status=2).stderr
+
+
+def test_the_folder_of_a_recording_in_poses_is_read(tmp_path: Path) -> None:
+    recording, truth = simulate_session(2, Session(rests=24))
+    write_recording(recording, tmp_path / "poses")
+    found = answer(str(tmp_path / "poses"))
+    for i, axis in enumerate("xyz"):
+        assert found["bias_g"][axis]["value"] == pytest.approx(truth.accel_bias_g[i], abs=2e-3)
+    table = write_readings(tmp_path / "a.csv", readings_in(poses(8, 1), 1))
+    mixed = run(str(tmp_path / "poses"), table, status=2).stderr.replace("\n", " ")
+    assert "one is a recording with a gyro, the other a table without" in mixed
