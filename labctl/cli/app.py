@@ -12,6 +12,7 @@ import typer
 from labctl.acting_user import Actor, acting
 from labctl.cli.command_log import log_of_command
 from labctl.cli.commands import (
+    accelerometer,
     audit,
     bench,
     calibrations,
@@ -74,6 +75,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "live": live.live,
     "allan": noise.allan,
     "orientation": noise.orientation,
+    "accelerometer": accelerometer.accelerometer,
     "magnetometer": magnetometer.magnetometer,
     "fit": calibrations.fit,
     "effects": effects.effects,

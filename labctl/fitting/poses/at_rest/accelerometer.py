@@ -24,6 +24,8 @@ PARAMETERS = 3 + len(UPPER)
 LEAST_POSES = 12
 #: Directions closer than this count as one pose, deg.
 SAME_POSE_DEG = 5.0
+#: A face counts as laid up where a pose is nearer to it than this, deg.
+FACE_DEG = 30.0
 #: A scale factor or misalignment that is less certain than this is not determined, and so a bias in g.
 LARGEST_U = 0.02
 #: In a rest whose gravity is off by more than this many standard deviations the unit moved.
@@ -89,8 +91,11 @@ def _sizes(theta: Array, accel_g: NDArray[np.float64]) -> Array:
 
 
 def _jacobian(theta: Array, accel_g: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the derivative of the sizes by the nine parameters, (k, 9)."""
-    errors, bias = matrices(theta)
+    return size_jacobian(*matrices(theta), accel_g)
+
+
+def size_jacobian(errors: NDArray[np.float64], bias: Array, accel_g: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the derivative of the sizes of forces behind readings (k, 3) by the nine parameters, (k, 9)."""
     inverse = np.linalg.inv(np.eye(3) + errors)
     force = corrected(accel_g, errors, bias)
     pull = -unit(force) @ inverse  # what one g of error in a reading changes of the size
@@ -139,8 +144,26 @@ def _require_poses(serial: str, rests: Rests) -> None:
             f"{serial}: {len(rests)} rests in {poses} different poses; the accelerometer, by which the gyro is "
             f"calibrated, needs at least {LEAST_POSES} for bias, scale factor and misalignment: lay the unit down "
             "for 2 s "
-            "or more on each face, each edge and some corners; free motion without rests is no reference"
+            "or more on each face, each edge and some corners"
+            f"{_missing(rests.accel_g)}; free motion without rests is no reference"
         )
+
+
+def _missing(accel_g: NDArray[np.float64]) -> str:
+    """Return the faces that no pose has up within FACE_DEG, in words."""
+    nearest = _faces(accel_g)
+    absent = [name for name, cosine in nearest.items() if cosine < np.cos(np.radians(FACE_DEG))]
+    return f" (no pose yet with {', '.join(absent)} up)" if absent else ""
+
+
+def _faces(accel_g: NDArray[np.float64]) -> dict[str, float]:
+    """Return the cosine between each face's direction and the nearest pose."""
+    directions = unit(accel_g)
+    return {
+        f"{sign}{a}": float((s * directions[:, i]).max())
+        for i, a in enumerate(AXES)
+        for sign, s in (("", 1), ("-", -1))
+    }
 
 
 def _covariance(serial: str, jacobian: NDArray[np.float64], accel_g: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -149,12 +172,7 @@ def _covariance(serial: str, jacobian: NDArray[np.float64], accel_g: NDArray[np.
     u = np.sqrt(np.diag(covariance))
     if rank == PARAMETERS and float(u.max()) <= LARGEST_U:
         return np.asarray(covariance, dtype=np.float64)
-    directions = unit(accel_g)
-    faces = {
-        f"{sign}{a}": float((s * directions[:, i]).max())
-        for i, a in enumerate(AXES)
-        for sign, s in (("", 1), ("-", -1))
-    }
+    faces = _faces(accel_g)
     face = min(faces, key=lambda name: faces[name])
     raise NotEnoughData(
         f"{serial}: the poses do not determine the accelerometer's nine parameters (the least certain has u = "

@@ -1,0 +1,52 @@
+"""What nine parameters of an accelerometer are worth: held-out rests against the noise of their means."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.poses.at_rest.accelerometer import Accelerometer, size_jacobian
+from labctl.fitting.poses.at_rest.rests import Rests
+
+#: Error of held-out rests over what the noise of their means lets expect, from which on the model leaves more.
+UNEXPLAINED = 1.5
+Verdict = Literal["adequate", "unexplained"]
+
+
+@dataclass(frozen=True)
+class Adequacy:
+    """Sizes of gravity in the used rests of an accelerometer, g."""
+
+    before_g: float  #: root mean square by which the raw sizes differ from gravity
+    heldout_g: float  #: the same of rests predicted from all others
+    expected_g: float  #: what the noise of the means alone makes of `heldout_g`
+
+    @property
+    def verdict(self) -> Verdict:
+        return "unexplained" if self.heldout_g > UNEXPLAINED * self.expected_g else "adequate"
+
+
+def adequacy_of(found: Accelerometer, rests: Rests) -> Adequacy:
+    """Return what is left of each rest by a fit to the others.
+
+    The fit without a rest is that to all with one unknown more, which absorbs its residual: none is made again.
+    """
+    accel_g, sigma = rests.accel_g[found.used], found.u_rest_g[found.used]
+    forces = np.linalg.solve(np.eye(3) + found.errors, (accel_g - found.bias_g).T).T
+    residual = np.linalg.norm(forces, axis=1) - found.gravity_g
+    white = np.sqrt(rests.accel_white_var.mean(axis=1))[found.used]
+    jacobian = size_jacobian(found.errors, found.bias_g, accel_g) / sigma[:, None]
+    hat = jacobian @ found.covariance @ jacobian.T
+    kept = np.maximum(1 - np.diag(hat), 1e-6)
+    # residual / sigma = (1 - hat) noise / sigma: the noise of every rest is in what the others predict of one
+    spread = (np.eye(len(hat)) - hat) * (white / sigma)
+    expected = sigma * np.linalg.norm(spread, axis=1) / kept
+    before = np.linalg.norm(accel_g, axis=1) - found.gravity_g
+    return Adequacy(_rms(before), _rms(residual / kept), _rms(expected))
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))

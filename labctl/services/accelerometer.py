@@ -1,0 +1,161 @@
+"""Nine parameters of an accelerometer from files of its readings in poses, as a response and as parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from labctl.errors import BadInput, BadRecording
+from labctl.exports.flight_controllers.accelerometer import FIRST_INSTANCE, FORMATS
+from labctl.fitting.poses.at_rest.accelerometer import Accelerometer, calibrate_accelerometer, different_poses
+from labctl.fitting.poses.at_rest.adequacy import Adequacy, adequacy_of
+from labctl.fitting.poses.at_rest.gravity import STANDARD_GRAVITY
+from labctl.fitting.poses.at_rest.rests import Rests, find_rests
+from labctl.fitting.poses.readings import AXES, GAP, LEAST_READINGS, PoseReadings, readings_of
+from labctl.fitting.poses.triad import UPPER
+from labctl.recording import RecordingInfo
+from labctl.recording.data_files import read_table
+from labctl.recording.files import read_recording
+from labctl.recording.info import NO_DATE
+from labctl.services.schemas.reports.accelerometer import AccelerometerResponse
+from labctl.services.schemas.reports.magnetometer import Estimate
+
+#: Units of readings, in g.
+UNITS_G = {"g": 1.0, "mg": 1e-3, "m/s2": 1 / STANDARD_GRAVITY}
+COLUMNS = ("t_s", "accel_x_g", "accel_y_g", "accel_z_g")
+
+
+@dataclass(frozen=True)
+class Source:
+    """How a table of readings is read; a recording says it itself."""
+
+    columns: Sequence[str] = COLUMNS  #: time in s, then x, y and z
+    unit: str = "g"
+    latitude_deg: float | None = None
+
+
+def accelerometer_of_files(paths: Sequence[Path], source: Source) -> tuple[AccelerometerResponse, Accelerometer]:
+    """Return the calibration by all files of one unit; raises BadInput, BadRecording, NotEnoughData."""
+    if source.unit not in UNITS_G:
+        raise BadInput(f"--unit {source.unit}: give one of {', '.join(UNITS_G)}")
+    if source.latitude_deg is not None and not abs(source.latitude_deg) <= 90:
+        raise BadInput(f"--latitude {source.latitude_deg:g}: give the latitude in deg, from -90 to 90")
+    if len(source.columns) != len(COLUMNS):
+        raise BadInput(f"--columns {','.join(source.columns)}: name four columns, of time, x, y and z")
+    readings = _joined([_readings(path, source) for path in paths])
+    rests = find_rests(readings)
+    found = calibrate_accelerometer(readings, rests)
+    return _response(found, rests, adequacy_of(found, rests)), found
+
+
+def parameters_of(
+    answer: AccelerometerResponse, found: Accelerometer, name: str, instance: int | None, device_id: int | None
+) -> str:
+    """Return a calibration as parameters of an autopilot; raises BadInput for what the format cannot express."""
+    if name not in FORMATS:
+        raise BadInput(f"--export {name}: an accelerometer is exported to {' or '.join(FORMATS)}")
+    return FORMATS[name](found, answer.text, FIRST_INSTANCE[name] if instance is None else instance, device_id)
+
+
+def _readings(path: Path, source: Source) -> PoseReadings:
+    if path.is_dir():
+        return readings_of(read_recording(path))
+    if not path.is_file():
+        raise BadRecording(f"{path}: not found; name a CSV or Parquet file of readings, or the folder of a recording")
+    table = read_table(path)
+    found = []
+    for name in source.columns:
+        if name not in table:
+            raise BadRecording(
+                f"{path}: there is no column {name!r} (the columns are {', '.join(list(table)[:12])}); name time, x, y "
+                "and z with --columns"
+            )
+        values = np.asarray(table[name])
+        if values.dtype.kind not in "fiu":
+            raise BadRecording(f"{path}: column {name!r} holds text, not numbers; name another column")
+        found.append(np.asarray(values, dtype=np.float64))
+    rows = np.column_stack(found)
+    wrong = np.flatnonzero(~np.isfinite(rows).all(axis=1))
+    if len(wrong):
+        raise BadRecording(f"{path}: row {int(wrong[0]) + 1} has no number in every column; leave the row out")
+    if len(rows) < LEAST_READINGS:
+        raise BadRecording(f"{path}: {len(rows)} rows; rests in poses need at least {LEAST_READINGS}; record longer")
+    steps = np.diff(rows[:, 0])
+    back = np.flatnonzero(steps <= 0)
+    if len(back):
+        raise BadRecording(f"{path}: row {int(back[0]) + 2}: the time does not increase; sort the rows by time, in s")
+    info = RecordingInfo.model_construct(
+        serial=str(path), axes=AXES, kind="samples", motion="poses", started_at=NO_DATE,
+        latitude_deg=source.latitude_deg,
+    )  # fmt: skip
+    breaks = np.concatenate([[False], steps > GAP * float(np.median(steps))])
+    # without a gyro nothing tells a turn about the vertical, which leaves the specific force as it is
+    return PoseReadings(
+        info, rows[:, 0], UNITS_G[source.unit] * rows[:, 1:], np.zeros((len(rows), 3)), None, breaks
+    )  # fmt: skip
+
+
+def _joined(parts: Sequence[PoseReadings]) -> PoseReadings:
+    """Return the readings of all parts, one after the other, with a break between them."""
+    whole = parts[0]
+    for part in parts[1:]:
+        if part.info.latitude_deg != whole.info.latitude_deg:
+            raise BadInput(
+                f"{part.info.serial}: latitude {part.info.latitude_deg} deg, but {whole.info.latitude_deg} deg of "
+                f"{whole.info.serial}; calibrate files of one place together"
+            )
+        if part.gyro_dps.any() != whole.gyro_dps.any():
+            raise BadInput(
+                f"{part.info.serial} and {whole.info.serial}: one is a recording with a gyro, the other a table "
+                "without; calibrate recordings together, or tables"
+            )
+        breaks = part.breaks.copy()
+        breaks[0] = True
+        later = part.t_s - part.t_s[0] + whole.t_s[-1] + 1.0
+        whole = replace(
+            whole,
+            t_s=np.concatenate([whole.t_s, later]),
+            accel_g=np.vstack([whole.accel_g, part.accel_g]),
+            gyro_dps=np.vstack([whole.gyro_dps, part.gyro_dps]),
+            temperature_c=None,
+            breaks=np.concatenate([whole.breaks, breaks]),
+        )
+    return whole
+
+
+def _response(found: Accelerometer, rests: Rests, worth: Adequacy) -> AccelerometerResponse:
+    u = np.sqrt(np.diag(found.covariance))
+    errors = {
+        f"{AXES[i]}{AXES[j]}": Estimate(value=float(found.errors[i, j]), u=float(u[3 + k]))
+        for k, (i, j) in enumerate(UPPER)
+    }
+    return AccelerometerResponse(
+        verdict=worth.verdict,
+        bias_g={a: Estimate(value=float(found.bias_g[i]), u=float(u[i])) for i, a in enumerate(AXES)},
+        scale_factor={a: errors[a + a] for a in AXES},
+        misalignment={name: each for name, each in errors.items() if name[0] != name[1]},
+        covariance=found.covariance.tolist(), gravity_g=found.gravity_g,
+        rests=len(rests), left_out=int((~found.used).sum()), poses=different_poses(found.up),
+        before_g=worth.before_g, residual_g=found.residual_g, heldout_g=worth.heldout_g, expected_g=worth.expected_g,
+        noise_density_m_s2={
+            a: float(STANDARD_GRAVITY * np.sqrt(rests.density[i])) for i, a in enumerate(AXES)
+        },
+        text=list(_text(found, worth)),
+    )  # fmt: skip
+
+
+def _text(found: Accelerometer, worth: Adequacy) -> Iterator[str]:
+    worst = float(np.sqrt(np.diag(found.covariance)[:3]).max())
+    yield f"Accelerometer: bias with u up to {worst:.2g} g; local gravity {found.gravity_g:.6g} g."
+    yield (
+        f"Size of gravity: off by {worth.before_g:.2g} g before, {worth.heldout_g:.2g} g after, in held-out rests; "
+        f"out; the noise of their means lets expect {worth.expected_g:.2g} g."
+    )
+    if worth.verdict == "unexplained":
+        yield (
+            f"that is {worth.heldout_g / worth.expected_g:.1f} times as much: the bias drifted, the unit moved in its "
+            "rests, or the output is not linear; the uncertainties include it"
+        )

@@ -1,0 +1,33 @@
+"""Calibration of an accelerometer."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from labctl.services.schemas.base import ResponseModel
+from labctl.services.schemas.reports.magnetometer import Estimate
+
+
+class AccelerometerResponse(ResponseModel):
+    """Nine parameters of an accelerometer: reading = bias + (1 + errors) force, by gravity in poses at rest."""
+
+    verdict: Literal["adequate", "unexplained"] = Field(
+        description="adequate: held-out rests are predicted to the noise of their means; unexplained: they are not, "
+        "and the uncertainties include what is left."
+    )
+    bias_g: dict[str, Estimate]
+    scale_factor: dict[str, Estimate] = Field(description="Relative errors of the scale factors, by axis.")
+    misalignment: dict[str, Estimate] = Field(description="xy, xz, yz: of an axis by the force along another.")
+    covariance: list[list[float]] = Field(description="Of bias x, y, z, scale factor x, y, z, misalignment xy, xz, yz.")
+    gravity_g: float = Field(description="Local gravity, in units of 9.80665 m/s2.")
+    rests: int
+    left_out: int = Field(description="Rests that do not agree with gravity by five standard deviations.")
+    poses: int = Field(description="Different directions among the rests.")
+    before_g: float = Field(description="Root mean square by which the raw sizes differ from gravity, g.")
+    residual_g: float = Field(description="The same after the calibration, g.")
+    heldout_g: float = Field(description="The same of rests predicted from all others, g.")
+    expected_g: float = Field(description="What the noise of the means alone makes of it, g.")
+    noise_density_m_s2: dict[str, float] = Field(description="White noise by axis, m/s2/sqrt(Hz), from the rests.")
+    text: list[str]
