@@ -145,10 +145,7 @@ def criticise(
     base = fitted.base if fitted is not None else None
     report_stage("reducing the recording")
     recording = with_temperature(fitted_part(recording))
-    data = reduce_recording(recording)
-    data = replace(
-        data, static=static_record(recording, 0.0 if full else LONG_S), steps=steps_of(recording, data.white_var)
-    )
+    data = _reduced(recording, full=full)
     forward = _forward(fit_data, model, base)
     if (short := _too_little(data, forward)) is not None:
         return Criticism(Verdict("insufficient_data", reason=short), data, fit_data, base, None, None)
@@ -161,15 +158,14 @@ def criticise(
     verdict = with_family(verdict, family)
     named = Criticism(verdict, data, fit_data, base, None, comparison, final, family=family)
     found = _checked(named, forward, full=full)
-    verdict = found.verdict
     if not full or found.beside_missing is None:
         return found
     report_stage("listing suspects and residuals")
     suspects = tuple(suspects_of(comparison, found.beside_missing, fit_data, forward, refined_term, base))
-    suspected = {*verdict.named, *(s.candidate.id for s in suspects if s.candidate.log_bf > 0)}
+    suspected = {*found.verdict.named, *(s.candidate.id for s in suspects if s.candidate.log_bf > 0)}
     return replace(
         found,
-        family=_with_time_constants(family, fit_data, forward),
+        family=_with_time_constants(found.family, fit_data, forward),
         direct_rms_dps=_direct_rms_dps(fit_data, model),
         suspects=suspects,
         not_testable=tuple(line for line in not_testable(comparison, catalogue) if line["effect"] not in suspected),
@@ -211,7 +207,14 @@ def _checked(found: Criticism, forward: ErrorModel, *, full: bool) -> Criticism:
     verdict = with_hypothesis(without_harm(verdict, advice, slow, comparison), comparison, slow)
     advice = (*advice, NO_CORRECTION) if verdict.named == (QUANTIZATION,) else advice
     kept = tuple(each for each in advice if each["effect"] in verdict.named)
-    return replace(found, verdict=verdict, advice=kept, slow=slow)
+    return replace(found, verdict=verdict, advice=kept, slow=slow, family=family if LAG in verdict.named else None)
+
+
+def _reduced(recording: Recording, *, full: bool) -> ReducedRecording:
+    """Return a recording reduced to means, with its record at rest and the steps of its outputs."""
+    data = reduce_recording(recording)
+    static = static_record(recording, 0.0 if full else LONG_S)
+    return replace(data, static=static, steps=steps_of(recording, data.white_var))
 
 
 def _to_check(comparison: Comparison, verdict: Verdict, group: tuple[str, ...]) -> Term | None:
