@@ -53,7 +53,7 @@ def _require_causes(data: FitData, model: ErrorModel) -> None:
         whys = [kind_of(term).undetermined_by(data.channels, axis) for axis in data.outputs]
         if whys and all(whys):
             raise NotEnoughData(
-                f"{data.info.serial}: {term.effect} cannot be determined: {whys[0]}, or leave the effect out"
+                f"{data.info.serial}: {term.effect} cannot be determined: {whys[0]}; leave the effect out otherwise"
             )
 
 

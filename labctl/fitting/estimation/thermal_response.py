@@ -117,12 +117,29 @@ def thermal_response(data: FitData, model: ErrorModel, term: Term) -> ThermalRes
     axes = [Axis(data, rest, axis) for axis in data.outputs]
     tried = [structure for structure in STRUCTURES if structure.id != "per_axis" or len(axes) > 1]
     held_out = {structure.id: left_out_by(axes, structure, stretches) for structure in (NONE, *tried)}
+    every = np.ones(len(data), dtype=bool)
+    chosen = _chosen(tried, held_out)
+    found = best_taus(axes, chosen, every, MOST_STEPS)
+    if not _are_apart(found):
+        chosen = _chosen([structure for structure in tried if structure != chosen], held_out)
+        found = best_taus(axes, chosen, every, MOST_STEPS)
+    return ThermalResponse(_term_of(axes, term, chosen, found), chosen, held_out)
+
+
+def _chosen(tried: Sequence[Structure], held_out: Mapping[str, LeftOut]) -> Structure:
+    """Return the simplest structure that no larger one clearly betters on what was left out."""
     chosen = tried[0]
     for size in sorted({structure.size for structure in tried}):
         best = min((s for s in tried if s.size == size), key=lambda s: held_out[s.id].chi2)
         chosen = best if held_out[best.id].is_below(held_out[chosen.id]) else chosen
-    found = best_taus(axes, chosen, np.ones(len(data), dtype=bool), MOST_STEPS)
-    return ThermalResponse(_term_of(axes, term, chosen, found), chosen, held_out)
+    return chosen
+
+
+def _are_apart(found: Taus) -> bool:
+    """Return whether two flows of each axis have clearly different time constants: nearer ones are one flow."""
+    least = GRID_S[APART] / GRID_S[0]
+    both = [(taus_s["tau"], taus_s["second_tau"]) for taus_s in found.values() if "second_tau" in taus_s]
+    return all(max(pair) >= least * min(pair) for pair in both)
 
 
 def stretches_of(data: FitData) -> list[tuple[NDArray[np.bool_], NDArray[np.bool_]]]:

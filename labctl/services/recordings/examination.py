@@ -44,7 +44,10 @@ def inspection_of_file(
     out_of_order = OutOfOrder(also_steps=True)
     if chosen == INTERCHANGE and not given:
         if column_map is not None or beside:
-            raise BadInput(f"{path}: a recording in labctl's own format has no column map and no further files")
+            raise BadInput(
+                f"{path}: a recording in labctl's own format has no column map and no further files; "
+                "leave --map and --beside out"
+            )
         recording = read_recording(path)
     else:
         recording = read_with(chosen, path, given, column_map, None, beside, out_of_order)

@@ -22,4 +22,6 @@ def finding_of(warning: DataWarning) -> Finding:
 
 def as_json(warning: DataWarning) -> FindingJson:
     """Return a warning as it is kept with a version."""
-    return finding_of(warning).to_json()
+    found = finding_of(warning).to_json()
+    found["text"] = warning.text
+    return found

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from math import comb
 
 import numpy as np
-from scipy.special import gammainccinv, gammaincinv
 
 from labctl.recording.sanity.finding import Finding
 from labctl.recording.sanity.readings.series import Array, Marked, Series, medians_of_five
@@ -62,6 +61,8 @@ def _limit(sets: int, pieces: float, bins: int) -> float:
     """
     shape, half = max(INDEPENDENT * pieces, 1.0), (sets + 1) // 2
     chance = (CHANCE / bins / comb(sets, half)) ** (1.0 / half)
+    from scipy.special import gammainccinv, gammaincinv  # noqa: PLC0415  0.2 s that only records of readings need
+
     return float(gammainccinv(shape, min(chance, 0.5)) / gammaincinv(shape, 0.5))
 
 
