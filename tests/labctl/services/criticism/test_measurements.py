@@ -63,5 +63,5 @@ def test_readings_that_a_fork_has_read_give_the_same_criticism(tmp_path: Path, m
             with monkeypatch.context() as counting:
                 counting.setattr(Recordings, "iter_datasets", counted("iter_datasets", calls))
                 answers.append(criticise_unit(store, "FOG-0001", 1, None))
-            assert calls["iter_datasets"] == (2 if forks else 3)  # the inspection and examination of the data read them too
+            assert calls["iter_datasets"] == (2 if forks else 3)  # the inspection reads them too, twice
     assert answers[0] == answers[1]
