@@ -29,3 +29,9 @@ def whole_number(options: Mapping[str, str], name: str, limits: tuple[int, int],
     if not (text.isdecimal() and text.isascii() and low <= int(text) <= high):
         raise BadInput(f"format {format_name}: option {name} = {text!r}: give a whole number from {low} to {high}")
     return int(text)
+
+
+def check_instance(name: str, instance: int, least: int, most: int) -> None:
+    """Raise BadInput for a sensor that an autopilot has not: each numbers its own from `least` to `most`."""
+    if not least <= instance <= most:
+        raise BadInput(f"format {name}: --instance {instance}: give a number from {least} to {most}")

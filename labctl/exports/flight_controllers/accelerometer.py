@@ -13,6 +13,7 @@ import numpy as np
 
 from labctl.errors import BadInput
 from labctl.exports.comments import commented, plain
+from labctl.exports.options import check_instance
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.poses.at_rest.accelerometer import Accelerometer
 from labctl.fitting.poses.at_rest.gravity import STANDARD_GRAVITY
@@ -35,7 +36,7 @@ def misalignment_loss_g(found: Accelerometer) -> float:
 
 def px4(found: Accelerometer, head: Sequence[str], instance: int, device_id: int | None) -> str:
     """Return a file of parameters that QGroundControl loads; raises BadInput for an instance that PX4 has not."""
-    _check_instance("px4", instance, 0, 3)
+    check_instance("px4", instance, 0, 3)
     name = f"CAL_ACC{instance}_"
     offset, scale = _offset_and_scale(found)
     rows = [] if device_id is None else [(f"{name}ID", str(device_id), INTEGER)]
@@ -58,7 +59,7 @@ def ardupilot(found: Accelerometer, head: Sequence[str], instance: int, device_i
 
     Raises BadInput for an instance that ArduPilot has not, and for values outside the ranges that it documents.
     """
-    _check_instance("ardupilot", instance, 1, 3)
+    check_instance("ardupilot", instance, 1, 3)
     number = "" if instance == 1 else str(instance)
     offset, scale = _offset_and_scale(found)
     for axis, value, factor in zip(AXES, offset, scale, strict=True):
@@ -85,11 +86,6 @@ def _offset_and_scale(found: Accelerometer) -> tuple[Array, Array]:
 
 def _lost(found: Accelerometer, consumer: str) -> str:
     return f"LOST misalignments ({consumer} has no place for them): up to {misalignment_loss_g(found):.2g} g of 1 g."
-
-
-def _check_instance(name: str, instance: int, least: int, most: int) -> None:
-    if not least <= instance <= most:
-        raise BadInput(f"format {name}: --instance {instance}: give a number from {least} to {most}")
 
 
 FORMATS: dict[str, Callable[[Accelerometer, Sequence[str], int, int | None], str]] = {

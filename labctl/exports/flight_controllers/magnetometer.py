@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 
 from labctl.errors import BadInput
 from labctl.exports.comments import commented, plain
+from labctl.exports.options import check_instance
 from labctl.fitting.magnetometer.calibrate import AXES, Magnetometer
 
 #: One gauss and one milligauss, in uT.
@@ -25,7 +26,7 @@ OFF_DIAGONAL = ((0, 1), (0, 2), (1, 2))
 
 def px4(result: Magnetometer, head: Sequence[str], instance: int, device_id: int | None) -> str:
     """Return a file of parameters that QGroundControl loads; raises BadInput for an instance that PX4 has not."""
-    _check_instance("px4", instance, 0, 3)
+    check_instance("px4", instance, 0, 3)
     name = f"CAL_MAG{instance}_"
     rows = [] if device_id is None else [(f"{name}ID", str(device_id), INTEGER)]
     offset, matrix = result.hard_iron_ut / GAUSS_UT, result.soft_iron
@@ -48,7 +49,7 @@ def ardupilot(result: Magnetometer, head: Sequence[str], instance: int, device_i
 
     Raises BadInput for an instance that ArduPilot has not, and for an offset that it refuses.
     """
-    _check_instance("ardupilot", instance, 1, 3)
+    check_instance("ardupilot", instance, 1, 3)
     number = "" if instance == 1 else str(instance)
     offset = -result.hard_iron_ut / MILLIGAUSS_UT
     worst = max(range(3), key=lambda i: abs(offset[i]))
@@ -68,11 +69,6 @@ def ardupilot(result: Magnetometer, head: Sequence[str], instance: int, device_i
         "ArduPilot corrects after the rotation of sensor and board: the readings must be in these axes, as in its log."
     ]
     return commented([*map(plain, head), *notes]) + "".join(f"{row},{value}\n" for row, value in rows)
-
-
-def _check_instance(name: str, instance: int, least: int, most: int) -> None:
-    if not least <= instance <= most:
-        raise BadInput(f"format {name}: --instance {instance}: give a number from {least} to {most}")
 
 
 FORMATS: dict[str, Callable[[Magnetometer, Sequence[str], int, int | None], str]] = {
