@@ -22,6 +22,7 @@ from labctl.recording.files import read_recording
 from labctl.recording.info import NO_DATE
 from labctl.services.schemas.reports.accelerometer import AccelerometerResponse
 from labctl.services.schemas.reports.magnetometer import Estimate
+from labctl.services.table_readings import numbers_of
 
 #: Units of readings, in g.
 UNITS_G = {"g": 1.0, "mg": 1e-3, "m/s2": 1 / STANDARD_GRAVITY}
@@ -66,21 +67,7 @@ def _readings(path: Path, source: Source) -> PoseReadings:
     if not path.is_file():
         raise BadRecording(f"{path}: not found; name a CSV or Parquet file of readings, or the folder of a recording")
     table = read_table(path)
-    found = []
-    for name in source.columns:
-        if name not in table:
-            raise BadRecording(
-                f"{path}: there is no column {name!r} (the columns are {', '.join(list(table)[:12])}); name time, x, y "
-                "and z with --columns"
-            )
-        values = np.asarray(table[name])
-        if values.dtype.kind not in "fiu":
-            raise BadRecording(f"{path}: column {name!r} holds text, not numbers; name another column")
-        found.append(np.asarray(values, dtype=np.float64))
-    rows = np.column_stack(found)
-    wrong = np.flatnonzero(~np.isfinite(rows).all(axis=1))
-    if len(wrong):
-        raise BadRecording(f"{path}: row {int(wrong[0]) + 1} has no number in every column; leave the row out")
+    rows = numbers_of(path, table, source.columns, "time, x, y and z")
     if len(rows) < LEAST_READINGS:
         raise BadRecording(f"{path}: {len(rows)} rows; rests in poses need at least {LEAST_READINGS}; record longer")
     steps = np.diff(rows[:, 0])

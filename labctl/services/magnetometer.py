@@ -6,15 +6,14 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from labctl.errors import BadInput, BadRecording
 from labctl.exports.flight_controllers.magnetometer import FIRST_INSTANCE, FORMATS
 from labctl.fitting.magnetometer.calibrate import AXES, MOST_LEFT_OUT, Magnetometer, calibrate_magnetometer
 from labctl.fitting.magnetometer.ellipsoid import PLACES
 from labctl.recording.data_files import read_table
-from labctl.recording.recording import Columns
 from labctl.services.schemas.reports.magnetometer import Estimate, MagnetometerResponse
+from labctl.services.table_readings import numbers_of
 
 #: Units of readings, in uT.
 UNITS_UT = {"uT": 1.0, "nT": 1e-3, "mT": 1e3, "T": 1e6, "gauss": 100.0, "mgauss": 0.1}
@@ -33,7 +32,7 @@ def magnetometer_of_file(
         raise BadRecording(f"{path}: not found; name a CSV or Parquet file with the readings of a magnetometer")
     if len(columns) != len(AXES):
         raise BadInput(f"--columns {','.join(columns)}: name three columns, of x, y and z")
-    readings = UNITS_UT[unit] * _readings(path, read_table(path), columns)
+    readings = UNITS_UT[unit] * numbers_of(path, read_table(path), columns, "the three columns")
     result = calibrate_magnetometer(str(path), readings, field_ut)
     return _response(result, given=field_ut is not None), result
 
@@ -49,25 +48,6 @@ def parameters_of(
             f"--export {name}: the readings are not those of a constant field ({answer.text[-1]}); record them again"
         )
     return FORMATS[name](result, answer.text, FIRST_INSTANCE[name] if instance is None else instance, device_id)
-
-
-def _readings(path: Path, table: Columns, columns: Sequence[str]) -> NDArray[np.float64]:
-    found = []
-    for name in columns:
-        if name not in table:
-            raise BadRecording(
-                f"{path}: there is no column {name!r} (the columns are {', '.join(list(table)[:12])}); name the three "
-                "columns with --columns"
-            )
-        values = np.asarray(table[name])
-        if values.dtype.kind not in "fiu":
-            raise BadRecording(f"{path}: column {name!r} holds text, not numbers; name another column")
-        found.append(np.asarray(values, dtype=np.float64))
-    readings = np.column_stack(found)
-    wrong = np.flatnonzero(~np.isfinite(readings).all(axis=1))
-    if len(wrong):
-        raise BadRecording(f"{path}: row {int(wrong[0]) + 1} has no number for every axis; leave the row out")
-    return readings
 
 
 def _response(result: Magnetometer, *, given: bool) -> MagnetometerResponse:
