@@ -27,7 +27,7 @@ class BudgetLine:
     freedom: float | None = None  #: degrees of freedom; None: infinite
     uncorrected: float = 0.0  #: sensitivity times a known error that nothing corrects for, in the unit of the result
     is_common: bool = False  #: whether it is the same at all rates: it adds linearly over them, no mean reduces it
-    is_stated: bool = True  #: False: a standard that the bench does not state
+    is_stated: bool = True  #: False: listed and not in U, as a standard that the bench does not state
     is_overdue: bool = False  #: whether the standard was past its due date when it was used
     due: str | None = None
     why: str = ""
@@ -57,7 +57,7 @@ class Budget:
 
     @property
     def not_stated(self) -> tuple[str, ...]:
-        """Standards that the bench does not state, and that are therefore not in U."""
+        """Sources that nothing states, as standards that the bench does not state: they are not in U."""
         return tuple(dict.fromkeys(line.source for line in self.lines if not line.is_stated))
 
     @property
@@ -79,10 +79,10 @@ def budget_of(result: str, unit: str, lines: Sequence[BudgetLine], value: float 
     """Return a budget of independent lines.
 
     Each line is one source at this place; what its inputs have in common is included in it. A line of type A that is
-    unknown leaves the result unknown; a standard that is not stated is listed and not in U.
+    unknown leaves the result unknown; one that is not stated, as a standard, is listed and not in U.
     """
     known = [line for line in lines if line.contribution is not None]
-    if any(line.contribution is None and line.kind == "A" for line in lines):
+    if any(line.contribution is None and line.kind == "A" and line.is_stated for line in lines):
         return Budget(result, unit, value, tuple(lines), None, None, None, None)
     sizes = [line.contribution or 0.0 for line in known]
     combined = combined_u(np.array(sizes))

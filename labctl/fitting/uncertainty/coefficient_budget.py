@@ -10,7 +10,7 @@ import numpy as np
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.uncertainty.budget import Budget, BudgetLine, budget_of
 from labctl.fitting.uncertainty.conditions import BenchConditions
-from labctl.fitting.uncertainty.evaluated_lines import coefficient_line, model_line, repeatability_line
+from labctl.fitting.uncertainty.evaluated_lines import coefficient_line, model_line, repeatability_line, slope_line
 from labctl.fitting.uncertainty.rate_vector import require_law_of_rate_and_temperature
 from labctl.fitting.uncertainty.sensitivity import coefficients_of
 from labctl.fitting.uncertainty.standard_lines import Sensitivities, standard_lines
@@ -48,6 +48,9 @@ def _of_axis(
         lines: list[BudgetLine] = [coefficient_line(fitted, law, temperature_c, evidence, unit)]
         if name == "bias":
             lines += [model_line(fitted, axis, evidence, {}, temperature_c), repeatability_line(fitted, evidence)]
+        else:
+            across = None if name == "scale_factor" else name.removeprefix("misalignment_")
+            lines.append(slope_line(fitted, evidence, temperature_c, across))
         sensitivities = _sensitivities(name, values, law.temperature_slope(fitted, temperature_c), bench)
         lines += [source.lines[0] for source in standard_lines(bench, sensitivities)]
         found[name] = budget_of(name, unit, lines, values[name])

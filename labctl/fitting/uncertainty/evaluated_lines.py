@@ -8,6 +8,7 @@ from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.models.presets import POSES
 from labctl.fitting.uncertainty.budget import BudgetLine
 from labctl.fitting.uncertainty.sensitivity import LawFunction
+from labctl.fitting.uncertainty.slope_error import slope_error, slope_unknown
 from labctl.fitting.uncertainty.use import AxisEvidence
 
 #: Why a part is unknown.
@@ -21,6 +22,9 @@ BY_HAND = (
 NO_POWER_ON = "only one power-on was recorded, and neither a data sheet nor a static record gives the repeatability"
 BY_COVARIANCE = "by the covariance matrix of the fit: correlations of the coefficients are included"
 BY_HELD_OUT = "by temperatures and rates left out of the fit in turn; the drift of the campaign is included"
+SLOPE_HELD_OUT = (
+    "by what grows with the rate near this temperature, at temperatures and rates left out of the fit in turn"
+)
 
 
 def coefficient_line(
@@ -54,6 +58,22 @@ def model_line(
     u = evidence.model_error.at(own, temperature_c, across) if evidence else None
     why = evidence.model_error.unknown_at(own, temperature_c, across) if evidence else _lacking(fitted)
     return BudgetLine("model", "held-out data sets", "A", "normal", u, "deg/s", 1.0, u, why=why or BY_HELD_OUT)
+
+
+def slope_line(
+    fitted: FittedModel, evidence: AxisEvidence | None, temperature_c: float, across: str | None = None
+) -> BudgetLine:
+    """Return the line of what the model leaves in a slope of one output at a temperature, a share of the rate.
+
+    The slope over the rate about its own axis, or about another body axis (`across`). An unknown one is said, and not
+    in U: a slope is stated beside the uncertainty of the corrected rate, which has no value then.
+    """
+    error = evidence.model_error if evidence else None
+    u = slope_error(error, temperature_c, across) if error else None
+    why = slope_unknown(error, temperature_c, across) if error else _lacking(fitted)
+    return BudgetLine(
+        "model", "held-out data sets", "A", "normal", u, "1", 1.0, u, is_stated=u is not None, why=why or SLOPE_HELD_OUT
+    )
 
 
 def repeatability_line(fitted: FittedModel, evidence: AxisEvidence | None) -> BudgetLine:

@@ -27,6 +27,12 @@ LEAST_SHARE = 0.25
 MOST_KEPT, TEMPERATURES = 2000, 10
 
 
+NO_TURNED_AXES = (
+    "the version was made by an older version of labctl, which did not store about which axes the unit was turned: fit "
+    "it again"
+)
+NONE_NEAR = "no data set was measured near there"
+NONE_LEFT_OUT = "no data set could be left out of the fit: the model needs all data sets"
 #: Rates about other body axes where the unit turns about one alone.
 NO_RATES: Mapping[str, float] = MappingProxyType({})
 
@@ -61,8 +67,8 @@ class LocalModelError:
 
     def _variance(self, away: Array) -> float:
         """Return the variance left, (deg/s)^2, where the data sets with a known one are so far away, in widths."""
-        known, weight = np.isfinite(self.left_var), _weights(away)
-        near = _effective_number(weight)
+        known, weight = np.isfinite(self.left_var), near_weights(away)
+        near = effective_number(weight)
         weight /= weight.sum()
         left = float(weight @ self.left_var[known])
         noise = float(weight @ self.white_var[known])
@@ -103,7 +109,7 @@ class LocalModelError:
         """Return why the error there is unknown, in words; None where it is known."""
         away = self._away(rate_dps, temperature_c)
         if len(away) == 0:
-            return "no data set could be left out of the fit: the model needs all data sets"
+            return NONE_LEFT_OUT
         if (why := _unknown(away)) is not None:
             return why
         for axis, rate in across_dps.items():
@@ -114,13 +120,13 @@ class LocalModelError:
     def _unknown_across(self, axis: str, rate_dps: float, temperature_c: float) -> str | None:
         """Return why the error at a rate about another body axis is unknown; None where it is known."""
         if self.across_dps is None:
-            return (
-                "the version was made by an older version of labctl, which did not store about which axes the unit was "
-                "turned: fit it again"
-            )
+            return NO_TURNED_AXES
         if axis not in self.across_dps:
             return f"the unit was not turned about {axis}"
-        why = _unknown(self._away_across(axis, rate_dps, temperature_c))
+        away = self._away_across(axis, rate_dps, temperature_c)
+        if len(away) == 0:
+            return NONE_LEFT_OUT
+        why = _unknown(away)
         return None if why is None else f"about {axis}, {why}"
 
     def _away(self, rate_dps: float, temperature_c: float) -> Array:
@@ -133,16 +139,20 @@ class LocalModelError:
         along = [_scaled(rates, rate_dps if name == axis else 0.0) for name, rates in across.items()]
         return self._distance([_scaled(self.rate_dps, 0.0), *along], temperature_c)
 
+    def warmth_away(self, temperature_c: float) -> Array:
+        """Return how far a temperature is from that of each data set, (m,) widths of the neighbourhood."""
+        return np.abs(_scaled(self.temperature_c, temperature_c, LEAST_SPAN_K / 2))
+
     def _distance(self, rates: list[Array], temperature_c: float) -> Array:
-        warm = _scaled(self.temperature_c, temperature_c, LEAST_SPAN_K / 2)
-        return np.asarray(np.linalg.norm([*rates, warm], axis=0)[np.isfinite(self.left_var)])
+        away = np.linalg.norm([*rates, self.warmth_away(temperature_c)], axis=0)
+        return np.asarray(away[np.isfinite(self.left_var)])
 
 
 def _unknown(away: Array) -> str | None:
     """Return why nothing is known so far, in widths, from the data sets; None where something is."""
     if away.min() > FARTHEST:
-        return "no data set was measured near there"
-    if _effective_number(_weights(away)) < LEAST_NEAR:
+        return NONE_NEAR
+    if effective_number(near_weights(away)) < LEAST_NEAR:
         return f"fewer than {LEAST_NEAR:g} data sets were measured near there"
     return None
 
@@ -151,16 +161,16 @@ def _sorted(rows: NDArray[np.int64], by: Array) -> NDArray[np.int64]:
     return rows[np.argsort(by[rows], kind="stable")]
 
 
-def _weights(away: Array) -> Array:
+def near_weights(away: Array) -> Array:
     """Return the weights of data sets so far away, in widths: of the narrowest neighbourhood with enough of them."""
     for factor in WIDENED:
         weight = np.exp(-0.5 * (away / factor) ** 2)
-        if _effective_number(weight) >= LEAST_NEAR:
+        if effective_number(weight) >= LEAST_NEAR:
             break
     return np.asarray(weight)
 
 
-def _effective_number(weight: Array) -> float:
+def effective_number(weight: Array) -> float:
     """Return the effective number: how many data sets of equal weight carry as much information."""
     return float(weight.sum() ** 2 / (weight**2).sum())
 

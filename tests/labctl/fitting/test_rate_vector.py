@@ -205,3 +205,27 @@ def test_units_that_turn_about_any_axis_are_inside_u() -> None:
     assert np.isfinite(every).all()
     assert np.mean(np.abs(every) <= 1) > 0.9
     assert np.sqrt(np.mean(every**2)) > 0.2  # and U is not far larger than the errors
+
+
+def test_a_slope_that_the_model_lacks_is_in_the_budget_of_the_coefficient() -> None:
+    """A misalignment and a scale factor that change with temperature, by a model in which they do not."""
+    slope = np.zeros((3, 3))
+    slope[2] = [40 * 2e-5, 0.0, 40 * 1e-5]  # of output z over 40 K, about x and z
+    result, evidence, bench = known(measured(unit=Unit(np.zeros((3, 3)), slope, np.zeros((3, 3)), np.zeros((3, 4)))))
+    for warm_c, away_k in ((0.0, 22.5), (45.0, 22.5), (22.5, 0.0)):
+        budgets = coefficient_budgets(result.fitted, warm_c, evidence=evidence, name="unit", bench=bench)["z"]
+        for name, per_k in (("misalignment_x", 2e-5), ("scale_factor", 1e-5)):
+            (line,) = [line for line in budgets[name].lines if line.source == "model"]
+            assert line.u == pytest.approx(per_k * max(away_k, 6.0), rel=0.6)
+        (line,) = [line for line in budgets["misalignment_y"].lines if line.source == "model"]
+        assert line.u is not None
+        assert line.u < 3e-5  # about y the model lacks nothing
+
+
+def test_the_model_error_of_a_slope_that_nothing_shows_is_said_and_not_in_its_u() -> None:
+    result, evidence, bench = known_of_ideal()
+    budgets = coefficient_budgets(result.fitted, 20.0, evidence={}, name="unit", bench=bench)["z"]
+    assert "model" in budgets["misalignment_x"].not_stated
+    assert budgets["misalignment_x"].expanded is not None
+    budgets = coefficient_budgets(result.fitted, 20.0, evidence=evidence, name="unit", bench=bench)["z"]
+    assert "model" not in budgets["misalignment_x"].not_stated

@@ -51,12 +51,14 @@ def documents(store: Store) -> dict[str, Any]:
     forms, content = store.certificates.forms(number.number), store.calibrations.document(SERIAL, 1)[0]
     calibration = read_calibration(content)
     reference_c = calibration.fitted.model.reference.temperature_c
+    stored = calibration.document["uncertainty"]
     return {
         "json": json.loads(forms.document),
         "page": json.loads(readable_certificate(Certificate.model_validate_json(forms.document))),
         "xml": ET.fromstring(forms.xml),
         "header": export_calibration(content, "c")[0].decode(),
-        "stored": calibration.document["uncertainty"],
+        "stored": stored,
+        "at_stored": uncertainty_answer(calibration, [50.0], stored["coefficients_at_c"]).model_dump(mode="json"),
         "answer": uncertainty_answer(calibration, [50.0], reference_c).model_dump(mode="json"),
         "sheet": datasheet(store, SERIAL).model_dump(mode="json"),
     }
@@ -116,7 +118,8 @@ def test_u_of_a_coefficient_is_that_of_its_budget(documents: dict[str, Any], nam
         assert each["u"] == pytest.approx(budget["combined"], rel=1e-9)
         assert each["value"] == pytest.approx(budget["value"], rel=1e-6)
         stored = documents["stored"]["axes"][each["axis"]]["coefficients"][name]
-        assert stored["combined"] == pytest.approx(budget["combined"], rel=1e-6)
+        at_stored = documents["at_stored"]["coefficients"][each["axis"]][name]
+        assert stored["combined"] == pytest.approx(at_stored["combined"], rel=1e-6)
 
 
 def test_the_data_sheet_knows_the_mountings_too(documents: dict[str, Any]) -> None:
