@@ -23,8 +23,10 @@ GUARDIAN_ANSWERS_S = 1.5
 SILENT_S = 3.0
 #: From the highest rate to rest a table takes some seconds, a guardian tries each part of the safe state twice, s.
 STANDS_WITHIN_S = 60.0
-#: From here on it is reported that the bench is not stopped yet, s.
+#: From here on it is reported that the bench is not stopped yet, s after the one who asks has begun.
 LATE_S = 4.0
+#: A computer that was busy until then has at least this long for the stop itself, s.
+LEAST_S = 0.5
 #: A latch on a disk that stands still does not keep a stop waiting, s.
 LATCH_S = 0.3
 ENDS_WITHIN_S = 2.0
@@ -168,13 +170,16 @@ class AttemptedStop:
         return self._attempt.text
 
 
-def stop_bench(place: BenchPlace, stop: StopRequest, say: Callable[[str], None] = lambda _: None) -> StopResult:
+def stop_bench(
+    place: BenchPlace, stop: StopRequest, say: Callable[[str], None] = lambda _: None, begun_s: float = 0.0
+) -> StopResult:
     """Stop a bench and wait until it stands, or it is known that it does not. Raises nothing.
 
-    `say` gets one line if the bench is not known to stand after `LATE_S`.
+    `say` gets one line if the bench is not known to stand after `LATE_S`, of which `begun_s` have passed already: on a
+    busy computer a command needs seconds to begin.
     """
     attempt = StopAttempt(place, stop)
-    if (found := attempt.result(LATE_S)) is None:
+    if (found := attempt.result(max(LATE_S - begun_s, LEAST_S))) is None:
         say(f"{NOT_STOPPED} yet: bench {place.name}: {attempt.text}. {SWITCH}.")
     found = found or attempt.result()
     assert found is not None

@@ -19,6 +19,7 @@ from urllib.parse import quote, unquote
 
 from labctl.stop.latch import FILE, FOLDER, StopLatch
 
+TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 NOTE = "driver.json"
 POINTERS = "benches"
 
@@ -41,6 +42,13 @@ class ProcessId:
     def lives(self) -> bool:
         """Whether the process is there; one that has ended and was not waited for is not."""
         return self.pid > 0 and self.boot == _boot() and _started(self.pid) == self.started
+
+    @property
+    def age_s(self) -> float:
+        """How long ago the process was started, s; 0 where the system does not say."""
+        with contextlib.suppress(OSError, ValueError, IndexError):
+            return float(Path("/proc/uptime").read_text(encoding="ascii").split()[0]) - self.started / TICKS_PER_S
+        return 0.0
 
     @property
     def stands_still(self) -> bool:

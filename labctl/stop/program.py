@@ -19,7 +19,7 @@ from typing import Any
 
 from labctl.stop.client import NOT_STOPPED, SWITCH, StopResult, at_instruments, stop_bench
 from labctl.stop.latch import StopRequest
-from labctl.stop.places import BenchPlace, DriverNote, folder_name, known_places, place_of, places_of
+from labctl.stop.places import BenchPlace, DriverNote, ProcessId, folder_name, known_places, place_of, places_of
 
 DATABASE_VARIABLE = "LABCTL_DATABASE"
 WHY = "stopped from the command line"
@@ -115,7 +115,7 @@ def _stop(place: BenchPlace, stop: StopRequest) -> StopResult:
     note = place.note()
     if note is not None and not note.driver.lives and not note.guardian.lives and (note.left_safe or note.simulated):
         return StopResult(note.bench, True, note.left or "its simulated instruments ended with their process")
-    return stop_bench(place, stop, _say)
+    return stop_bench(place, stop, _say, ProcessId.of(os.getpid()).age_s)
 
 
 def _places(database: str | None) -> list[BenchPlace]:

@@ -105,8 +105,13 @@ def test_a_socket_without_an_answer_goes_to_the_instruments_and_its_process_is_e
     assert frozen.wait() == -signal.SIGKILL
 
 
-def test_a_table_that_does_not_answer_is_not_called_stopped(place: BenchPlace, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(client, "LATE_S", 0.0)
+@pytest.mark.parametrize(("late_s", "begun_s"), [(0.0, 0.0), (4.0, 60.0)])
+def test_a_table_that_does_not_answer_is_not_called_stopped(
+    place: BenchPlace, monkeypatch: pytest.MonkeyPatch, late_s: float, begun_s: float
+) -> None:
+    """Also where the computer was busy for so long before the command began that no more time is left."""
+    monkeypatch.setattr(client, "LATE_S", late_s)
+    monkeypatch.setattr(client, "LEAST_S", 0.0)
     slow = threading.Event()
 
     def silent(*_: object) -> InstrumentsLeft:
@@ -121,7 +126,7 @@ def test_a_table_that_does_not_answer_is_not_called_stopped(place: BenchPlace, m
         said.append(text)
         slow.set()
 
-    found = stop_bench(place, stop(), say)
+    found = stop_bench(place, stop(), say, begun_s)
     assert (found.stands, found.text) == (False, "its instruments were stopped directly: table to rest: no answer")
     assert said[0].startswith("NOT STOPPED yet: bench b: ")
     assert place.latch.state().unconfirmed
@@ -136,6 +141,7 @@ def test_a_bench_that_was_left_safe_is_not_touched(place: BenchPlace, at_instrum
 def test_another_process_with_the_same_number_is_not_taken_for_the_driver() -> None:
     mine = me()
     assert mine.lives
+    assert mine.age_s > 0.1
     assert not ProcessId(mine.pid, mine.started + 1, mine.boot).lives
     assert not ProcessId(mine.pid, mine.started, "another start of the computer").lives
     assert client.end_process(ProcessId(mine.pid, mine.started + 1, mine.boot)) == ""  # and this process goes on
