@@ -180,8 +180,10 @@ def _print_mountings(angles: MisalignmentOutlook) -> None:
     for more in angles.further:
         console.print(
             f"    {more.expanded:.2g} with {more.turned}: mountings: {more.mountings} more, time: {hours(more.more_s)} "
-            f"more; add {' '.join(more.recipe_toml.splitlines())}",
-            soft_wrap=True, markup=False,
+            "more; the recipe then has",
+            soft_wrap=True,
         )  # fmt: skip
+        for line in more.recipe_toml.splitlines():
+            console.print(f"      {line}", soft_wrap=True, markup=False)
     if angles.not_stated:
         console.print(f"    not in U, since the bench does not state it: {', '.join(angles.not_stated)}")

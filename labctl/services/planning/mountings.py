@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from datetime import date
+from typing import Any
 
 from instruments.bench_config import BenchFile
 from instruments.positions import Position
@@ -25,7 +26,12 @@ K = 2.0
 ANY_DAY = date(1970, 1, 1)
 #: Mountings that leave more than this share of U are not offered.
 WORTH_SHARE = 0.98
-HALF_TURN, QUARTER_TURN = 180, 90
+#: What can be turned once more, in words, by which key of `[indexing]`, and by how much, deg.
+TURNS = (
+    ("each unit turned by 180 deg on its face", "unit_deg", 180),
+    ("the fixture turned by 180 deg on the table", "fixture_deg", 180),
+    ("the fixture turned by 90 deg on the table", "fixture_deg", 90),
+)
 
 
 def misalignment_outlook(plan: Plan, bench: BenchFile, limits: BenchLimits) -> MisalignmentOutlook | None:
@@ -79,25 +85,36 @@ def _expanded(bench: BenchFile, shares: dict[str, float]) -> float:
 
 
 def _wider(recipe: Recipe) -> Iterator[tuple[str, str, Recipe]]:
-    """Yield what is turned, the table to add, and the recipe with each position once more turned so."""
+    """Yield what is turned, the table that the recipe then has, and the recipe with each position once more turned so.
+
+    A recipe that turns something already keeps its table, with one angle more.
+    """
     fastest = max(recipe.rates_dps, key=abs)
     if fastest == 0:
         return
-    rates, at = (fastest, -fastest), (_temperature_c(recipe),)
+    points = {"temperatures_c": (_temperature_c(recipe),), "rates_dps": (fastest, -fastest)}
+    table: dict[str, Any] = {**points, "hold_s": 0.0}
+    if recipe.indexing is not None:
+        table = recipe.indexing.model_dump(exclude_defaults=True)
+    for what, key, angle in TURNS:
+        there = table.get(key, ())
+        if angle not in there:
+            turned = Indexing.model_validate({**table, key: (*there, angle)})
+            yield what, _toml("indexing", turned), recipe.model_copy(update={"indexing": turned})
     listed = set(recipe.positions)
-    points = f"temperatures_c = [{at[0]:g}]\nrates_dps = [{rates[0]:g}, {rates[1]:g}]"
-    if recipe.indexing is None:
-        for what, key, angle in (
-            ("each unit turned by 180 deg on its face", "unit_deg", HALF_TURN),
-            ("the fixture turned by 180 deg on the table", "fixture_deg", HALF_TURN),
-            ("the fixture turned by 90 deg on the table", "fixture_deg", QUARTER_TURN),
-        ):
-            turned = Indexing.model_validate({key: (angle,), "temperatures_c": at, "rates_dps": rates, "hold_s": 0.0})
-            table = f"[indexing]\n{key} = [{angle}]\n{points}\nhold_s = 0"
-            yield what, table, recipe.model_copy(update={"indexing": turned})
     if recipe.inverted is None and not all(str(Position.of(each).upside_down) in listed for each in listed):
-        inverted = Inverted(temperatures_c=at, rates_dps=rates)
-        yield "each unit upside down", f"[inverted]\n{points}", recipe.model_copy(update={"inverted": inverted})
+        inverted = Inverted.model_validate(points)
+        yield "each unit upside down", _toml("inverted", inverted), recipe.model_copy(update={"inverted": inverted})
+
+
+def _toml(name: str, table: Indexing | Inverted) -> str:
+    """Return a table of a recipe as TOML, a line for each key."""
+    given = table.model_dump(exclude_defaults=True)
+    lines = [
+        f"{key} = [{', '.join(f'{each:g}' for each in value)}]" if isinstance(value, tuple) else f"{key} = {value:g}"
+        for key, value in given.items()
+    ]
+    return "\n".join([f"[{name}]", *lines])
 
 
 def _temperature_c(recipe: Recipe) -> float:

@@ -91,7 +91,7 @@ class FurtherMountings(ResponseModel):
     expanded: float = Field(description="U of a misalignment with them, k = 2, rad.")
     mountings: int = Field(description="Number of mountings that this adds.")
     more_s: float = Field(description="Expected time that this adds, s.")
-    recipe_toml: str = Field(description="The table of a recipe that adds them.")
+    recipe_toml: str = Field(description="The table of the recipe that adds them, in place of one of its name.")
 
 
 class MisalignmentOutlook(ResponseModel):

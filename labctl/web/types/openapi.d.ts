@@ -5450,7 +5450,7 @@ export interface components {
             more_s: number;
             /**
              * Recipe Toml
-             * @description The table of a recipe that adds them.
+             * @description The table of the recipe that adds them, in place of one of its name.
              */
             recipe_toml: string;
         };

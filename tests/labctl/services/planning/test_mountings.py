@@ -60,9 +60,11 @@ def test_the_budget_of_the_fit_is_what_the_plan_said(changes: dict[str, Any], tm
     assert said.not_stated == []
 
 
-@pytest.mark.parametrize("number", range(4))
-def test_further_mountings_are_worth_and_cost_what_is_said(number: int) -> None:
-    recipe = load_recipe("quick-triaxial")
+@pytest.mark.parametrize(
+    ("changes", "number"), [*(({}, k) for k in range(4)), *(({"indexing": CUBE}, k) for k in (0, 1))]
+)
+def test_further_mountings_are_worth_and_cost_what_is_said(changes: dict[str, Any], number: int) -> None:
+    recipe = load_recipe("quick-triaxial").model_copy(update=changes)
     more = outlook(recipe).further[number]
     added = tomllib.loads(more.recipe_toml)
     kinds = {"indexing": Indexing, "inverted": Inverted}
@@ -72,8 +74,15 @@ def test_further_mountings_are_worth_and_cost_what_is_said(number: int) -> None:
     assert outlook(longer).expanded == pytest.approx(more.expanded)
     mounted = [sum(isinstance(step, Mount) for step in plan.steps) for plan in plans]
     assert mounted[1] - mounted[0] == more.mountings == 3
-    for offered in outlook(longer).further:
-        assert not set(tomllib.loads(offered.recipe_toml)) & set(added)
+    assert more.turned not in {offered.turned for offered in outlook(longer).further}
+
+
+def test_a_recipe_that_turns_something_keeps_that_and_is_offered_what_it_does_not_turn_yet() -> None:
+    (best, *_) = outlook(load_recipe("quick-triaxial").model_copy(update={"indexing": CUBE})).further
+    assert best.turned == "each unit turned by 180 deg on its face"
+    assert Indexing.model_validate(tomllib.loads(best.recipe_toml)["indexing"]) == CUBE.model_copy(
+        update={"unit_deg": (180,)}
+    )
 
 
 def test_a_unit_turned_on_its_face_leaves_how_well_it_is_placed_again() -> None:

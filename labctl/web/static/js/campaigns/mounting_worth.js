@@ -24,7 +24,7 @@ export function mountingWorth(outlook) {
             { title: "U, rad", cell: (each) => number(each.expanded, 2) },
             { title: "More mountings", cell: (each) => String(each.mountings) },
             { title: "More time", cell: (each) => duration(each.more_s) },
-            { title: "Table to add to the recipe", cell: (each) => h("pre", { class: "small" }, each.recipe_toml) },
+            { title: "Table of the recipe then", cell: (each) => h("pre", { class: "small" }, each.recipe_toml) },
           ],
           further,
           { label: "What further mountings of each position are worth" },
