@@ -13,9 +13,10 @@ def main() -> None:
     """Run the command line; a stop is carried out before anything else is loaded."""
     if sys.argv[1:2] == ["stop"] and "--help" not in sys.argv:
         from labctl.stop.priority import at_once
+
+        at_once()  # before the rest is loaded: that takes seconds beside busy processes
         from labctl.stop.program import main as stop
 
-        at_once()
         sys.exit(stop(sys.argv[2:]))
     if sys.argv[1:2] == ["serve"]:  # the supervisor, which guards a bench
         from labctl.stop.priority import first_of_all, keep_memory

@@ -8,15 +8,14 @@ that was typed at a terminal runs in real time instead, which no group holds bac
 
 What drives or guards a bench also keeps its memory: where a system takes pages away that were not used for a while, and
 its disk is busy, reading them again takes seconds in which a process does nothing, not even stop.
+
+A stop loads this module before it runs first, so what it need not have is loaded where it is used.
 """
 
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import os
-import resource
-from pathlib import Path
 
 #: What stops or guards a bench, what drives it, what answers requests where the others could not be raised.
 STOP, BENCH, PAGES = -15, -10, 5
@@ -61,6 +60,9 @@ def keep_memory() -> bool:
 
     Only where it may be as much as the process needs: beyond a limit (RLIMIT_MEMLOCK) it would get no more memory.
     """
+    import ctypes  # noqa: PLC0415
+    import resource  # noqa: PLC0415
+
     unlimited = resource.getrlimit(resource.RLIMIT_MEMLOCK)[0] == resource.RLIM_INFINITY
     if not (unlimited or os.geteuid() == 0):
         return False
@@ -78,6 +80,14 @@ def _set(niceness: int) -> bool:
             continue
         with contextlib.suppress(OSError):
             if os.getsid(0) == os.getpid():
-                Path("/proc/self/autogroup").write_text(str(wanted), encoding="ascii")
+                _write("/proc/self/autogroup", str(wanted))
         return wanted == niceness
     return False
+
+
+def _write(path: str, text: str) -> None:
+    handle = os.open(path, os.O_WRONLY)
+    try:
+        os.write(handle, text.encode())
+    finally:
+        os.close(handle)

@@ -39,6 +39,15 @@ def test_it_loads_the_standard_library_alone() -> None:
     assert others == set()
 
 
+def test_it_runs_first_before_it_loads_what_it_needs(environment: dict[str, str]) -> None:
+    code = (
+        "import os, sys; os.sched_setscheduler = lambda *_: print(sorted({'labctl.stop.program', 'ctypes', 'tomllib'} "
+        "& set(sys.modules))); sys.argv = ['labctl', 'stop']; import labctl.cli; labctl.cli.main()"
+    )
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, env=environment)
+    assert found.stdout.split("\n")[0] == "[]"
+
+
 def test_no_bench_that_is_known_is_not_called_stopped(environment: dict[str, str]) -> None:
     found = stop(environment)
     assert (found.returncode, "NOT STOPPED: labctl knows of no bench" in found.stderr) == (1, True)
