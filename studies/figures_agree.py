@@ -193,16 +193,21 @@ def _made(store: Store, unit: Unit) -> None:
     store.calibrations.certify(unit.serial, 1, "certify", by="A", reason="meets the criteria", at=AT)
 
 
+def _figures_of(unit: Unit) -> list[Figure]:
+    """Make a unit in a database of its own, which the service closes in the end, and read its figures."""
+    with tempfile.TemporaryDirectory() as folder, open_store(str(Path(folder) / "lab.sqlite"), write=True) as store:
+        _made(store, unit)
+        return list(figures(store, unit))
+
+
 def run() -> str:
     """Return the table of all figures, and how many agree."""
     lines, wrong, n = [], 0, 0
-    with tempfile.TemporaryDirectory() as folder, open_store(str(Path(folder) / "lab.sqlite"), write=True) as store:
-        for unit in UNITS:
-            _made(store, unit)
-            lines.append(f"\n{unit.serial}: " + "  ".join(NAMES))
-            for figure in figures(store, unit):
-                n += 1
-                wrong += not figure.agrees
-                shown = "  ".join(f"{name}={figure.said[name]}" for name in NAMES if name in figure.said)
-                lines.append(f"{'  ' if figure.agrees else 'NO'} {figure.quantity:44} {shown}")
+    for unit in UNITS:
+        lines.append(f"\n{unit.serial}: " + "  ".join(NAMES))
+        for figure in _figures_of(unit):
+            n += 1
+            wrong += not figure.agrees
+            shown = "  ".join(f"{name}={figure.said[name]}" for name in NAMES if name in figure.said)
+            lines.append(f"{'  ' if figure.agrees else 'NO'} {figure.quantity:44} {shown}")
     return "\n".join([*lines, f"{n - wrong} of {n} quantities agree in every document"])
