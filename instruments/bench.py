@@ -32,6 +32,7 @@ class Bench:
     unit_handler: UnitHandler
     simulation: Simulation | None = None  #: the simulated instruments of this process, where the bench has any
     references: dict[str, Reference] = field(default_factory=dict)  #: by name
+    configurations: dict[str, dict[str, str]] = field(default_factory=dict)  #: unit -> how it is to be set
 
     def close(self) -> None:
         """Close every link, also after one cannot be closed; raises the first InstrumentError or OSError at the end."""
@@ -68,6 +69,7 @@ def open_bench(bench: BenchFile, clock: Clock, simulation: Simulation | None = N
         _unit_handler(bench, simulation, clock),
         simulation,
         {each.name: driver_of(each).make(each, ports, clock) for each in bench.references},
+        {gyro.name: gyro.configuration for gyro in bench.gyros},
     )
 
 

@@ -89,6 +89,8 @@ class GyroSettings(DeviceSettings):
     name: str
     serial: str = Field(pattern=SERIAL)
     own_serial: str | None = None  #: what the unit says of itself, where it does; another one is refused
+    #: How the unit is to be set, by the names and texts with which it reports that; set otherwise, it is refused.
+    configuration: dict[str, str] = Field(default_factory=dict)
     model: str = ""
     technology: Literal["fog", "mems", "piezo", ""] = ""
     axes: tuple[Literal["x", "y", "z"], ...] = ("z",)

@@ -13,9 +13,10 @@ from importlib.metadata import version as package_version
 from pathlib import Path
 from typing import cast, get_args
 
+from instruments.configuration import changed
 from labctl.canonical_json import canonical, canonical_and_hash, hash_of, with_own_hash
 from labctl.certification import CalibrationWarning, Certification, read_certification
-from labctl.errors import BadCalibrationFile
+from labctl.errors import BadCalibrationFile, OtherConfiguration
 from labctl.fitting import FitResult, FittedModel, coefficients_json
 from labctl.fitting.models.force_sensitivity import ForceSensitivity, specific_force_json
 from labctl.fitting.models.memory import state_json
@@ -133,6 +134,24 @@ class Calibration:
             return _limits(self.document["validity"]["rate_dps"])
 
     @property
+    def configuration(self) -> dict[str, str]:
+        """How the unit was set when it was measured, as it said itself; empty where it says nothing."""
+        with _reading("configuration"):
+            return {str(name): str(value) for name, value in self.document.get("configuration", {}).items()}
+
+    def require_configuration(self, reported: Mapping[str, str]) -> None:
+        """Raise OtherConfiguration where the unit now reports another setting than when it was measured.
+
+        `reported` is what it says of itself, by the same names; what only one of the two has is not compared.
+        """
+        if found := changed(self.configuration, reported):
+            said = ", ".join(f"{name} was {was} and is {now}" for name, (was, now) in found.items())
+            raise OtherConfiguration(
+                f"calibration of {self.serial} version {self.version}: the unit is set otherwise than when it was "
+                f"measured: {said}; set it as it was, or calibrate it as it is"
+            )
+
+    @property
     def certification(self) -> Certification | None:
         """The certification at the time when the file was fetched; None: it was not certified then."""
         with _reading("certification"):
@@ -193,13 +212,15 @@ def build_calibration(
         "how_to_use": HOW_TO_USE,
         "hash": "",
     }
-    _add_where_known(document, result, exported)
+    _add_where_known(document, info, result, exported)
     document["hash"] = hash_of(document)
     return Calibration(document)
 
 
-def _add_where_known(document: CalibrationJson, result: FitResult, exported: FittedModel) -> None:
+def _add_where_known(document: CalibrationJson, info: RecordingInfo, result: FitResult, exported: FittedModel) -> None:
     """Add what only some calibrations have."""
+    if info.configuration:
+        document["configuration"] = dict(info.configuration)
     if (force := specific_force_json(result.fitted)) is not None:
         document["specific_force"] = force
     if (state := state_json(exported)) is not None:

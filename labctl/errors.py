@@ -137,6 +137,12 @@ class BadCalibrationFile(BadInput):
     slug = "bad-calibration-file"
 
 
+class OtherConfiguration(BadInput):
+    """A unit is set otherwise than when its calibration was measured."""
+
+    slug = "other-configuration"
+
+
 class Stopped(LabctlError):
     """A person stopped what ran here, by Ctrl-C or a signal; the text says how the bench was left."""
 

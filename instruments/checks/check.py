@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from instruments.bench import Bench, open_bench
-from instruments.bench_config import BenchFile, DeviceSettings
+from instruments.bench_config import BenchFile, DeviceSettings, GyroSettings
 from instruments.checks.devices import ask_chamber, ask_gyro, ask_reference, ask_table
 from instruments.checks.findings import DeviceReport, Finding, Kind
 from instruments.checks.ports import before_opening, is_real_port, of_open_port, shared
 from instruments.clock import Clock
+from instruments.configuration import not_as_stated
 from instruments.errors import InstrumentError
 from instruments.simulation import Simulation
 from instruments.transport.adapters import adapter_of
@@ -31,7 +32,7 @@ def check(bench: BenchFile, clock: Clock, simulation: Simulation | None = None) 
                 report.add(before_opening(port))
                 report.add([sharing[name]] if name in sharing else [])
             if report.is_ok:
-                _ask(opened, report)
+                _ask(opened, report, section.configuration if isinstance(section, GyroSettings) else {})
                 if port is not None:
                     report.add(_about_port(port, report))
             reports.append(report)
@@ -56,7 +57,7 @@ def _address(section: DeviceSettings) -> str:
     return section.host if "://" in section.host else f"{section.host}:{section.tcp_port}"
 
 
-def _ask(opened: Bench, report: DeviceReport) -> None:
+def _ask(opened: Bench, report: DeviceReport, stated: Mapping[str, str]) -> None:
     if report.kind == "table" and opened.table is not None:
         ask_table(opened.table, report)
     elif report.kind == "chamber" and opened.chamber is not None:
@@ -65,6 +66,8 @@ def _ask(opened: Bench, report: DeviceReport) -> None:
         ask_reference(opened.references[report.device], report)
     elif report.kind == "gyro":
         ask_gyro(opened.gyros[report.device], report)
+        if (said := not_as_stated(stated, report.reported)) and report.reported:
+            report.add([Finding("configuration", f"not set as the bench file states: {'; '.join(said)}", "bad")])
 
 
 def _about_port(port: str, report: DeviceReport) -> list[Finding]:

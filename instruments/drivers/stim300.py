@@ -13,9 +13,11 @@ from instruments.interfaces.gyro import Channel, GyroIdentity, GyroLimits, Readi
 from instruments.interfaces.self_checks import StreamPeriod
 from instruments.protocols.stim300.checks import DEFAULT_RATE_HZ, differences, is_other_serial
 from instruments.protocols.stim300.datagrams import (
+    ASK_BIAS_TRIM,
     ASK_CONFIGURATION,
     ASK_SERIAL_NUMBER,
     Configuration,
+    parse_bias_trim,
     parse_configuration,
     parse_serial_number,
 )
@@ -46,12 +48,15 @@ EMPTY_EVERY_S = 1.0
 START_WITHIN_S = 1.5
 #: A question that was not answered is put again after this, s.
 ASK_EVERY_S = 0.4
+#: So often the bias trim offset is asked for: older firmware does not know the question.
+TRIM_QUESTIONS = 2
 
 
 class Stim300:
     """Driver of a STIM300 in normal mode.
 
-    After each start the unit is asked for its configuration and serial number before its first reading is passed on.
+    After each start the unit is asked for its configuration, serial number and bias trim offset before its first
+    reading is passed on.
     What it reports later, after a reset, is checked in the same way.
     """
 
@@ -78,6 +83,8 @@ class Stim300:
         self._last_frame_s = 0.0
         self._set: Configuration | None = None  # as the unit says
         self._serial: str | None = None
+        self._trim_dps: tuple[float, ...] | None = None
+        self._questions = 0  #: since the start
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -106,7 +113,8 @@ class Stim300:
     def start(self) -> None:
         """Control the stream: open the port and drop stale bytes; raises LinkError."""
         self._stream.open()
-        self._set = self._serial = None
+        self._set = self._serial = self._trim_dps = None
+        self._questions = 0
         self._discard()
         self._last_frame_s = self._clock.now_s()
         self._time = StreamTime(1.0 / self.sample_rate_hz, self._last_frame_s)
@@ -134,7 +142,8 @@ class Stim300:
         ask_s = began_s
         while (now_s := self._clock.now_s()) < began_s + START_WITHIN_S:
             if self._is_unknown and now_s >= ask_s:
-                self._stream.write(ASK_CONFIGURATION + ASK_SERIAL_NUMBER)
+                self._stream.write(ASK_CONFIGURATION + ASK_SERIAL_NUMBER + ASK_BIAS_TRIM)
+                self._questions += 1
                 ask_s = now_s + ASK_EVERY_S
             self._clock.sleep(FRESH_PERIODS / self.sample_rate_hz)
             data = self._stream.read_available()
@@ -181,8 +190,9 @@ class Stim300:
 
     @property
     def _is_unknown(self) -> bool:
-        """Whether the unit has yet to report its configuration and serial number."""
-        return self.options.ask and (self._set is None or self._serial is None)
+        """Whether the unit has yet to report its configuration, serial number and, if it knows it, bias trim offset."""
+        trim = self._trim_dps is None and self._questions < TRIM_QUESTIONS
+        return self.options.ask and (self._set is None or self._serial is None or trim)
 
     def _hear(self, special: bytes) -> None:
         """Take in what the unit says of itself; raises WrongInstrument where its bench file says otherwise."""
@@ -198,6 +208,8 @@ class Stim300:
         elif (serial := parse_serial_number(special)) is not None:
             self._refuse_other_unit(serial)
             self._serial = serial
+        elif (trim_dps := parse_bias_trim(special)) is not None:
+            self._trim_dps = trim_dps
 
     def _refuse_other_unit(self, serial: str) -> None:
         settings = self.settings
@@ -220,7 +232,14 @@ class Stim300:
         reported = {} if self._serial is None else {"serial": self._serial}
         if self._set is not None:
             unit = f"{self._set.unit}, delayed" if self._set.is_delayed else self._set.unit
-            reported |= {"firmware": str(self._set.firmware), "revision": self._set.revision, "output_unit": unit}
+            reported |= {
+                "firmware": str(self._set.firmware), "revision": self._set.revision, "output_unit": unit,
+                "filter_hz": " ".join(self._set.filters_hz), "g_compensation": self._set.g_compensation,
+                "range_dps": " ".join(self._set.ranges_dps), "datagram": f"0x{self.options.datagram:02X}",
+                "sample_rate_hz": str(self._set.sample_rate_hz or "external trigger"),
+            }  # fmt: skip
+        if self._trim_dps is not None:
+            reported["bias_trim_dps"] = " ".join(f"{each:.5g}" for each in self._trim_dps)
         return reported
 
     def _decode(self, data: bytes) -> Readings:

@@ -15,6 +15,7 @@ from labctl.exports.c_code.orientation import orientation_body
 from labctl.exports.c_code.rounding import rounding_line
 from labctl.exports.c_code.sine import sine_body
 from labctl.exports.c_code.tables import c_table
+from labctl.exports.comments import configuration_lines
 from labctl.exports.format import Format
 from labctl.exports.uncertainty_bound import bound_constant, bound_lines
 from labctl.fitting.models.matrix_form import LINEAR as LINEAR_EFFECTS
@@ -216,7 +217,9 @@ def _head(name: str, calibration: Calibration) -> str:
         guard=f"LABCTL_{name}_V{calibration.version}_{calibration.calibration_hash[:GUARD_DIGITS]}_H",
         name=name,
         axes=len(calibration.axes),
-        uncertainty="".join(f" * {_in_comment(line)}\n" for line in bound_lines(calibration))
+        uncertainty="".join(
+            f" * {_in_comment(line)}\n" for line in [*configuration_lines(calibration), *bound_lines(calibration)]
+        )
         + force_head(name, calibration.force_sensitivity),
         rounding=rounding_line(calibration),
         bound=bound_constant(name, calibration),

@@ -26,6 +26,7 @@ def head_lines(
         f"Hash of the calibration: {calibration.calibration_hash}",
         f"Calibrated from {low:g} to {high:g} deg C and from {slow:g} to {fast:g} deg/s.",
         f"Carries: {carries}.",
+        *configuration_lines(calibration),
     ]
     if differs_dps is not None:
         lines.append(
@@ -35,6 +36,12 @@ def head_lines(
     lines += [plain(line) for line in bound_lines(calibration)]
     lines += [f"LOST {loss.text}." for loss in losses]
     return lines + list(notes)
+
+
+def configuration_lines(calibration: Calibration) -> list[str]:
+    """Return the line that says how the unit was set when it was measured; none where it does not say that."""
+    said = "; ".join(f"{name} = {value}" for name, value in calibration.configuration.items())
+    return [plain(f"The unit was set to: {said}.")] if said else []
 
 
 def commented(lines: Iterable[str], sign: str = "# ") -> str:

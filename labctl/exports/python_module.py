@@ -52,6 +52,7 @@ def write(calibration: Calibration) -> Written:
         "version": calibration.version,
         "hash": calibration.calibration_hash,
         "model": calibration.fitted.model.name,
+        **({"configuration": calibration.configuration} if calibration.configuration else {}),
         "axes": list(calibration.axes),
         "temperature_c": [_limit(low), _limit(high)],
         "inside_c": [_limit(low - MARGIN_C), _limit(high + MARGIN_C)],

@@ -98,6 +98,7 @@ class CalibrationJson(TypedDict):
     standards: NotRequired[BenchConditionsJson]
     uncertainty: NotRequired[UncertaintyJson | None]
     poses: NotRequired[PosesJson]
+    configuration: NotRequired[dict[str, str]]  #: how the unit was set, as it said itself; absent where it says nothing
     provenance: dict[str, object]
     how_to_use: str
     hash: str

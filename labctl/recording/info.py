@@ -120,6 +120,8 @@ class RecordingInfo(BaseModel):
     output: dict[Axis, OutputUnit] = Field(default_factory=dict)
     #: Reference standards of the bench, as they were when the readings were taken.
     standards: tuple[Standard, ...] = ()
+    #: How the unit was set, as it said itself: filter, range, firmware; empty where it says nothing.
+    configuration: dict[str, str] = Field(default_factory=dict)
     thermometer: str = ""  #: the instrument that `temperature_c` is by; empty: the unit's own, or the chamber's
 
     def datasheet_figure(self, name: str) -> DatasheetFigure | None:

@@ -26,6 +26,9 @@ class Bench(Protocol):
     @property
     def references(self) -> Mapping[str, Reference]: ...
 
+    @property
+    def configurations(self) -> Mapping[str, Mapping[str, str]]: ...  # unit -> how it is to be set
+
 
 class MonitoredBench(Protocol):
     """What is watched of a bench: the chamber, where it has one, references, and the units that take part."""

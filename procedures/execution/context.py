@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 from instruments.clock import Clock
-from instruments.errors import InstrumentError
+from instruments.configuration import changed, configuration_of
+from instruments.errors import InstrumentError, WrongInstrument
 from procedures.contracts.bench import Bench
 from procedures.contracts.control import Control
 from procedures.contracts.journal import Event
@@ -44,6 +45,7 @@ class ExecutionContext:
     unchecked: list[int] = field(default_factory=list)  #: data sets since home was last found where it was left
     warned_of_rate: bool = False  #: whether it was said that the table does not turn as commanded
     _prompts: int = field(default=0, repr=False)
+    _set: dict[str, dict[str, str]] = field(default_factory=dict, repr=False)  #: unit -> how it was set so far
 
     def poll(self, *, read_latest: bool = True) -> None:
         """Poll the bench once. Raises GuardTripped for a limit that does more than warn, and InstrumentError."""
@@ -74,6 +76,18 @@ class ExecutionContext:
         self.recorder.tracker.update(dropped=dict(self.bench.dropped))
         text = f"{gyro} is excluded from the rest of the campaign: {reason}"
         self.recorder.event(Event("unit_dropped", text, level="error", device=gyro))
+
+    def require_same_settings(self, gyro: str, reported: Mapping[str, str]) -> None:
+        """Raise WrongInstrument where a unit is set otherwise than in the campaign so far, or than it is to be."""
+        before = self._set.get(gyro) or self.full_bench.configurations.get(gyro, {})
+        if found := changed(before, reported):
+            said = ", ".join(f"{name} was {was} and is {now}" for name, (was, now) in found.items())
+            raise WrongInstrument(
+                gyro,
+                f"the unit is set otherwise than before: {said}. What was not saved in the unit is lost when it is "
+                "switched off: set it as it was, save that, and resume the campaign",
+            )
+        self._set[gyro] = {**before, **configuration_of(reported)}
 
     def notice_leaving(self, _t_s: float, chamber_c: float, _gyro_c: object) -> None:
         """Note that a soaked temperature no longer holds, once the air has left its band."""

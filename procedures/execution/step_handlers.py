@@ -73,7 +73,7 @@ def open_streams(context: ExecutionContext, run: int, *, dropping: bool = True) 
 def _open_stream(context: ExecutionContext, gyro: Gyro) -> None:
     for pause_s in (*STARTING_PAUSES_S, None):
         try:
-            gyro.identify()
+            context.require_same_settings(gyro.name, gyro.identify().reported)
             gyro.start()
         except LinkError:
             if pause_s is None:

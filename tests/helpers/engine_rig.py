@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from types import SimpleNamespace
 from typing import Any
 
@@ -22,6 +22,7 @@ class Rig:
     """A fake bench with everything an engine needs."""
 
     limits = BenchLimits(TABLE, CHAMBER, {"imu": UNIT})
+    configurations: Mapping[str, Mapping[str, str]] = {}
 
     def __init__(self, gyros: tuple[str, ...] = ("imu",)) -> None:
         self.clock = VirtualClock()

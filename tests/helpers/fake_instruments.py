@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -141,10 +141,11 @@ class FakeGyro(Fake):
     silent = False
     lag_c = 0.0
     started = False
+    reported: Mapping[str, str] = {}
 
     def identify(self) -> GyroIdentity:
         self.called("identify")
-        return GyroIdentity("0001", "fake")
+        return GyroIdentity("0001", "fake", reported=self.reported)
 
     def start(self) -> None:
         self.called("start")

@@ -147,7 +147,7 @@ def _special(identifier: int, length: int, *, crlf: bool) -> Layout:
     return Layout(identifier, length, -(length - CRC_BYTES) % 4, 0, None, None, crlf)
 
 
-SERIAL_NUMBER, CONFIGURATION = (0xB5, 0xB7), (0xBC, 0xBD)  #: without and with CR LF
+SERIAL_NUMBER, CONFIGURATION, BIAS_TRIM = (0xB5, 0xB7), (0xBC, 0xBD), (0xD1, 0xD2)  #: without and with CR LF
 #: Datagrams that a unit sends once at its start or when it is asked: part and serial number, configuration, bias trim
 #: offset, extended error information. The second identifier of each stands for the one with CR LF.
 SPECIALS = {
@@ -156,7 +156,7 @@ SPECIALS = {
         ((0xB1, 0xB3), 20),
         (SERIAL_NUMBER, 20),
         (CONFIGURATION, 26),
-        ((0xD1, 0xD2), 40),
+        (BIAS_TRIM, 40),
         ((0xBE, 0xBF), 21),
     )
     for identifier, crlf in zip(identifiers, (False, True), strict=True)

@@ -1,7 +1,7 @@
 """A simulated STIM300: one datagram per sampling interval from power-on, whether or not the port is read.
 
-It answers the commands C, I and R of the normal mode, and may be set otherwise than its bench file says: keys `device`
-of its table in [simulation.units].
+It answers the commands C, I, T and R of the normal mode, and may be set otherwise than its bench file says: keys
+`device` of its table in [simulation.units].
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from pydantic import ValidationError
 
 from instruments.bench_config import GyroSettings, Strict, part_of
 from instruments.protocols.stim300.datagrams import (
+    ASK_BIAS_TRIM,
     ASK_CONFIGURATION,
     ASK_SERIAL_NUMBER,
     RESET,
@@ -22,6 +23,7 @@ from instruments.protocols.stim300.datagrams import (
     SERIAL_PATTERN,
     Configuration,
     OutputUnit,
+    bias_trim_frame,
     configuration_frame,
     content_of_datagram,
     serial_number_frame,
@@ -56,6 +58,9 @@ class DeviceSettings(Strict):
     crlf: bool | None = None
     sample_rate_hz: Literal[125, 250, 500, 1000, 2000] | None = None
     output_unit: OutputUnit = "rate"
+    filter_hz: Literal[16, 33, 66, 131, 262] = 262  #: what it says; its readings do not change with it
+    g_compensation: str = "off"
+    bias_trim_dps: tuple[float, float, float] | None = (0.0, 0.0, 0.0)  #: None: older firmware, which has none
     serial: str | None = None  #: N and 14 digits
     mute: bool = False  #: no wire leads to its receiver: it answers nothing
 
@@ -114,11 +119,14 @@ class SimulatedStim300:
         configuration = Configuration(
             REVISION, FIRMWARE, set_hz if set_hz in SAMPLE_RATES_HZ else None, content, options.crlf,
             options.baudrate, options.stop_bits, options.parity, "xyz", device.output_unit, False, has_pps, 10,
+            (str(device.filter_hz),) * 3, device.g_compensation,
         )  # fmt: skip
         self._says = {
             ASK_CONFIGURATION: configuration_frame(configuration),
             ASK_SERIAL_NUMBER: serial_number_frame(device.serial or _serial_of(setup.gyro), crlf=options.crlf),
         }
+        if device.bias_trim_dps is not None:
+            self._says[ASK_BIAS_TRIM] = bias_trim_frame(device.bias_trim_dps, crlf=options.crlf)
 
     def receive(self, data: bytes, t_s: float) -> None:
         """Take the commands of the normal mode; one that is not known has no reply."""

@@ -12,7 +12,8 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
-from instruments.bench_config import BenchFile, DeviceSettings
+from instruments.bench_config import BenchFile, DeviceSettings, GyroSettings
+from instruments.configuration import changed, configuration_of, not_as_stated
 from instruments.transport.adapters import adapter_of
 from labctl.errors import Conflict
 from labctl.store import CampaignRow, Store
@@ -47,8 +48,18 @@ def pinned(bench: BenchFile, reported: Reported) -> BenchFile:
     return bench.model_copy(update={**fixed, **named})
 
 
+def refuse_otherwise_set(bench: BenchFile, reported: Reported) -> None:
+    """Raise Conflict where a unit is not set as its bench file states."""
+    for gyro in bench.gyros:
+        if said := not_as_stated(gyro.configuration, reported.get(gyro.name, {})):
+            raise Conflict(
+                f"{gyro.name}: unit {gyro.serial} is not set as the bench file states: {'; '.join(said)}; set the unit "
+                "so, or correct `configuration` in its section of the bench file"
+            )
+
+
 def refuse_changed(store: Store, bench: BenchFile, reported: Reported) -> None:
-    """Raise Conflict where an instrument is another one than in the campaign before, and no bench file says so."""
+    """Raise Conflict where an instrument is another one, or set otherwise, than before, and no bench file says so."""
     for gyro in bench.gyros:
         before = store.campaigns.newest_of_unit(gyro.serial)
         if before is None:
@@ -60,12 +71,28 @@ def refuse_changed(store: Store, bench: BenchFile, reported: Reported) -> None:
                 raise Conflict(_other_unit(gyro.name, gyro.serial, (was, found), before))
         elif before.bench_name == bench.name:
             _refuse_other_adapter(gyro.name, gyro, then, now, before)
+        if then.get(OWN) == now.get(OWN):
+            _refuse_other_settings(gyro, then, now, before)
     before = store.campaigns.newest_on_bench(bench.name)
     gyros = {gyro.name for gyro in bench.gyros}
     for name, section in bench.sections.items():
         if before is None or name in gyros:
             continue
         _refuse_other_adapter(name, section, _reported_then(before, name), reported.get(name, {}), before)
+
+
+def _refuse_other_settings(
+    gyro: GyroSettings, then: Mapping[str, str], now: Mapping[str, str], before: CampaignRow
+) -> None:
+    found = {name: both for name, both in changed(then, now).items() if name not in gyro.configuration}
+    if found:
+        said = ", ".join(f"{name} was {was} and is {new}" for name, (was, new) in found.items())
+        stated = ", ".join(f'{name} = "{new}"' for name, (_, new) in found.items())
+        raise Conflict(
+            f"{gyro.name}: unit {gyro.serial} is set otherwise than in campaign {before.id}: {said}. Its calibration "
+            "may not hold so. Set the unit as it was; or, if this is meant, state it in the section of the unit in the "
+            f"bench file: configuration = {{ {stated} }}"
+        )
 
 
 def _refuse_other_adapter(
@@ -110,8 +137,10 @@ def _reported_then(before: CampaignRow, name: str) -> Mapping[str, str]:
 
 
 def _pinned(section: DeviceSettings, reported: Mapping[str, str]) -> DeviceSettings:
-    known = {"adapter": reported.get(ADAPTER)}
-    if "own_serial" in type(section).model_fields:
+    known: dict[str, object] = {"adapter": reported.get(ADAPTER)}
+    if isinstance(section, GyroSettings):
         known["own_serial"] = reported.get(OWN)
     update = {key: value for key, value in known.items() if value and getattr(section, key) is None}
+    if isinstance(section, GyroSettings):
+        update["configuration"] = configuration_of(reported) | section.configuration
     return section.model_copy(update=update)

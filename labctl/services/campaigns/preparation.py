@@ -9,6 +9,7 @@ from datetime import datetime
 from instruments.bench import Bench, open_bench
 from instruments.bench_config import BenchFile, SimulationSettings
 from instruments.clock import VIRTUAL_START, Clock, PacedClock, ScaledClock, SystemClock
+from instruments.configuration import configuration_of
 from instruments.drivers.unit_handlers import ManualUnitHandler
 from instruments.errors import InstrumentError
 from instruments.interfaces.gyro import Gyro, GyroIdentity
@@ -20,7 +21,7 @@ from labctl.json_types.recordings import RawChannelJson
 from labctl.log import get_logger
 from labctl.recording import RecordingInfo
 from labctl.services.benches.confirmation import describe_bench
-from labctl.services.benches.identity import refuse_changed, reported_of
+from labctl.services.benches.identity import refuse_changed, refuse_otherwise_set, reported_of
 from labctl.services.benches.power_failure import boot_id
 from labctl.services.benches.reference_columns import (
     raw_channel,
@@ -206,6 +207,7 @@ def _log_planned(number: int, bench: BenchFile, plan: Plan, units: tuple[NewUnit
 def _with_reported(store: Store, bench: BenchFile, identities: Mapping[str, GyroIdentity]) -> BenchFile:
     """Return a bench with what its instruments say of themselves; raises Conflict where one is not the known one."""
     reported = reported_of(bench, {name: found.reported for name, found in identities.items()})
+    refuse_otherwise_set(bench, reported)
     refuse_changed(store, bench, reported)
     return bench.model_copy(update={"reported": reported})
 
@@ -279,6 +281,7 @@ def _unit(
             "output": {axis: dict(unit) for axis, unit in identity.output.items()},
             "standards": standards,
             "thermometer": temperature_instrument(bench),
+            "configuration": configuration_of(identity.reported),
         }
     )
     channels = tuple(raw_channel(channel) for channel in gyro.channels)

@@ -8,13 +8,14 @@ from functools import cached_property
 
 import numpy as np
 
+from instruments.configuration import changed
 from labctl.errors import BadInput
 from labctl.fitting.data.covered import Covered
 from labctl.fitting.data.fit_data import refuse_poses
 from labctl.fitting.data.joined import joined_coverage, joined_recording
 from labctl.progress import report_stage
 from labctl.recording import Recording
-from labctl.recording.info import GIVE_DATE, measured_at
+from labctl.recording.info import GIVE_DATE, RecordingInfo, measured_at
 from labctl.recording.output_steps import per_reading, quantisation_of
 from labctl.services.criticism.decimated_readings import Decimated, decimated_columns_of, is_decimated
 from labctl.services.recordings.coverage import covered_of
@@ -96,7 +97,7 @@ class Measurements:
             )
             for n, found in found_in.items()
             for warning in found
-        ] + list(undated_warnings(self.rows))
+        ] + [*undated_warnings(self.rows), *other_settings_warnings(self.rows)]
 
     @property
     def covered(self) -> Covered | None:
@@ -142,6 +143,21 @@ def undated_warnings(rows: Sequence[RecordingRow]) -> Iterator[DataWarning]:
         expected="a date of measurement of each recording", do=GIVE_DATE,
         text=f"{said}, and no trend over the recordings is looked for; {GIVE_DATE}",
     )  # fmt: skip
+
+
+def other_settings_warnings(rows: Sequence[RecordingRow]) -> Iterator[DataWarning]:
+    """Yield that the unit was set otherwise in one of several recordings than in the first one that says how."""
+    known = [(row.id, RecordingInfo.model_validate(row.info).configuration) for row in rows]
+    first, *others = [each for each in known if each[1]] or [(0, {})]
+    for number, found in others:
+        if differs := changed(first[1], found):
+            said = ", ".join(f"{name} was {was} and is {now}" for name, (was, now) in differs.items())
+            text = f"the unit is set otherwise than in recording {first[0]}: {said}"
+            do = "fit the recordings of each setting by themselves"
+            yield DataWarning(
+                what="configuration", severity="likely", where=f"recording {number}", said=text, value=None, unit="",
+                expected="one setting of the unit", do=do, text=f"recording {number}: {text}; {do}",
+            )  # fmt: skip
 
 
 def recordings_text(recordings: tuple[int, ...]) -> str:

@@ -11,6 +11,7 @@ from pydantic import ValidationError
 from instruments.bench import open_bench
 from instruments.bench_config import BenchFile
 from instruments.clock import Clock
+from instruments.configuration import configuration_of
 from instruments.interfaces.gyro import Readings
 from instruments.simulation import lay_simulated
 from labctl.errors import BadInput
@@ -61,6 +62,7 @@ class GyroSource:
             "technology": identity.technology or None, "datasheet": dict(identity.datasheet),
             "datasheet_conventions": conventions,
             "output": {axis: dict(unit) for axis, unit in identity.output.items()},
+            "configuration": configuration_of(identity.reported),
             "standards": standards_of(self._bench_file), "notes": "turned by hand, live",
         })  # fmt: skip
 

@@ -217,7 +217,7 @@ def test_the_driver_speaks_over_a_real_socket(served: tuple[str, int]) -> None:
     try:
         assert "Acutrol3000" in bench.table.identify()
         assert not bench.table.is_moving()
-        assert bench.table.angle_deg() == pytest.approx(0.0, abs=0.01)
+        assert (bench.table.angle_deg() + 180.0) % 360.0 == pytest.approx(180.0, abs=0.01)
     finally:
         bench.close()
 

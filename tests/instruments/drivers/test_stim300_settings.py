@@ -91,7 +91,15 @@ def test_the_unit_says_who_it_is(stand: Make) -> None:
     assert found.serial == "STIM-0001"
     assert found.reported == {
         "serial": "N25582405002002", "firmware": "12", "revision": "K", "output_unit": "rate",
+        "filter_hz": "262 262 262", "g_compensation": "off", "range_dps": "400 400 400", "datagram": "0x94",
+        "sample_rate_hz": "125", "bias_trim_dps": "0 0 0",
     }  # fmt: skip
+
+
+def test_older_firmware_without_a_bias_trim_is_not_waited_for(stand: Make) -> None:
+    found = unit(stand, {"bias_trim_dps": None, "filter_hz": 16}).gyro.identify()
+    assert "bias_trim_dps" not in found.reported
+    assert found.reported["filter_hz"] == "16 16 16"
 
 
 @pytest.mark.parametrize("written", ["N25582405002002", "25582405002002"])

@@ -8,7 +8,9 @@ import pytest
 
 from instruments.protocols.stim300.datagrams import (
     Configuration,
+    bias_trim_frame,
     configuration_frame,
+    parse_bias_trim,
     parse_configuration,
     parse_serial_number,
     serial_number_frame,
@@ -37,9 +39,38 @@ def test_lengths_and_padding_are_those_of_the_data_sheet() -> None:
 def test_a_configuration_by_hand() -> None:
     frame = BY_HAND + crc32_mpeg2(BY_HAND + bytes(2)).to_bytes(4, "big")
     assert parse_configuration(frame) == Configuration(
-        "K", 12, 2000, Content(True, True, True, True), True, 921_600, 2, "even", "xyz", "average", True, True, 5
-    )
+        "K", 12, 2000, Content(True, True, True, True), True, 921_600, 2, "even", "xyz", "average", True, True, 5,
+        ("262", "262", "16"),
+    )  # fmt: skip
     assert parse_serial_number(frame) is None
+
+
+@pytest.mark.parametrize(
+    ("byte_6", "byte_7", "filters_hz", "g_compensation"),
+    [
+        (0x01, 0x20, ("16", "33", "66"), "off"),
+        (0x34, 0x41, ("131", "262", "262"), "scale by accelerometer"),
+        (0x44, 0x4B, ("262", "262", "262"), "bias and scale by accelerometer, 0.01 Hz"),
+        (0x54, 0x4D, ("code 5", "262", "262"), "code 13"),
+    ],
+)
+def test_filters_and_compensation_by_hand(
+    byte_6: int, byte_7: int, filters_hz: tuple[str, ...], g_compensation: str
+) -> None:
+    body = BY_HAND[:6] + bytes([byte_6, byte_7]) + BY_HAND[8:]
+    found = parse_configuration(body + crc32_mpeg2(body + bytes(2)).to_bytes(4, "big"))
+    assert found is not None
+    assert (found.filters_hz, found.g_compensation, found.ranges_dps) == (filters_hz, g_compensation, ("400",) * 3)
+
+
+def test_a_bias_trim_by_hand() -> None:
+    """The offsets of figure 8-1 to the digits that it prints: 0.02343, -0.01222 and 0.00111 deg/s."""
+    body = bytes.fromhex("d1 000180 ffff38 000012") + bytes(26)
+    trim_dps = parse_bias_trim(body + crc32_mpeg2(body).to_bytes(4, "big"))
+    assert trim_dps == pytest.approx((0.02343, -0.01222, 0.00111), abs=1.5e-5)
+    assert trim_dps is not None
+    assert bias_trim_frame(trim_dps, crlf=False)[:36] == body
+    assert parse_bias_trim(BY_HAND) is None
 
 
 @pytest.mark.parametrize("rate_hz", [125, 250, 500, 1000, 2000, None])

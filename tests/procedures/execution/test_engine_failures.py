@@ -56,6 +56,21 @@ def test_a_device_that_fails_for_good_ends_the_campaign_safely(
         assert {state for _, state, _ in rig.journal.closed} == {"partial"}
 
 
+@pytest.mark.parametrize("filter_hz", ["16", "262", None])
+def test_a_unit_that_comes_back_set_otherwise_is_not_measured_on(rig: Any, filter_hz: str | None) -> None:
+    """What was not saved in it is lost when it is switched off; what it does not say is not compared."""
+    rig.configurations = {"imu": {"filter_hz": "262"}}
+    rig.gyros["imu"].reported = {"serial": "N1", "firmware": "12"} | ({"filter_hz": filter_hz} if filter_hz else {})
+    outcome = rig.run()
+    if filter_hz != "16":
+        assert outcome.state == CampaignState.DONE
+        return
+    assert outcome.state == CampaignState.FAILED
+    assert "imu: the unit is set otherwise than before: filter_hz was 262 and is 16." in outcome.reason
+    assert not rig.table.moving
+    assert rig.journal.closed == []
+
+
 @pytest.mark.parametrize(("kind", "name", "method"), CALLS)
 def test_ctrl_c_anywhere_leaves_the_bench_safe(rig: Any, kind: str, name: str, method: str) -> None:
     rig.when_step(kind, lambda: device(rig, name).fail(method, KeyboardInterrupt(), times=1))

@@ -21,6 +21,11 @@ from labctl.services.planning.loading import load_bench
 from labctl.services.schemas.campaigns import ResumeRequest
 from labctl.store import Store, open_store
 
+#: How a simulated unit is set.
+SET = {
+    "firmware": "12", "revision": "K", "output_unit": "rate", "filter_hz": "262 262 262", "g_compensation": "off",
+    "range_dps": "400 400 400", "datagram": "0x94", "sample_rate_hz": "125", "bias_trim_dps": "0 0 0",
+}  # fmt: skip
 OWN = {"a": "N25580000000001", "b": "N25580000000002"}
 
 
@@ -66,9 +71,9 @@ def with_gyro(bench: BenchFile, name: str, **changes: Any) -> BenchFile:
 def test_what_units_say_is_kept_and_shown(store: Store, capsys: pytest.CaptureFixture[str]) -> None:
     begin(store, stims())
     answer = campaign_status(store, 1)
-    assert answer.reported["a"] == {
-        "serial": OWN["a"], "firmware": "12", "revision": "K", "output_unit": "rate",
-    }  # fmt: skip
+    assert answer.reported["a"] == {"serial": OWN["a"], **SET}
+    (recording,) = [each for each in store.recordings.of_unit("UNIT-A") if each.info]
+    assert recording.info["configuration"] == SET
     print_campaign(answer)
     assert f"a says: serial {OWN['a']}, firmware 12, revision K, output unit rate" in capsys.readouterr().out
 
@@ -99,6 +104,51 @@ def test_a_bench_file_that_names_another_unit_than_answers_is_refused(store: Sto
         WrongInstrument, match=f"has serial number {OWN['a']}, but the bench file or the campaign names N1; connect"
     ):
         begin(store, with_gyro(stims(), "a", own_serial="N1"))
+
+
+def set_otherwise(**device: Any) -> BenchFile:
+    """The two units, of which `a` is set otherwise."""
+    bench = stims()
+    assert bench.simulation is not None
+    units = bench.simulation.units
+    units["a"]["device"] = {**units["a"]["device"], **device}  # type: ignore[dict-item]
+    return bench
+
+
+@pytest.mark.parametrize(
+    ("device", "said", "stated"),
+    [
+        ({"filter_hz": 16}, "filter_hz was 262 262 262 and is 16 16 16", {"filter_hz": "16 16 16"}),
+        (
+            {"g_compensation": "scale by accelerometer"},
+            "g_compensation was off and is scale by accelerometer",
+            {"g_compensation": "scale by accelerometer"},
+        ),
+        ({"bias_trim_dps": (0.5, 0.0, 0.0)}, "bias_trim_dps was 0 0 0 and is 0.5 0 0", {"bias_trim_dps": "0.5 0 0"}),
+    ],
+)
+def test_a_unit_that_is_set_otherwise_than_before_is_refused_until_the_bench_file_states_it(
+    store: Store, device: dict[str, Any], said: str, stated: dict[str, str]
+) -> None:
+    begin(store, stims())
+    ((name, value),) = stated.items()
+    with pytest.raises(Conflict) as told:
+        begin(store, set_otherwise(**device))
+    assert str(told.value) == (
+        f"a: unit UNIT-A is set otherwise than in campaign 1: {said}. Its calibration may not hold so. Set the unit as "
+        "it was; or, if this is meant, state it in the section of the unit in the bench file: "
+        f'configuration = {{ {name} = "{value}" }}'
+    )
+    begin(store, with_gyro(set_otherwise(**device), "a", configuration=stated))
+    with pytest.raises(Conflict, match=rf"is not set as the bench file states: {name} is .* instead of "):
+        begin(store, with_gyro(stims(), "a", configuration=stated))
+
+
+def test_what_a_unit_of_older_firmware_does_not_say_is_not_compared(store: Store) -> None:
+    begin(store, stims())
+    begin(store, set_otherwise(bias_trim_dps=None))
+    with pytest.raises(Conflict, match=r"states: it does not report bias_trim_dps \(0 0 0\); set the unit so"):
+        begin(store, with_gyro(set_otherwise(bias_trim_dps=None), "a", configuration={"bias_trim_dps": "0 0 0"}))
 
 
 def fog(**changes: Any) -> BenchFile:
