@@ -39,6 +39,7 @@ from instruments.transport.factory import Ports
 from instruments.transport.sample_counter import SampleCounter
 from instruments.transport.sample_timing import FRESH_PERIODS, StreamTime, refuse_other_rate
 from instruments.transport.serial_stream import SerialStream, line_of
+from instruments.transport.stream_period import OF_A_CRYSTAL
 
 SILENCE_S = 2.0
 COUNTER_WRAP = 256
@@ -79,7 +80,7 @@ class Stim300:
         self._counter = SampleCounter(
             self.name, settings.port, step=round(COUNTS_PER_S / self.sample_rate_hz), wrap=COUNTER_WRAP
         )
-        self._time = StreamTime(1.0 / self.sample_rate_hz, 0.0)
+        self._time = StreamTime(1.0 / self.sample_rate_hz, 0.0, OF_A_CRYSTAL)
         self._last_frame_s = 0.0
         self._set: Configuration | None = None  # as the unit says
         self._serial: str | None = None
@@ -117,7 +118,7 @@ class Stim300:
         self._questions = 0
         self._discard()
         self._last_frame_s = self._clock.now_s()
-        self._time = StreamTime(1.0 / self.sample_rate_hz, self._last_frame_s)
+        self._time = StreamTime(1.0 / self.sample_rate_hz, self._last_frame_s, OF_A_CRYSTAL)
 
     def read(self, duration_s: float) -> Readings:
         """Get every reading of the next `duration_s` seconds; fewer where the stream has gaps.

@@ -24,12 +24,12 @@ SAME_PHASE = 0.25
 class StreamTime:
     """Times of a stream of evenly spaced readings, strictly rising.
 
-    `period_s` is the nominal period, s; the device's own is estimated from the arrivals of its readings. `now_s` is
-    when the port was emptied before the first of them.
+    `period_s` is the nominal period, s; the device's own is estimated from the arrivals of its readings, and may differ
+    by the share `tolerance`. `now_s` is when the port was emptied before the first of them.
     """
 
-    def __init__(self, period_s: float, now_s: float) -> None:
-        self._line = PeriodLine(period_s)
+    def __init__(self, period_s: float, now_s: float, tolerance: float = TOLERANCE) -> None:
+        self._line = PeriodLine(period_s, tolerance)
         self._anchor_s = now_s
         self._index = -1
         self._started = False
@@ -144,5 +144,5 @@ def refuse_other_rate(device: str, port: str | None, line: PeriodLine) -> None:
         raise WrongInstrument(
             device,
             f"sends {1 / period_s:.4g} readings/s on {port}, but the bench file says {1 / line.nominal_s:.4g}, limit "
-            f"+-{100 * TOLERANCE:g} %; set sample_rate_hz = {1 / period_s:.4g} or configure the unit",
+            f"+-{100 * line.tolerance:g} %; set sample_rate_hz = {1 / period_s:.4g} or configure the unit",
         )

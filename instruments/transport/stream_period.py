@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import math
 
-#: Largest share by which the rate of a device may differ from the one in the bench file.
-TOLERANCE = 0.04
+#: Largest share by which the rate of a device may differ from the one in the bench file, where its driver states none,
+#: and where a quartz crystal drives the device: many times what one is off, so that it is another rate.
+TOLERANCE, OF_A_CRYSTAL = 0.04, 0.005
 #: Before anything was measured the period may be off by this share: a wrong bench file is distinguished from losses.
 UNKNOWN = 0.5
 #: A period that is known to this share, from so many points, is measured.
@@ -28,8 +29,9 @@ OFF_LINE = 2.0
 class PeriodLine:
     """Estimate of one period, s. The nominal period stands until the arrivals exclude it."""
 
-    def __init__(self, nominal_s: float) -> None:
+    def __init__(self, nominal_s: float, tolerance: float = TOLERANCE) -> None:
         self.nominal_s = nominal_s
+        self.tolerance = tolerance
         self._weight = self._mean_x = self._mean_z = 0.0  # of the present stretch
         self._last_s = 0.0
         self._forget()
@@ -57,10 +59,10 @@ class PeriodLine:
 
     @property
     def is_outside_tolerance(self) -> bool:
-        """Whether the arrivals exclude every rate within TOLERANCE of the nominal one."""
+        """Whether the arrivals exclude every rate within the tolerance of the nominal one."""
         if (period_s := self.measured_s) is None:
             return False
-        return abs(self.nominal_s / period_s - 1.0) > TOLERANCE + self._bound_s / period_s
+        return abs(self.nominal_s / period_s - 1.0) > self.tolerance + self._bound_s / period_s
 
     def restart(self) -> None:
         """Begin a new stretch: the number of the next reading is not known."""

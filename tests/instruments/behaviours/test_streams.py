@@ -165,6 +165,7 @@ BROKE = (
 
 def of_each(driver: str) -> list[Behaviour]:
     """Return what the device of any stream may do."""
+    within_ppm, beyond_ppm = (3e3, 2.8e4) if driver == STIM else (3e4, 8e4)  # a crystal, and what a manual allows
     mute, strange = (NoReply, WHERE[driver].format(NOTHING)), (NoReply, WHERE[driver].format(STRANGE))
     return [
         Behaviour(driver, "mute", through(lambda data, _: b""), mute),
@@ -177,11 +178,12 @@ def of_each(driver: str) -> list[Behaviour]:
         Behaviour(driver, "byte by byte", lambda wire: Late(wire, 0.0, 1, 1e-5), gives=told),
         Behaviour(driver, "half a second late", lambda wire: Late(wire, 0.5), gives=told),
         Behaviour(driver, "echo of what is sent", Echo, gives=lambda found: told(found) and found.damaged <= 1),
-        Behaviour(driver, "clock 3 % fast", gives=lambda found: found.lost == 0, changes=clock_off(3e4)),
+        Behaviour(driver, f"clock {within_ppm / 1e4:g} % fast", gives=lambda found: found.lost == 0,
+                  changes=clock_off(within_ppm)),
         Behaviour(
-            driver, "clock 8 % fast", None,
+            driver, f"clock {beyond_ppm / 1e4:g} % fast", None,
             (WrongInstrument, r"sends [\d.]+ readings/s on sim://\S+, but the bench file says .*; set sample_rate_hz"),
-            changes=clock_off(8e4),
+            changes=clock_off(beyond_ppm),
         ),
         Behaviour(driver, "switched off for 1.5 s", Reset, gives=told),
         Behaviour(
