@@ -24,6 +24,8 @@ class ChamberState:
     temperature_c: float
     setpoint_c: float
     alarms: tuple[str, ...] = ()
+    given_c: float | None = None  #: the set point that labctl gave last; None before it did
+    foreign: tuple[str, ...] = ()  #: what somebody else has changed since then, in words
 
 
 class Chamber(Protocol):

@@ -42,7 +42,8 @@ def _wait_for_answer(context: ExecutionContext, prompt: Prompt, meanwhile: Calla
     recorder.tracker.update(prompt=prompt)
     recorder.change_state(CampaignState.WAITING, prompt.text)
     try:
-        answer = _poll_until_answered(context, prompt, meanwhile)
+        with context.monitor.attended():
+            answer = _poll_until_answered(context, prompt, meanwhile)
     finally:
         context.operator.withdraw(prompt.id)
         recorder.tracker.update(prompt=None)

@@ -122,6 +122,7 @@ def move_chamber(context: ExecutionContext, step: MoveChamber) -> Figures:
     """Write the set point and wait until the air is in the band. Raises SoakFailed when it does not arrive in time."""
     context.soaked = None
     set_c = context.bench.chamber.set_temperature_c(step.temperature_c)
+    context.given_c = step.temperature_c
     half_step_c = context.bench.chamber.limits.resolution_c / 2
     if abs(set_c - step.temperature_c) > half_step_c + 1e-6:
         raise StepFailed(
@@ -162,7 +163,7 @@ def soak(context: ExecutionContext, step: Soak) -> Figures:
 
 def _unsettled(context: ExecutionContext, step: Soak, judge: SoakCriterion, took_s: float) -> None:
     """Do what the recipe says about a soak that does not settle. Raises SoakFailed or GuardTripped, or warns."""
-    action = context.recipe.guards.actions.get("soak", "fail")
+    action = context.recipe.guards.action_of("soak")
     reason = f"the soak at {step.temperature_c:g} deg C did not settle within {step.timeout_s:g} s: {judge.why_not()}"
     level = "warning" if action == "warn" else "error"
     context.recorder.event(Event("guard.soak", reason, level, context.bench.chamber.name, took_s, step.timeout_s, "s"))

@@ -9,6 +9,7 @@ from procedures.contracts.errors import GuardTripped, Unanswered
 from procedures.contracts.steps import Mount, Step
 from procedures.execution.context import ExecutionContext
 from procedures.execution.reconnect import is_reconnectable
+from procedures.recipe.rules import WAITED_FOR
 
 
 @dataclass
@@ -27,7 +28,7 @@ class Recovery:
     def by_suspension(self, error: BaseException) -> bool:
         """Return whether the step is begun again once the limits hold."""
         may = self.suspensions < self.context.recipe.guards.max_suspensions
-        return isinstance(error, GuardTripped) and error.action == "suspend" and may
+        return isinstance(error, GuardTripped) and error.action in WAITED_FOR and may
 
     def by_reconnection(self, error: BaseException) -> bool:
         """Return whether the step is begun again once a silent instrument answers."""

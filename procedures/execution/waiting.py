@@ -9,10 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from instruments.errors import RequestRejected
 from procedures.contracts.campaign_state import CampaignState
 from procedures.contracts.errors import Aborted, GuardTripped, Interrupted, StepFailed
 from procedures.contracts.journal import Event
 from procedures.execution.context import POLL_S, ExecutionContext
+from procedures.recipe.rules import WAITED_FOR
 
 CHECK_S = 1.0  #: how long the clock runs at most between two polls of the control
 
@@ -73,6 +75,18 @@ def hold(context: ExecutionContext) -> None:
     context.recorder.change_state(before, context.control.request.reason)
 
 
+def take_back(context: ExecutionContext) -> None:
+    """Give the chamber the set point again that it had before somebody else changed it. Raises StepFailed."""
+    if (given_c := context.given_c) is None:
+        return
+    chamber = context.bench.chamber
+    try:
+        chamber.set_temperature_c(given_c)
+    except RequestRejected as error:
+        raise StepFailed(f"the set point {given_c:g} deg C cannot be taken back: {error}") from error
+    context.recorder.event(Event("taken_back", f"{chamber.name}: set point {given_c:g} deg C was given again"))
+
+
 def suspend(context: ExecutionContext, violation: GuardTripped) -> None:
     """Wait with the table at rest until every limit has held for `release_s`; the soak that held is owed then.
 
@@ -83,14 +97,18 @@ def suspend(context: ExecutionContext, violation: GuardTripped) -> None:
     context.bench.stop_table()
     recorder.event(Event("soak_owed", f"suspended: {violation}"))
     recorder.change_state(CampaignState.PAUSED, f"suspended: {violation}")
+    if violation.action == "take_back":
+        take_back(context)
     began_s = clear_since_s = clock.now_s()
     while clock.now_s() - clear_since_s < rules.release_s:
         pass_time(context, POLL_S, pausing=False)
         violations = context.without_dropouts(context.monitor.poll(POLL_S))
         if any(each.action == "fail" for each in violations):
             raise StepFailed(f"while suspended: {violations[0].message}")
-        if any(each.action == "suspend" for each in violations):
+        if any(each.action in WAITED_FOR for each in violations):
             clear_since_s = clock.now_s()
+        if any(each.action == "take_back" for each in violations):
+            take_back(context)
         if clock.now_s() - began_s >= rules.suspend_timeout_s:
             raise StepFailed(
                 f"suspended for {rules.suspend_timeout_s:g} s, the limit of the recipe, because: "

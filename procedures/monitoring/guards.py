@@ -82,7 +82,7 @@ class Guards:
         return [
             GuardViolation(
                 kind,
-                self.rules.actions.get(kind, "fail"),
+                self.rules.action_of(kind),
                 excess.device,
                 excess.value,
                 excess.limit,
@@ -149,6 +149,11 @@ def _chamber_alarm(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
         yield Excess(guards.chamber, float(len(now.alarms)), 0.0, "", f"alarms ({', '.join(now.alarms)})")
 
 
+def _foreign_change(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
+    if now.foreign and not now.attended:
+        yield Excess(guards.chamber, float(len(now.foreign)), 0.0, "", f"changed by others ({'; '.join(now.foreign)})")
+
+
 def _stale(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
     for device, silent_s in now.silent_s.items():
         if silent_s > guards.rules.stale_s:
@@ -184,6 +189,7 @@ CHECKS: Mapping[GuardKind, Check] = {
     "unit_temperature": _unit_temperature,
     "chamber_deviation": _chamber_deviation,
     "chamber_alarm": _chamber_alarm,
+    "foreign_change": _foreign_change,
     "stale": _stale,
     "damaged_readings": _damaged,
     "invalid_readings": _invalid,

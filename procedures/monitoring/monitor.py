@@ -47,7 +47,7 @@ class BenchMonitor:
         self._gyro_c: dict[str, float] = {}
         self._spin: Spin | None = None
         self._counts: Mapping[str, ReadingCounts] = {}
-        self._taking_readings = False
+        self._taking_readings = self._attended = False
         self._next_poll_s = 0.0
         self.run = 0  #: powered session; 0 while the units are off
 
@@ -103,6 +103,13 @@ class BenchMonitor:
         """Set point of the chamber at the last poll; None without a chamber."""
         return None if self._chamber is None else self._chamber.setpoint_c
 
+    @property
+    def _wanted_c(self) -> float | None:
+        """The set point that labctl gave, else that of the chamber; None without a chamber."""
+        if self._chamber is None:
+            return None
+        return self._chamber.setpoint_c if self._chamber.given_c is None else self._chamber.given_c
+
     @contextmanager
     def listening(self, listener: Listener) -> Iterator[None]:
         """Call `listener` after every poll while the block runs, also during a pause."""
@@ -111,6 +118,15 @@ class BenchMonitor:
             yield
         finally:
             self._listeners.remove(listener)
+
+    @contextmanager
+    def attended(self) -> Iterator[None]:
+        """Take what is changed at the bench while the block runs for what a person was asked to do there."""
+        self._attended = True
+        try:
+            yield
+        finally:
+            self._attended = False
 
     @contextmanager
     def taking_readings(
@@ -178,8 +194,10 @@ class BenchMonitor:
         return BenchSnapshot(
             t_s=t_s,
             chamber_c=self.air_c,
-            setpoint_c=self.air_setpoint_c,
+            setpoint_c=self._wanted_c,
             alarms=() if self._chamber is None else self._chamber.alarms,
+            foreign=() if self._chamber is None else self._chamber.foreign,
+            attended=self._attended,
             gyro_c=self._gyro_c,
             silent_s=self.links.silent_s(t_s),
             taking_readings=self._taking_readings,

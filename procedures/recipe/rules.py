@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, Strict, model_validator
@@ -11,13 +12,14 @@ Whole = Annotated[int, Strict()]
 Yes = Annotated[bool, Strict()]
 Turned = Annotated[int, Strict(), Field(ge=1, le=359)]  #: deg, counter-clockwise seen from above
 Position = Literal["x", "-x", "y", "-y", "z", "-z"]
-Action = Literal["warn", "suspend", "fail"]
+Action = Literal["warn", "take_back", "suspend", "fail"]
 GuardKind = Literal[
     "chamber_limits",  # air against the chamber's limits
     "unit_air",  # air against a unit's limits
     "unit_temperature",  # a unit's own thermometer against its limits
     "chamber_deviation",  # air off its set point while readings are taken
     "chamber_alarm",  # the controller itself says so
+    "foreign_change",  # somebody else has changed the set point or the mode of the chamber
     "stale",  # a chamber or a unit has said nothing for too long
     "damaged_readings",
     "invalid_readings",
@@ -125,6 +127,13 @@ class Mounting(Table):
     repower_each: Yes = False  #: the units are switched off whenever one is turned: a new powered session
 
 
+#: Actions after which a step is begun again once the limits hold.
+WAITED_FOR: frozenset[Action] = frozenset({"suspend", "take_back"})
+TAKEN_BACK: GuardKind = "foreign_change"
+#: A person who changes something at the chamber has a reason: the campaign waits until it is as it was.
+DEFAULT_ACTIONS: Mapping[GuardKind, Action] = {"foreign_change": "suspend"}
+
+
 class GuardRules(Table):
     """Limits that are watched while anything runs."""
 
@@ -135,7 +144,7 @@ class GuardRules(Table):
     max_damaged_fraction: Number = Field(default=0.02, gt=0, le=1)  #: of a data set's readings lost or damaged
     max_invalid_fraction: Number = Field(default=0.5, gt=0, le=1)  #: of them marked bad by the instrument itself
     max_rate_error_fraction: Number = Field(default=0.01, gt=0)  #: the rate really run against the one asked for
-    #: What a trip does; a guard that is not named fails the campaign.
+    #: What a trip does; a guard that is not named fails the campaign, but for those of `DEFAULT_ACTIONS`.
     actions: dict[GuardKind, Action] = {"invalid_readings": "warn"}
     max_gyro_off_air_c: Number = Field(default=20.0, gt=0)  #: of a unit that has been soaked; more is no self-heating
     release_s: Number = Field(default=60.0, ge=0)  #: a suspended campaign goes on after the limits held for this long
@@ -144,6 +153,18 @@ class GuardRules(Table):
     #: What a campaign of a service does when the supervisor is gone, which would end a bench process that hangs: go on
     #: to its end, or go to the safe state, to be resumed by the next service.
     unsupervised: Literal["continue", "stop"] = "continue"
+
+    def action_of(self, kind: GuardKind) -> Action:
+        """Return what a trip of a guard does."""
+        return self.actions.get(kind) or DEFAULT_ACTIONS.get(kind, "fail")
+
+    @model_validator(mode="after")
+    def _taken_back_where_it_can_be(self) -> GuardRules:
+        if wrong := [kind for kind, action in self.actions.items() if action == "take_back" and kind != TAKEN_BACK]:
+            raise ValueError(
+                f'actions: {wrong[0]} = "take_back": only {TAKEN_BACK} can be taken back; give warn, suspend or fail'
+            )
+        return self
 
 
 class OnFailure(Table):

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from instruments.clock import VirtualClock
+from instruments.errors import RequestRejected
 from instruments.interfaces.chamber import ChamberLimits, ChamberState
 from instruments.interfaces.gyro import Channel, GyroIdentity, GyroLimits, Readings
 from instruments.interfaces.table import Spin, TableLimits
@@ -98,6 +99,12 @@ class FakeChamber(Fake):
     alarms: tuple[str, ...] = ()
     from_c, from_s = 25.0, 0.0
     misread_c = 0.0
+    given_c: float | None = None
+    hindrance = ""  #: a set point is refused because of it
+
+    def at_the_panel(self, setpoint_c: float) -> None:
+        """Let a person change the set point."""
+        self.from_c, self.from_s, self.setpoint_c = self.air_c(), self.clock.now_s(), setpoint_c
 
     def disturbance_c(self, t_s: float) -> float:
         return 0.0
@@ -113,13 +120,19 @@ class FakeChamber(Fake):
 
     def set_temperature_c(self, temperature_c: float) -> float:
         self.called("set_temperature_c")
-        self.from_c, self.from_s = self.air_c(), self.clock.now_s()
-        self.setpoint_c = temperature_c
+        if self.hindrance:
+            raise RequestRejected(self.name, self.hindrance)
+        self.at_the_panel(temperature_c)
+        self.given_c = temperature_c
         return temperature_c + self.misread_c
 
     def read(self) -> ChamberState:
         self.called("read")
-        return ChamberState(self.clock.now_s(), self.air_c(), self.setpoint_c, self.alarms)
+        foreign = [self.hindrance] if self.hindrance and self.given_c is not None else []
+        if self.given_c is not None and self.setpoint_c != self.given_c:
+            foreign.append(f"the set point is {self.setpoint_c:g} deg C, labctl gave {self.given_c:g} deg C")
+        now_s, air_c = self.clock.now_s(), self.air_c()
+        return ChamberState(now_s, air_c, self.setpoint_c, self.alarms, self.given_c, tuple(foreign))
 
     def make_safe(self) -> float:
         self.called("make_safe")

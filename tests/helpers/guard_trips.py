@@ -23,6 +23,7 @@ TRIPS = [
     ("unit_temperature", {"gyro_c": {"imu": 100.5}}, "imu", 100.5, 100.0, "deg C"),
     ("chamber_deviation", {"chamber_c": 17.5}, "chamber", 2.5, 2.0, "deg C"),
     ("chamber_alarm", {"alarms": ("over-temperature",)}, "chamber", 1.0, 0.0, ""),
+    ("foreign_change", {"foreign": ("the set point is 27 deg C, labctl gave 20 deg C",)}, "chamber", 1.0, 0.0, ""),
     ("stale", {"silent_s": {"imu": 31.0}}, "imu", 31.0, 30.0, "s"),
     ("damaged_readings", {"counts": {"imu": ReadingCounts(1000, damaged=30)}}, "imu", 3.0, 2.0, "%"),
     ("invalid_readings", {"counts": {"imu": ReadingCounts(1000, invalid=600)}}, "imu", 60.0, 50.0, "%"),

@@ -38,6 +38,7 @@ class SetpointChamber(ABC):
         self._link, self._clock = link, clock
         self._limits: ChamberLimits | None = None
         self._has_controlled = False
+        self._given_c: float | None = None  #: the set point that the controller took last from this driver
 
     @property
     def limits(self) -> ChamberLimits:
@@ -114,8 +115,9 @@ class SetpointChamber(ABC):
         return self._write_and_verify(rounded)
 
     def read(self) -> ChamberState:
-        """Get air temperature, set point (deg C) and alarms; raises what an exchange with the controller raises."""
-        return ChamberState(self._clock.now_s(), self._read_air(), self._read_setpoint(), self._alarms())
+        """Get air temperature, set point (deg C), alarms and foreign changes; raises what an exchange raises."""
+        now_s, air_c, setpoint_c = self._clock.now_s(), self._read_air(), self._read_setpoint()
+        return ChamberState(now_s, air_c, setpoint_c, self._alarms(), self._given_c, self._foreign(setpoint_c))
 
     def shortcomings(self) -> tuple[str, ...]:
         """Get why a set point would have no effect, and what to do; raises what a read of the controller raises."""
@@ -149,11 +151,21 @@ class SetpointChamber(ABC):
             )
         return ""
 
+    def _foreign(self, setpoint_c: float) -> tuple[str, ...]:
+        """Return what somebody else has changed since this driver gave a set point; nothing before it did."""
+        if self._given_c is None:
+            return ()
+        found = [self._hindrance()]
+        if abs(setpoint_c - self._given_c) > self.limits.resolution_c / 2 + TINY_C:
+            found.append(f"the set point is {setpoint_c:g} deg C, labctl gave {self._given_c:g} deg C")
+        return tuple(filter(None, found))
+
     def _refuse_without_effect(self) -> None:
         if hint := self._hindrance():
             raise RequestRejected(self.name, f"{hint}")
 
     def _write_and_verify(self, rounded_c: float) -> float:
+        self._given_c = None
         if abs(self._read_setpoint() - rounded_c) > TINY_C:
             self._write_setpoint(rounded_c)
         found = self._read_setpoint()
@@ -163,6 +175,7 @@ class SetpointChamber(ABC):
                 f"set point {rounded_c:g} deg C was written, but the controller reports {found:g} deg C; set "
                 "the controller to its run page",
             )
+        self._given_c = found
         return found
 
     def _wrong(self, text: str) -> WrongInstrument:

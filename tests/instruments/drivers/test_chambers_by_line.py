@@ -311,3 +311,27 @@ def test_a_host_is_reached_by_a_socket() -> None:
     record["chamber"] = {"driver": "weiss-simserv", "host": "10.0.0.7"}
     settings: Any = resolve(BenchFile.model_validate(record)).chamber
     assert settings.address_url == "socket://10.0.0.7:2049"
+
+
+@pytest.mark.parametrize("driver", ALL)
+def test_what_others_change_at_the_panel_is_in_the_next_reading(chamber: Callable[..., Any], driver: str) -> None:
+    s = chamber(driver)
+    s.state.setpoint_c = 31.0  # before labctl gave one it is nobody else's
+    assert (s.driver.read().given_c, s.driver.read().foreign) == (None, ())
+    s.driver.set_temperature_c(40.0)
+    assert (s.driver.read().given_c, s.driver.read().foreign) == (40.0, ())
+    s.state.setpoint_c = 47.0
+    found = s.driver.read()
+    assert (found.setpoint_c, found.given_c) == (47.0, 40.0)
+    assert found.foreign == ("the set point is 47 deg C, labctl gave 40 deg C",)
+    assert s.driver.set_temperature_c(40.0) == 40.0
+    assert s.driver.read().foreign == ()
+
+
+@pytest.mark.parametrize("driver", ["espec", "weiss-simserv", "thermotron"])
+def test_a_program_that_somebody_starts_is_in_the_next_reading(chamber: Callable[..., Any], driver: str) -> None:
+    s = chamber(driver)
+    s.driver.set_temperature_c(40.0)
+    s.state.program = True
+    (said, *_) = s.driver.read().foreign
+    assert said.startswith("a profile is running or held on the controller")

@@ -143,6 +143,19 @@ def test_a_profile_of_somebody_is_not_ended(f4: Any, mode: int) -> None:
     assert TERMINATE_FRAME not in sent(f4)
 
 
+def test_what_others_change_at_the_panel_is_in_the_next_reading(f4: Any) -> None:
+    f4.simulated.mode = 2
+    assert f4.driver.read().foreign == ()  # labctl has not given a set point
+    f4.simulated.mode = 0
+    f4.driver.set_temperature_c(40.0)
+    assert f4.driver.read().foreign == ()
+    f4.simulated.setpoint = 470
+    assert f4.driver.read().foreign == ("the set point is 47 deg C, labctl gave 40 deg C",)
+    f4.simulated.setpoint, f4.simulated.mode = 400, 2
+    (said,) = f4.driver.read().foreign
+    assert said.startswith("a profile is running or held on the controller")
+
+
 def test_the_way_to_safety_ends_a_profile_that_came_later(f4: Any) -> None:
     f4.driver.set_temperature_c(80.0)
     f4.simulated.mode = 2
