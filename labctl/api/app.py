@@ -29,6 +29,7 @@ from labctl.api.routers import (
     plans,
     recordings,
     schedule,
+    sensors,
     standards,
     swagger_ui,
     units,
@@ -55,7 +56,7 @@ certifying and keys for an approver's.
 #: In the order of the API's description, in which they are also asked: what is read most comes first.
 ROUTERS = (
     calibrations, certification, health, units, benches, effects, certificates, plans,
-    campaigns, schedule, recordings, motions, standards, validity, admin, swagger_ui,
+    campaigns, schedule, recordings, motions, sensors, standards, validity, admin, swagger_ui,
 )  # fmt: skip
 #: Which of their routes take a key; every route of the others does.
 SAY_THEMSELVES = (health, swagger_ui)

@@ -31,6 +31,7 @@ from labctl.cli.commands import (
     recordings,
     schedule,
     seal_key,
+    sensors,
     server,
     signing_key,
     standards,
@@ -63,6 +64,7 @@ app.add_typer(signing_key.app, name="signing-key")
 app.add_typer(certificate_list.app, name="certificates")
 app.add_typer(certificate.app, name="certificate")
 app.add_typer(standards.app, name="standards")
+app.add_typer(sensors.app, name="sensors")
 app.add_typer(environment.app, name="environment")
 COMMANDS: dict[str, Callable[..., None]] = {
     "demo": server.demo,

@@ -128,3 +128,39 @@ Beside = Annotated[
         "--beside", metavar="FILE", help="File with further columns of the same run, joined by time; may be repeated."
     ),
 ]
+SensorSerial = Annotated[
+    str | None,
+    typer.Option(
+        "--serial",
+        metavar="SERIAL",
+        help="Keep the result as the next version of this unit's sensor; default: it is only printed.",
+    ),
+]
+By = Annotated[str | None, typer.Option("--by", metavar="NAME", help="Who; default: the user who is logged in.")]
+SensorExport = Annotated[
+    str | None,
+    typer.Option(
+        "--export",
+        metavar="NAME",
+        help="Write the calibration to --out: px4, ardupilot, json, python, c; an accelerometer also kalibr, ros.",
+    ),
+]
+Out = Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Path of the file to write.")]
+SensorInstance = Annotated[
+    int | None,
+    typer.Option(
+        "--instance",
+        metavar="N",
+        help="Number of the sensor at the autopilot: px4 from 0, ardupilot from 1; default: the first.",
+    ),
+]
+DeviceId = Annotated[
+    int | None, typer.Option("--device-id", metavar="ID", min=1, help="Device id of the sensor at the autopilot.")
+]
+
+
+def who(by: str | None) -> str:
+    """Return who acts: as given, or the user who is logged in."""
+    from labctl.acting_user import actor
+
+    return by or actor().name

@@ -13,6 +13,8 @@ from instruments.datasheet import Convention, DatasheetFigure, datasheet_figure,
 from instruments.standards import Standard
 
 Axis = Literal["x", "y", "z"]
+#: Serial number of a unit.
+SERIAL_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._+# -]{0,63}$"
 #: What moves the unit, and so what its true rate is known from: `rates` a table, at one rate in each data set; `rest`
 #: nothing; `turns` a hand or a table, by a known angle in each data set; `profile` a table whose rate changes and is
 #: known reading by reading; `poses` a hand, between rests that gravity distinguishes.
@@ -87,7 +89,7 @@ class RecordingInfo(BaseModel):
     model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True)
 
     format: Literal["labctl-recording/1"] = "labctl-recording/1"
-    serial: str = Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9._+# -]{0,63}$")
+    serial: str = Field(pattern=SERIAL_PATTERN)
     model: str = ""
     axes: tuple[Axis, ...] = Field(min_length=1, max_length=3)
     kind: Literal["samples", "points", "coefficients"]

@@ -1,4 +1,4 @@
-"""Nine parameters of an accelerometer from files of its readings in poses, as a response and as parameters."""
+"""Nine parameters of an accelerometer from files of its readings in poses, as a response."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from labctl.errors import BadInput, BadRecording
-from labctl.exports.flight_controllers.accelerometer import FIRST_INSTANCE, FORMATS
 from labctl.fitting.poses.at_rest.accelerometer import Accelerometer, calibrate_accelerometer, different_poses
 from labctl.fitting.poses.at_rest.adequacy import Adequacy, adequacy_of
 from labctl.fitting.poses.at_rest.gravity import STANDARD_GRAVITY
@@ -37,28 +36,34 @@ class Source:
     unit: str = "g"
     latitude_deg: float | None = None
 
+    @property
+    def text(self) -> str:
+        """What was read, in one line."""
+        local = "" if self.latitude_deg is None else f", gravity at latitude {self.latitude_deg:g} deg"
+        return f"columns {', '.join(self.columns)} in {self.unit}{local}"
 
-def accelerometer_of_files(paths: Sequence[Path], source: Source) -> tuple[AccelerometerResponse, Accelerometer]:
-    """Return the calibration by all files of one unit; raises BadInput, BadRecording, NotEnoughData."""
+
+def accelerometer_of_files(paths: Sequence[Path], source: Source, serial: str | None = None) -> AccelerometerResponse:
+    """Return the calibration by all files of one unit; raises BadInput, BadRecording, NotEnoughData.
+
+    `serial` is its serial number where it is known: a recording of another unit is refused.
+    """
     if source.unit not in UNITS_G:
         raise BadInput(f"--unit {source.unit}: give one of {', '.join(UNITS_G)}")
     if source.latitude_deg is not None and not abs(source.latitude_deg) <= 90:
         raise BadInput(f"--latitude {source.latitude_deg:g}: give the latitude in deg, from -90 to 90")
     if len(source.columns) != len(COLUMNS):
         raise BadInput(f"--columns {','.join(source.columns)}: name four columns, of time, x, y and z")
-    readings = _joined([_readings(path, source) for path in paths])
+    parts = [_readings(path, source) for path in paths]
+    for path, part in zip(paths, parts, strict=True):
+        if serial is not None and path.is_dir() and part.info.serial != serial:
+            raise BadInput(
+                f"{path}: this recording is of unit {part.info.serial}, but --serial is {serial}; name its unit"
+            )
+    readings = _joined(parts)
     rests = find_rests(readings)
     found = calibrate_accelerometer(readings, rests)
-    return _response(found, rests, adequacy_of(found, rests)), found
-
-
-def parameters_of(
-    answer: AccelerometerResponse, found: Accelerometer, name: str, instance: int | None, device_id: int | None
-) -> str:
-    """Return a calibration as parameters of an autopilot; raises BadInput for what the format cannot express."""
-    if name not in FORMATS:
-        raise BadInput(f"--export {name}: an accelerometer is exported to {' or '.join(FORMATS)}")
-    return FORMATS[name](found, answer.text, FIRST_INSTANCE[name] if instance is None else instance, device_id)
+    return _response(found, rests, adequacy_of(found, rests))
 
 
 def _readings(path: Path, source: Source) -> PoseReadings:
@@ -139,7 +144,7 @@ def _text(found: Accelerometer, worth: Adequacy) -> Iterator[str]:
     yield f"Accelerometer: bias with u up to {worst:.2g} g; local gravity {found.gravity_g:.6g} g."
     yield (
         f"Size of gravity: off by {worth.before_g:.2g} g before, {worth.heldout_g:.2g} g after, in held-out rests; "
-        f"out; the noise of their means lets expect {worth.expected_g:.2g} g."
+        f"the noise of their means lets expect {worth.expected_g:.2g} g."
     )
     if worth.verdict == "unexplained":
         yield (

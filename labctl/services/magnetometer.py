@@ -1,14 +1,14 @@
-"""Hard and soft iron of a magnetometer from a table of its readings, as a response and as parameters of autopilots."""
+"""Hard and soft iron of a magnetometer from a table of its readings, as a response."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from labctl.errors import BadInput, BadRecording
-from labctl.exports.flight_controllers.magnetometer import FIRST_INSTANCE, FORMATS
 from labctl.fitting.magnetometer.calibrate import AXES, MOST_LEFT_OUT, Magnetometer, calibrate_magnetometer
 from labctl.fitting.magnetometer.ellipsoid import PLACES
 from labctl.recording.data_files import read_table
@@ -20,10 +20,24 @@ UNITS_UT = {"uT": 1.0, "nT": 1e-3, "mT": 1e3, "T": 1e6, "gauss": 100.0, "mgauss"
 COLUMNS = ("mag_x", "mag_y", "mag_z")
 
 
-def magnetometer_of_file(
-    path: Path, columns: Sequence[str], unit: str, field_ut: float | None
-) -> tuple[MagnetometerResponse, Magnetometer]:
+@dataclass(frozen=True)
+class Source:
+    """How a table of readings is read."""
+
+    columns: Sequence[str] = COLUMNS  #: x, y and z
+    unit: str = "uT"
+    field_ut: float | None = None  #: size of the local field
+
+    @property
+    def text(self) -> str:
+        """What was read, in one line."""
+        given = "" if self.field_ut is None else f", field {self.field_ut:g} uT"
+        return f"columns {', '.join(self.columns)} in {self.unit}{given}"
+
+
+def magnetometer_of_file(path: Path, source: Source) -> MagnetometerResponse:
     """Return the calibration of a table's readings, in order of time. Raises BadInput, BadRecording, NotEnoughData."""
+    columns, unit, field_ut = source.columns, source.unit, source.field_ut
     if unit not in UNITS_UT:
         raise BadInput(f"--unit {unit}: give one of {', '.join(UNITS_UT)}")
     if field_ut is not None and not (np.isfinite(field_ut) and field_ut > 0):
@@ -34,20 +48,7 @@ def magnetometer_of_file(
         raise BadInput(f"--columns {','.join(columns)}: name three columns, of x, y and z")
     readings = UNITS_UT[unit] * numbers_of(path, read_table(path), columns, "the three columns")
     result = calibrate_magnetometer(str(path), readings, field_ut)
-    return _response(result, given=field_ut is not None), result
-
-
-def parameters_of(
-    answer: MagnetometerResponse, result: Magnetometer, name: str, instance: int | None, device_id: int | None
-) -> str:
-    """Return a calibration as parameters of an autopilot; raises BadInput for what the format cannot express."""
-    if name not in FORMATS:
-        raise BadInput(f"--export {name}: a magnetometer is exported to {' or '.join(FORMATS)}")
-    if answer.verdict != "adequate":
-        raise BadInput(
-            f"--export {name}: the readings are not those of a constant field ({answer.text[-1]}); record them again"
-        )
-    return FORMATS[name](result, answer.text, FIRST_INSTANCE[name] if instance is None else instance, device_id)
+    return _response(result, given=field_ut is not None)
 
 
 def _response(result: Magnetometer, *, given: bool) -> MagnetometerResponse:

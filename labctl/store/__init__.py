@@ -56,6 +56,7 @@ from labctl.store.repositories.releases import NewReleaseRequest, ReleaseRequest
 from labctl.store.repositories.resume_points import ResumePoint, ResumePoints, Resumption
 from labctl.store.repositories.room_environment import RoomEnvironment, RoomReading, RoomSpan
 from labctl.store.repositories.scheduled_starts import NewStart, StartEventRow, StartRow, Starts
+from labctl.store.repositories.sensors import NewSensorVersion, Sensor, SensorVersionRow, SensorVersions
 from labctl.store.repositories.standards import (
     CertifiedPoint,
     RegisteredStandard,
@@ -118,6 +119,7 @@ __all__ = [
     "NewCalibration",
     "NewCampaign",
     "NewReleaseRequest",
+    "NewSensorVersion",
     "NewStart",
     "NewUnit",
     "Progress",
@@ -134,6 +136,9 @@ __all__ = [
     "RoomEnvironment",
     "RoomReading",
     "RoomSpan",
+    "Sensor",
+    "SensorVersionRow",
+    "SensorVersions",
     "ServedCalibration",
     "ServiceAddress",
     "Signer",
@@ -189,6 +194,7 @@ class Store:
         self.drafts = Drafts(database)
         self.standards = Standards(database)
         self.check_gyros = CheckGyros(database)
+        self.sensor_versions = SensorVersions(database)
         self.room_environment = RoomEnvironment(database)
         self.audit = Audit(database)
         self.keys = Keys(database)

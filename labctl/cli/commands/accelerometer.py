@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from labctl.cli.error_reporting import one_clear_line
-from labctl.cli.options import Json
-from labctl.cli.output import console, format_number, print_json, table
-
-if TYPE_CHECKING:
-    from labctl.services.schemas.reports.accelerometer import AccelerometerResponse
+from labctl.cli.options import By, Database, DeviceId, Json, Out, SensorExport, SensorInstance, SensorSerial, who
+from labctl.cli.output import print_json
+from labctl.cli.printing.sensors import print_kept, print_sensor
 
 
 def accelerometer(
@@ -28,55 +26,34 @@ def accelerometer(
         float | None,
         typer.Option("--latitude", metavar="DEG", help="Latitude, for the local gravity; default: 9.80665 m/s2."),
     ] = None,
-    export: Annotated[
-        str | None,
-        typer.Option("--export", metavar="NAME", help="Write parameters of an autopilot, px4 or ardupilot, to --out."),
-    ] = None,
-    out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Path of the file to write.")] = None,
-    instance: Annotated[
-        int | None,
-        typer.Option(
-            "--instance", metavar="N", help="Number of the accelerometer: px4 from 0, ardupilot from 1; default: first."
-        ),
-    ] = None,
-    device_id: Annotated[
-        int | None, typer.Option("--device-id", metavar="ID", min=1, help="Device id of the sensor at the autopilot.")
-    ] = None,
+    serial: SensorSerial = None,
+    by: By = None,
+    export: SensorExport = None,
+    out: Out = None,
+    instance: SensorInstance = None,
+    device_id: DeviceId = None,
     as_json: Json = False,
+    database: Database = None,
 ) -> None:
     """Calibrate an accelerometer by gravity in poses at rest: nine parameters, their uncertainty, and a verdict."""
-    from labctl.errors import BadInput
-    from labctl.services.accelerometer import Source, accelerometer_of_files, parameters_of
+    from labctl.services.accelerometer import Source, accelerometer_of_files
+    from labctl.services.commands.open import execute
+    from labctl.services.commands.requests import ToUnit
+    from labctl.services.commands.sensors import KEEP_ACCELEROMETER
+    from labctl.services.schemas.sensors import AccelerometerRequest
+    from labctl.services.sensor_exports import check_export, write_export
+    from labctl.services.sensor_versions import measured_data
 
+    kept = None
     with one_clear_line():
-        if (export is None) != (out is None):
-            raise BadInput("give --export and --out together: the format, and the file to write")
+        check_export(export, out)
         source = Source([name.strip() for name in columns.split(",")], unit, latitude_deg)
-        answer, found = accelerometer_of_files(paths, source)
-        if export is not None and out is not None:
-            out.write_text(parameters_of(answer, found, export, instance, device_id), encoding="ascii")
+        answer = accelerometer_of_files(paths, source, serial)
+        write_export(answer, export, out, instance, device_id)
+        if serial is not None:
+            request = AccelerometerRequest(data=measured_data(paths, source.text), result=answer, by=who(by))
+            kept = execute(database, KEEP_ACCELEROMETER, ToUnit(serial, request))
     if as_json:
-        print_json(answer)
+        print_json(answer if kept is None else kept)
     else:
-        _print(answer)
-
-
-def _print(answer: AccelerometerResponse) -> None:
-    rows = table("accelerometer", "coefficient", "unit", "value", "u", numbers=2)
-    for name, unit, values in (
-        ("bias", "g", answer.bias_g),
-        ("scale factor", "1", answer.scale_factor),
-        ("misalignment", "1", answer.misalignment),
-    ):
-        for place, found in values.items():
-            rows.add_row(f"{name} {place}", unit, format_number(found.value, 5), format_number(found.u, 2))
-    console.print(rows)
-    console.print(f"verdict: {answer.verdict}", style="green" if answer.verdict == "adequate" else "bold red")
-    for line in answer.text:
-        console.print(line, soft_wrap=True, markup=False)
-    density = max(answer.noise_density_m_s2.values())
-    console.print(
-        f"{answer.rests - answer.left_out} of {answer.rests} rests used, in {answer.poses} poses; white noise up to "
-        f"{density:.2g} m/s2/sqrt(Hz)",
-        style="dim",
-    )
+        print_sensor(answer) if kept is None else print_kept(kept)

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from labctl.cli.error_reporting import one_clear_line
-from labctl.cli.options import Json
-from labctl.cli.output import console, format_number, print_json, table
-
-if TYPE_CHECKING:
-    from labctl.services.schemas.reports.magnetometer import MagnetometerResponse
+from labctl.cli.options import By, Database, DeviceId, Json, Out, SensorExport, SensorInstance, SensorSerial, who
+from labctl.cli.output import print_json
+from labctl.cli.printing.sensors import print_kept, print_sensor
 
 
 def magnetometer(
@@ -31,52 +29,34 @@ def magnetometer(
             help="Size of the local field, uT; default: by the readings, with a soft iron of determinant 1.",
         ),
     ] = None,
-    export: Annotated[
-        str | None,
-        typer.Option("--export", metavar="NAME", help="Write parameters of an autopilot, px4 or ardupilot, to --out."),
-    ] = None,
-    out: Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Path of the file to write.")] = None,
-    instance: Annotated[
-        int | None,
-        typer.Option(
-            "--instance", metavar="N", help="Number of the magnetometer: px4 from 0, ardupilot from 1; default: first."
-        ),
-    ] = None,
-    device_id: Annotated[
-        int | None, typer.Option("--device-id", metavar="ID", min=1, help="Device id of the sensor at the autopilot.")
-    ] = None,
+    serial: SensorSerial = None,
+    by: By = None,
+    export: SensorExport = None,
+    out: Out = None,
+    instance: SensorInstance = None,
+    device_id: DeviceId = None,
     as_json: Json = False,
+    database: Database = None,
 ) -> None:
     """Calibrate a magnetometer: hard iron, soft iron, their uncertainty, and whether the field was constant."""
-    from labctl.errors import BadInput
-    from labctl.services.magnetometer import magnetometer_of_file, parameters_of
+    from labctl.services.commands.open import execute
+    from labctl.services.commands.requests import ToUnit
+    from labctl.services.commands.sensors import KEEP_MAGNETOMETER
+    from labctl.services.magnetometer import Source, magnetometer_of_file
+    from labctl.services.schemas.sensors import MagnetometerRequest
+    from labctl.services.sensor_exports import check_export, write_export
+    from labctl.services.sensor_versions import measured_data
 
+    kept = None
     with one_clear_line():
-        if (export is None) != (out is None):
-            raise BadInput("give --export and --out together: the format, and the file to write")
-        names = [name.strip() for name in columns.split(",")]
-        answer, result = magnetometer_of_file(path, names, unit, field_ut)
-        if export is not None and out is not None:
-            out.write_text(parameters_of(answer, result, export, instance, device_id), encoding="ascii")
+        check_export(export, out)
+        source = Source([name.strip() for name in columns.split(",")], unit, field_ut)
+        answer = magnetometer_of_file(path, source)
+        write_export(answer, export, out, instance, device_id)
+        if serial is not None:
+            request = MagnetometerRequest(data=measured_data([path], source.text), result=answer, by=who(by))
+            kept = execute(database, KEEP_MAGNETOMETER, ToUnit(serial, request))
     if as_json:
-        print_json(answer)
+        print_json(answer if kept is None else kept)
     else:
-        _print(answer)
-
-
-def _print(answer: MagnetometerResponse) -> None:
-    rows = table("magnetometer", "coefficient", "unit", "value", "u", numbers=2)
-    for axis, found in answer.hard_iron_ut.items():
-        rows.add_row(f"hard iron {axis}", "uT", format_number(found.value), format_number(found.u, 2))
-    for place, found in answer.soft_iron.items():
-        rows.add_row(f"soft iron {place}", "1", format_number(found.value, 5), format_number(found.u, 2))
-    rows.add_row("field", "uT", format_number(answer.field_ut.value), format_number(answer.field_ut.u, 2))
-    console.print(rows)
-    console.print(f"verdict: {answer.verdict}", style="green" if answer.verdict == "adequate" else "bold red")
-    for line in answer.text:
-        console.print(line, soft_wrap=True, markup=False)
-    console.print(
-        f"{answer.readings - answer.left_out} of {answer.readings} readings used; from any direction to the nearest "
-        f"measured one: up to {answer.largest_gap_deg:.0f} deg",
-        style="dim",
-    )
+        print_sensor(answer) if kept is None else print_kept(kept)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from labctl.cli.error_reporting import one_clear_line
-from labctl.cli.options import Database, Json, Serial, day, instant
+from labctl.cli.options import By, Database, Json, Serial, day, instant, who
 from labctl.cli.output import print_json
 from labctl.cli.printing.standards import print_affected, print_check_gyro, print_comparison, print_list, print_standard
 
@@ -19,19 +19,12 @@ app = typer.Typer(
 )
 
 Label = Annotated[str, typer.Argument(metavar="LABEL", help="Label of the standard, or its serial number.")]
-By = Annotated[str | None, typer.Option("--by", metavar="NAME", help="Who; default: the user who is logged in.")]
 On = Annotated[
     str | None, typer.Option("--on", metavar="DATE", help="Day for the state and the prediction; default: today.")
 ]
 Temperature = Annotated[
     float | None, typer.Option("--temperature-c", metavar="T", help="Temperature of the results, deg C.")
 ]
-
-
-def _who(by: str | None) -> str:
-    from labctl.acting_user import actor
-
-    return by or actor().name
 
 
 @app.command("list")
@@ -72,7 +65,7 @@ def add(
 
     with one_clear_line():
         request = StandardRequest(
-            label=label, quantity=quantity, unit=unit, serial=serial, description=description, by=_who(by)
+            label=label, quantity=quantity, unit=unit, serial=serial, description=description, by=who(by)
         )
         answer = execute(database, ADD_STANDARD, request)
     print_json(answer) if as_json else print_standard(answer)
@@ -134,7 +127,7 @@ def certificate(
             raise BadInput("--calibrated is empty; give the day of the calibration, such as 2026-03-01")
         request = StandardCertificateRequest(
             number=number, laboratory=laboratory, calibrated=calibrated_on, due=day(due, "--due"), adjusted=adjusted,
-            traceability=traceability, points=[_point(each, k) for each in point], reason=reason, by=_who(by),
+            traceability=traceability, points=[_point(each, k) for each in point], reason=reason, by=who(by),
         )  # fmt: skip
         answer = execute(database, ADD_STANDARD_CERTIFICATE, ToStandard(label, request))
     print_json(answer) if as_json else print_standard(answer)
@@ -177,7 +170,7 @@ def check(
 
     with one_clear_line():
         request = StandardCheckRequest(
-            value=value, u=u, nominal=nominal, checked_at=instant(at, "--at"), note=note, by=_who(by)
+            value=value, u=u, nominal=nominal, checked_at=instant(at, "--at"), note=note, by=who(by)
         )
         answer = execute(database, ADD_STANDARD_CHECK, ToStandard(label, request))
     print_json(answer) if as_json else print_standard(answer)
@@ -211,7 +204,7 @@ def bad(
         if (first := day(bad_from, "--from")) is None:
             raise BadInput("--from is empty; give the first day, such as 2026-03-01")
         last = day(bad_until, "--until")
-        request = StandardBadRequest(bad_from=first, bad_until=last, reason=reason, by=_who(by))
+        request = StandardBadRequest(bad_from=first, bad_until=last, reason=reason, by=who(by))
         execute(database, MARK_STANDARD_BAD, ToStandard(label, request))
         with open_readonly(database) as store:
             answer = affected_by(store, label, first, last)
@@ -234,7 +227,7 @@ def withdraw(
     from labctl.services.schemas.standards import WithdrawFindingRequest
 
     with one_clear_line():
-        request = WithdrawFindingRequest(reason=reason, by=_who(by))
+        request = WithdrawFindingRequest(reason=reason, by=who(by))
         answer = execute(database, WITHDRAW_FINDING, ToFinding(label, finding, request))
     print_json(answer) if as_json else print_standard(answer)
 
@@ -286,7 +279,7 @@ def check_gyro(
         else:
             request = CheckGyroRequest(
                 marked=mark, temperature_c=temperature_c, chart_from=day(chart_from, "--from"), reason=reason,
-                by=_who(by),
+                by=who(by),
             )  # fmt: skip
             answer = execute(database, SET_CHECK_GYRO, ToUnit(serial, request))
     print_json(answer) if as_json else print_check_gyro(answer)

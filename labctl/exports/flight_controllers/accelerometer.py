@@ -7,15 +7,15 @@ for misalignments; how much of gravity's size that loses is in the head of the f
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from labctl.errors import BadInput
 from labctl.exports.comments import commented, plain
 from labctl.exports.options import check_instance
+from labctl.exports.sensors.parameters import ForceParameters
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.poses.at_rest.accelerometer import Accelerometer
 from labctl.fitting.poses.at_rest.gravity import STANDARD_GRAVITY
 from labctl.fitting.poses.readings import AXES
 
@@ -27,14 +27,14 @@ PRIORITY = 50
 LARGEST_OFFSET_M_S2, SCALES = 3.5, (0.8, 1.2)
 
 
-def misalignment_loss_g(found: Accelerometer) -> float:
+def misalignment_loss_g(found: ForceParameters) -> float:
     """Return the largest error, over all directions, of gravity's size that is left without the misalignments, g."""
     inverse = np.linalg.inv(np.eye(3) + found.errors)
     left = inverse @ np.diag(1 + np.diag(found.errors)) - np.eye(3)
     return found.gravity_g * float(np.abs(np.linalg.eigvalsh((left + left.T) / 2)).max())
 
 
-def px4(found: Accelerometer, head: Sequence[str], instance: int, device_id: int | None) -> str:
+def px4(found: ForceParameters, head: Sequence[str], instance: int, device_id: int | None) -> str:
     """Return a file of parameters that QGroundControl loads; raises BadInput for an instance that PX4 has not."""
     check_instance("px4", instance, 0, 3)
     name = f"CAL_ACC{instance}_"
@@ -54,7 +54,7 @@ def px4(found: Accelerometer, head: Sequence[str], instance: int, device_id: int
     return commented([*map(plain, head), *notes]) + body
 
 
-def ardupilot(found: Accelerometer, head: Sequence[str], instance: int, device_id: int | None) -> str:
+def ardupilot(found: ForceParameters, head: Sequence[str], instance: int, device_id: int | None) -> str:
     """Return a file of parameters that Mission Planner loads.
 
     Raises BadInput for an instance that ArduPilot has not, and for values outside the ranges that it documents.
@@ -80,17 +80,9 @@ def ardupilot(found: Accelerometer, head: Sequence[str], instance: int, device_i
     return commented([*map(plain, head), *notes]) + "".join(f"{row},{value}\n" for row, value in rows)
 
 
-def _offset_and_scale(found: Accelerometer) -> tuple[Array, Array]:
+def _offset_and_scale(found: ForceParameters) -> tuple[Array, Array]:
     return found.bias_g * STANDARD_GRAVITY, 1 / (1 + np.diag(found.errors))
 
 
-def _lost(found: Accelerometer, consumer: str) -> str:
+def _lost(found: ForceParameters, consumer: str) -> str:
     return f"LOST misalignments ({consumer} has no place for them): up to {misalignment_loss_g(found):.2g} g of 1 g."
-
-
-FORMATS: dict[str, Callable[[Accelerometer, Sequence[str], int, int | None], str]] = {
-    "px4": px4,
-    "ardupilot": ardupilot,
-}
-#: Instance that is written where none is named.
-FIRST_INSTANCE = {"px4": 0, "ardupilot": 1}

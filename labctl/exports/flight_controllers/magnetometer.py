@@ -7,12 +7,13 @@ rotation of sensor and board (AP_Compass_Backend, correct_field); COMPASS_SCALE 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from labctl.errors import BadInput
 from labctl.exports.comments import commented, plain
 from labctl.exports.options import check_instance
-from labctl.fitting.magnetometer.calibrate import AXES, Magnetometer
+from labctl.exports.sensors.parameters import FieldParameters
+from labctl.fitting.magnetometer.calibrate import AXES
 
 #: One gauss and one milligauss, in uT.
 GAUSS_UT, MILLIGAUSS_UT = 100.0, 0.1
@@ -24,7 +25,7 @@ FLOAT, INTEGER = 9, 6
 OFF_DIAGONAL = ((0, 1), (0, 2), (1, 2))
 
 
-def px4(result: Magnetometer, head: Sequence[str], instance: int, device_id: int | None) -> str:
+def px4(result: FieldParameters, head: Sequence[str], instance: int, device_id: int | None) -> str:
     """Return a file of parameters that QGroundControl loads; raises BadInput for an instance that PX4 has not."""
     check_instance("px4", instance, 0, 3)
     name = f"CAL_MAG{instance}_"
@@ -44,7 +45,7 @@ def px4(result: Magnetometer, head: Sequence[str], instance: int, device_id: int
     return commented([*map(plain, head), *notes]) + body
 
 
-def ardupilot(result: Magnetometer, head: Sequence[str], instance: int, device_id: int | None) -> str:
+def ardupilot(result: FieldParameters, head: Sequence[str], instance: int, device_id: int | None) -> str:
     """Return a file of parameters that Mission Planner loads.
 
     Raises BadInput for an instance that ArduPilot has not, and for an offset that it refuses.
@@ -69,11 +70,3 @@ def ardupilot(result: Magnetometer, head: Sequence[str], instance: int, device_i
         "ArduPilot corrects after the rotation of sensor and board: the readings must be in these axes, as in its log."
     ]
     return commented([*map(plain, head), *notes]) + "".join(f"{row},{value}\n" for row, value in rows)
-
-
-FORMATS: dict[str, Callable[[Magnetometer, Sequence[str], int, int | None], str]] = {
-    "px4": px4,
-    "ardupilot": ardupilot,
-}
-#: Instance that is written where none is named.
-FIRST_INSTANCE = {"px4": 0, "ardupilot": 1}

@@ -25,6 +25,7 @@ from labctl.services.commands.requests import (
     ToUnit,
     ToVersion,
 )
+from labctl.services.commands.sensors import KEEP_ACCELEROMETER, KEEP_MAGNETOMETER
 from labctl.services.commands.standards import (
     ADD_ENVIRONMENT,
     ADD_STANDARD,
@@ -277,12 +278,12 @@ CREATE_KEY = Command(method="POST", path="/api/keys", handler=_create_key, respo
 REVOKE_KEY = Command(method="POST", path="/api/keys/{name}/revoke", handler=_revoke_key, responses={200: KeyResponse})
 NOTE_BACKUP = Command(method="POST", path="/api/backups", handler=_note_backup, responses={204: NoContent})
 
-_OF_STANDARDS: tuple[Command[Any, Any], ...] = (
+_ELSEWHERE: tuple[Command[Any, Any], ...] = (
     ADD_STANDARD, ADD_STANDARD_CERTIFICATE, ADD_STANDARD_CHECK, MARK_STANDARD_BAD, WITHDRAW_FINDING, SET_CHECK_GYRO,
-    ADD_ENVIRONMENT,
+    ADD_ENVIRONMENT, KEEP_ACCELEROMETER, KEEP_MAGNETOMETER,
 )  # fmt: skip
 #: All of them, in the order above.
 COMMANDS: tuple[Command[Any, Any], ...] = (
-    *(each for each in list(vars().values()) if isinstance(each, Command) and each not in _OF_STANDARDS),
-    *_OF_STANDARDS,
+    *(each for each in list(vars().values()) if isinstance(each, Command) and each not in _ELSEWHERE),
+    *_ELSEWHERE,
 )

@@ -297,6 +297,20 @@ CHECK_GYRO = Kind(
     since="0020",
 )
 
+SENSOR_VERSION = Kind(
+    "sensor version",
+    _T.sensor_versions,
+    "id",
+    (
+        Part("head", _T.sensor_versions, "id", "serial sensor version verdict hash by by_key at", since="0022"),
+        Part("data", _T.sensor_versions, "id", "data", since="0022"),
+        Part("document", _T.sensor_versions, "id", "document", since="0022"),
+    ),
+    lambda row: f"{row[1]} {row[0]} version {row[2]}",
+    "serial sensor version",
+    since="0022",
+)
+
 #: All of them.
 KINDS: Mapping[str, Kind] = {
     kind.name: kind
@@ -314,5 +328,6 @@ KINDS: Mapping[str, Kind] = {
         STANDARD_CHECK,
         STANDARD_FINDING,
         CHECK_GYRO,
+        SENSOR_VERSION,
     )
 }

@@ -13,13 +13,14 @@ from labctl.store.records import CertificationRow, ServedCalibration, Unit, With
 from labctl.store.schema import tables
 
 
-def _whole_recordings() -> sa.ColumnElement[bool]:
-    r = tables.recordings.c
-    return sa.exists().where(r.serial == tables.units.c.serial, r.importing.is_(None))
+def _measured() -> sa.ColumnElement[bool]:
+    r, s = tables.recordings.c, tables.sensor_versions.c
+    whole = sa.exists().where(r.serial == tables.units.c.serial, r.importing.is_(None))
+    return sa.or_(whole, sa.exists().where(s.serial == tables.units.c.serial))
 
 
 #: A unit that only an import under way has brought in is not there yet.
-SEEN = _whole_recordings()
+SEEN = _measured()
 
 
 def add_missing_unit(connection: sa.Connection, serial: str, model: str, technology: str | None, at: datetime) -> bool:

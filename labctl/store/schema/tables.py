@@ -19,6 +19,7 @@ from labctl.store.schema.manifests import block_digests, manifest_head, manifest
 from labctl.store.schema.recordings import data_set_means, data_sets, environment, recordings, sample_blocks
 from labctl.store.schema.room_environment import room_environment
 from labctl.store.schema.schedule import scheduled_starts, start_events
+from labctl.store.schema.sensors import sensor_versions
 from labctl.store.schema.standards import (
     check_gyros,
     standard_certificates,
@@ -58,6 +59,7 @@ __all__ = [
     "room_environment",
     "sample_blocks",
     "scheduled_starts",
+    "sensor_versions",
     "standard_certificates",
     "standard_checks",
     "standard_findings",

@@ -58,6 +58,7 @@ export type ReleaseRequest = Schema<"ReleaseRequestResponse">;
 export type ResidualColumns = Schema<"ResidualColumns">;
 export type RestColumns = Schema<"RestColumns">;
 export type Scheduled = Schema<"ScheduledResponse">;
+export type SensorVersion = Schema<"SensorVersionResponse">;
 export type StartEvent = Schema<"StartEventResponse">;
 export type Trace = Schema<"TraceResponse">;
 export type Trend = Schema<"TrendResponse">;

@@ -1454,6 +1454,94 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/units/{serial}/sensors": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Accelerometer and magnetometer of a unit
+         * @description Every version of both, by sensor, the newest first: verdict, data, who and when.
+         */
+        get: operations["sensors_api_units__serial__sensors_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/units/{serial}/sensors/accelerometer": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * A version of the accelerometer
+         * @description Bias, scale factors and misalignments with their covariance, and what they were fitted to.
+         */
+        get: operations["accelerometer_api_units__serial__sensors_accelerometer_get"];
+        put?: never;
+        /**
+         * Keep a calibration of the accelerometer
+         * @description The unit's next version, with the hashes of the files that it was fitted to; a new unit is added.
+         */
+        post: operations["keep_accelerometer_api_units__serial__sensors_accelerometer_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/units/{serial}/sensors/magnetometer": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * A version of the magnetometer
+         * @description Hard and soft iron with their covariance, and what they were fitted to.
+         */
+        get: operations["magnetometer_api_units__serial__sensors_magnetometer_get"];
+        put?: never;
+        /**
+         * Keep a calibration of the magnetometer
+         * @description The unit's next version, with the hashes of the files that it was fitted to; a new unit is added.
+         */
+        post: operations["keep_magnetometer_api_units__serial__sensors_magnetometer_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/units/{serial}/sensors/{sensor}/file": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * A version as a file
+         * @description The same bytes as `--export` of the command that fitted it; 400 for what the format cannot express.
+         */
+        get: operations["file_api_units__serial__sensors__sensor__file_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/standards": {
         parameters: {
             query?: never;
@@ -1805,6 +1893,154 @@ export interface components {
             residual_g: number;
             /** Frame */
             frame: string;
+        };
+        /**
+         * AccelerometerRequest
+         * @description A calibration of an accelerometer, to be kept as the next version of a unit.
+         */
+        AccelerometerRequest: {
+            data: components["schemas"]["MeasuredData"];
+            /** @description As `labctl accelerometer FILE --json` prints it. */
+            result: components["schemas"]["AccelerometerResponse"];
+            /**
+             * By
+             * @description Who.
+             */
+            by: string;
+        };
+        /**
+         * AccelerometerResponse
+         * @description Nine parameters of an accelerometer: reading = bias + (1 + errors) force, by gravity in poses at rest.
+         */
+        AccelerometerResponse: {
+            /**
+             * Verdict
+             * @description adequate: held-out rests are predicted to the noise of their means; unexplained: they are not, and the uncertainties include what is left.
+             * @enum {string}
+             */
+            verdict: "adequate" | "unexplained";
+            /** Bias G */
+            bias_g: {
+                [key: string]: components["schemas"]["Estimate"];
+            };
+            /**
+             * Scale Factor
+             * @description Relative errors of the scale factors, by axis.
+             */
+            scale_factor: {
+                [key: string]: components["schemas"]["Estimate"];
+            };
+            /**
+             * Misalignment
+             * @description xy, xz, yz: of an axis by the force along another.
+             */
+            misalignment: {
+                [key: string]: components["schemas"]["Estimate"];
+            };
+            /**
+             * Covariance
+             * @description Of bias x, y, z, scale factor x, y, z, misalignment xy, xz, yz.
+             */
+            covariance: number[][];
+            /**
+             * Gravity G
+             * @description Local gravity, in units of 9.80665 m/s2.
+             */
+            gravity_g: number;
+            /** Rests */
+            rests: number;
+            /**
+             * Left Out
+             * @description Rests that do not agree with gravity by five standard deviations.
+             */
+            left_out: number;
+            /**
+             * Poses
+             * @description Different directions among the rests.
+             */
+            poses: number;
+            /**
+             * Before G
+             * @description Root mean square by which the raw sizes differ from gravity, g.
+             */
+            before_g: number;
+            /**
+             * Residual G
+             * @description The same after the calibration, g.
+             */
+            residual_g: number;
+            /**
+             * Heldout G
+             * @description The same of rests predicted from all others, g.
+             */
+            heldout_g: number;
+            /**
+             * Expected G
+             * @description What the noise of the means alone makes of it, g.
+             */
+            expected_g: number;
+            /**
+             * Noise Density M S2
+             * @description White noise by axis, m/s2/sqrt(Hz), from the rests.
+             */
+            noise_density_m_s2: {
+                [key: string]: number;
+            };
+            /** Text */
+            text: string[];
+        };
+        /**
+         * AccelerometerVersion
+         * @description A version of a unit's accelerometer.
+         */
+        AccelerometerVersion: {
+            /** Serial */
+            serial: string;
+            /**
+             * Sensor
+             * @enum {string}
+             */
+            sensor: "accelerometer" | "magnetometer";
+            /**
+             * Version
+             * @description From 1, per serial number and sensor; a version never changes.
+             */
+            version: number;
+            /**
+             * Verdict
+             * @enum {string}
+             */
+            verdict: "adequate" | "unexplained";
+            /**
+             * At
+             * Format: date-time
+             * @description When it was stored.
+             */
+            at: string;
+            /** By */
+            by: string;
+            /**
+             * By Key
+             * @description Name of the API key that acted; null: none did, the person's name is as typed.
+             */
+            by_key: string | null;
+            data: components["schemas"]["MeasuredData"];
+            /**
+             * Hash
+             * @description SHA-256 of the result in canonical JSON.
+             */
+            hash: string;
+            /**
+             * Summary
+             * @description What the fit found, in sentences.
+             */
+            summary: string[];
+            /**
+             * Formats
+             * @description Formats in which it is available; none for a magnetometer whose field was not constant.
+             */
+            formats: components["schemas"]["SensorFormatResponse"][];
+            result: components["schemas"]["AccelerometerResponse"];
         };
         /**
          * Advice
@@ -4992,6 +5228,19 @@ export interface components {
             heldout_by_leg: components["schemas"]["LegError"][];
         };
         /**
+         * Estimate
+         * @description A value with its standard uncertainty.
+         */
+        Estimate: {
+            /** Value */
+            value: number;
+            /**
+             * U
+             * @description Standard uncertainty; null: the value was given.
+             */
+            u: number | null;
+        };
+        /**
          * EventResponse
          * @description Something that happened in a campaign.
          */
@@ -6355,6 +6604,146 @@ export interface components {
             high: (number | null)[];
         };
         /**
+         * MagnetometerRequest
+         * @description A calibration of a magnetometer, to be kept as the next version of a unit.
+         */
+        MagnetometerRequest: {
+            data: components["schemas"]["MeasuredData"];
+            /** @description As `labctl magnetometer FILE --json` prints it. */
+            result: components["schemas"]["MagnetometerResponse"];
+            /**
+             * By
+             * @description Who.
+             */
+            by: string;
+        };
+        /**
+         * MagnetometerResponse
+         * @description Hard and soft iron of a magnetometer: field = soft iron (reading - hard iron), in the axes of the sensor.
+         */
+        MagnetometerResponse: {
+            /**
+             * Verdict
+             * @description adequate: the readings are those of a constant field up to their noise; unexplained: they are not.
+             * @enum {string}
+             */
+            verdict: "adequate" | "unexplained";
+            /** Hard Iron Ut */
+            hard_iron_ut: {
+                [key: string]: components["schemas"]["Estimate"];
+            };
+            /**
+             * Soft Iron
+             * @description Symmetric matrix: xx, yy, zz, xy, xz, yz.
+             */
+            soft_iron: {
+                [key: string]: components["schemas"]["Estimate"];
+            };
+            field_ut: components["schemas"]["Estimate"];
+            /**
+             * Covariance
+             * @description Of hard iron x, y, z, soft iron xx, yy, zz, xy, xz, yz, and field.
+             */
+            covariance: number[][];
+            /** Readings */
+            readings: number;
+            /**
+             * Left Out
+             * @description Readings further from the ellipsoid than five robust standard deviations.
+             */
+            left_out: number;
+            /**
+             * Before Ut
+             * @description Standard deviation of the size of the raw readings, uT.
+             */
+            before_ut: number;
+            /**
+             * Residual Ut
+             * @description Root mean square of the distances from the ellipsoid, uT.
+             */
+            residual_ut: number;
+            /**
+             * Heldout Ut
+             * @description The same of readings predicted from those of other times, uT.
+             */
+            heldout_ut: number;
+            /**
+             * Noise Ut
+             * @description Noise of the distances from one reading to the next, uT.
+             */
+            noise_ut: number;
+            /**
+             * Repetition
+             * @description Readings that tell as much as one independent reading, by the autocorrelation of the distances; the covariance includes it.
+             */
+            repetition: number;
+            /**
+             * Heading Error Deg
+             * @description Angle to which the held-out error turns a field square to it, deg.
+             */
+            heading_error_deg: number;
+            /**
+             * Largest Gap Deg
+             * @description From any direction to the nearest that was measured, at most, deg.
+             */
+            largest_gap_deg: number;
+            /** Text */
+            text: string[];
+        };
+        /**
+         * MagnetometerVersion
+         * @description A version of a unit's magnetometer.
+         */
+        MagnetometerVersion: {
+            /** Serial */
+            serial: string;
+            /**
+             * Sensor
+             * @enum {string}
+             */
+            sensor: "accelerometer" | "magnetometer";
+            /**
+             * Version
+             * @description From 1, per serial number and sensor; a version never changes.
+             */
+            version: number;
+            /**
+             * Verdict
+             * @enum {string}
+             */
+            verdict: "adequate" | "unexplained";
+            /**
+             * At
+             * Format: date-time
+             * @description When it was stored.
+             */
+            at: string;
+            /** By */
+            by: string;
+            /**
+             * By Key
+             * @description Name of the API key that acted; null: none did, the person's name is as typed.
+             */
+            by_key: string | null;
+            data: components["schemas"]["MeasuredData"];
+            /**
+             * Hash
+             * @description SHA-256 of the result in canonical JSON.
+             */
+            hash: string;
+            /**
+             * Summary
+             * @description What the fit found, in sentences.
+             */
+            summary: string[];
+            /**
+             * Formats
+             * @description Formats in which it is available; none for a magnetometer whose field was not constant.
+             */
+            formats: components["schemas"]["SensorFormatResponse"][];
+            result: components["schemas"]["MagnetometerResponse"];
+        };
+        /**
          * MarkJson
          * @description Where one kind of finding is in a channel: the times of the longest of `places` stretches.
          *
@@ -6373,6 +6762,35 @@ export interface components {
             places: number;
             /** Whole */
             whole: boolean;
+        };
+        /**
+         * MeasuredData
+         * @description The data behind a result, and how they were read.
+         */
+        MeasuredData: {
+            /** Files */
+            files: components["schemas"]["MeasuredFile"][];
+            /**
+             * Read As
+             * @description Columns, their unit, and the local gravity or field that was given.
+             */
+            read_as: string;
+        };
+        /**
+         * MeasuredFile
+         * @description A file that a result was fitted to.
+         */
+        MeasuredFile: {
+            /**
+             * Name
+             * @description Name of the file, without the folder it was in.
+             */
+            name: string;
+            /**
+             * Sha256
+             * @description SHA-256 of its content, as `sha256sum` prints it.
+             */
+            sha256: string;
         };
         /**
          * MeasuredUnder
@@ -8073,6 +8491,76 @@ export interface components {
             confirmed_by: string;
             /** @description When the next start needs a person at the bench; null: never, or not known. */
             attendance: components["schemas"]["AttendanceResponse"] | null;
+        };
+        /**
+         * SensorFormatResponse
+         * @description A format in which a version is available.
+         */
+        SensorFormatResponse: {
+            /**
+             * Id
+             * @description Name of the format, to be sent as `format`.
+             */
+            id: string;
+            /** Title */
+            title: string;
+            /**
+             * Suffix
+             * @description Suffix of a file in this format, without the dot.
+             */
+            suffix: string;
+        };
+        /**
+         * SensorVersionResponse
+         * @description A version of a sensor, without its parameters.
+         */
+        SensorVersionResponse: {
+            /** Serial */
+            serial: string;
+            /**
+             * Sensor
+             * @enum {string}
+             */
+            sensor: "accelerometer" | "magnetometer";
+            /**
+             * Version
+             * @description From 1, per serial number and sensor; a version never changes.
+             */
+            version: number;
+            /**
+             * Verdict
+             * @enum {string}
+             */
+            verdict: "adequate" | "unexplained";
+            /**
+             * At
+             * Format: date-time
+             * @description When it was stored.
+             */
+            at: string;
+            /** By */
+            by: string;
+            /**
+             * By Key
+             * @description Name of the API key that acted; null: none did, the person's name is as typed.
+             */
+            by_key: string | null;
+            data: components["schemas"]["MeasuredData"];
+            /**
+             * Hash
+             * @description SHA-256 of the result in canonical JSON.
+             */
+            hash: string;
+            /**
+             * Summary
+             * @description What the fit found, in sentences.
+             */
+            summary: string[];
+            /**
+             * Formats
+             * @description Formats in which it is available; none for a magnetometer whose field was not constant.
+             */
+            formats: components["schemas"]["SensorFormatResponse"][];
         };
         /**
          * ShiftJson
@@ -11980,6 +12468,214 @@ export interface operations {
                 content: {
                     "application/json": components["schemas"]["MotionResponse"];
                 };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    sensors_api_units__serial__sensors_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                serial: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["SensorVersionResponse"][];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    accelerometer_api_units__serial__sensors_accelerometer_get: {
+        parameters: {
+            query?: {
+                /** @description Number of the version; default: the newest. */
+                version?: number | null;
+            };
+            header?: never;
+            path: {
+                serial: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["AccelerometerVersion"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    keep_accelerometer_api_units__serial__sensors_accelerometer_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                serial: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["AccelerometerRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["AccelerometerVersion"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    magnetometer_api_units__serial__sensors_magnetometer_get: {
+        parameters: {
+            query?: {
+                /** @description Number of the version; default: the newest. */
+                version?: number | null;
+            };
+            header?: never;
+            path: {
+                serial: string;
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MagnetometerVersion"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    keep_magnetometer_api_units__serial__sensors_magnetometer_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path: {
+                serial: string;
+            };
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["MagnetometerRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["MagnetometerVersion"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    file_api_units__serial__sensors__sensor__file_get: {
+        parameters: {
+            query: {
+                /** @description px4, ardupilot, json, python, c; an accelerometer also kalibr, ros. */
+                format: string;
+                /** @description Number of the version; default: the newest. */
+                version?: number | null;
+                /** @description Number of the sensor: px4 from 0, ardupilot from 1; default: the first. */
+                instance?: number | null;
+                /** @description Device id of the sensor at the autopilot. */
+                device_id?: number | null;
+            };
+            header?: never;
+            path: {
+                serial: string;
+                sensor: "accelerometer" | "magnetometer";
+            };
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content?: never;
             };
             /** @description Validation Error */
             422: {

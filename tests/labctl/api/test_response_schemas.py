@@ -14,6 +14,7 @@ FILES = {
     "GET /api/units/{serial}/calibration": "a calibration file: the document, or C, in a consumer's format",
     "GET /api/units/{serial}/calibrations/{version}/certificate": "a PDF, or a DCC, as issued; the JSON has a schema",
     "GET /api/recordings/{recording}/file": "a zip",
+    "GET /api/units/{serial}/sensors/{sensor}/file": "a file in a consumer's format",
     "POST /api/backups": "nothing (204)",
 }
 #: Values of any JSON kind: whose form they have.

@@ -270,6 +270,8 @@ ELSEWHERE = {
     "/api/standards/{label}/findings": "tests/labctl/services/standards/test_story.py",
     "/api/standards/{label}/findings/{finding}/withdraw": "tests/labctl/services/standards/test_story.py",
     "/api/check-gyros/{serial}": "tests/labctl/services/test_check_gyros.py",
+    "/api/units/{serial}/sensors/accelerometer": "tests/labctl/api/test_sensors.py",
+    "/api/units/{serial}/sensors/magnetometer": "tests/labctl/api/test_sensors.py",
     "/api/environment": "tests/labctl/api/test_standards.py",
 }
 

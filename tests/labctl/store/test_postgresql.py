@@ -27,6 +27,7 @@ from labctl.store import (
     CheckGyroRow,
     FetchRow,
     NewReleaseRequest,
+    NewSensorVersion,
     Release,
     RoomReading,
     Store,
@@ -287,11 +288,15 @@ def test_the_register_of_standards_is_the_same_as_in_a_file(url: str, tmp_path: 
             store.room_environment.add([reading], AT, "T. Technician")
             store.units.get(store.recordings.get(store.recordings.add_import(simulated(), AT)).serial)
             store.check_gyros.add(CheckGyroRow("FOG-0001", "mark", 25.0, AT.date(), "stays", "Q", AT))
+            new = NewSensorVersion("IMU-7", "accelerometer", "adequate", {"files": []}, {"text": ["a"], "u": 1e-5}, "Q")
+            assert [store.sensor_versions.add(new, AT).version for _ in range(2)] == [1, 2]
+            assert [each.result for each in store.sensor_versions.of_unit("IMU-7")] == [new.result] * 2
             assert store.standards.get("SN-0815") == store.standards.all()[0]
             assert [each.high for each in store.room_environment.spans(AT, AT, "any")] == [21.5]
             assert [each.chart_from for each in store.check_gyros.all()] == [AT.date()]
         assert not check(location).findings
     in_file, on_server = rows_of(path), rows_of(url)
+    assert len(in_file["sensor_versions"]) == 2
     for name in ("standards", "standard_certificates", "standard_checks", "standard_findings", "check_gyros"):
         assert len(in_file[name]) == 1
     for name in (*in_file.keys() - {"block_digests"},):

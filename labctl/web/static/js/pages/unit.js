@@ -30,6 +30,7 @@ import { certificateTable } from "../unit/certificate_state.js";
 import { datasheetCard } from "../unit/datasheet.js";
 import { exportFiles } from "../unit/export_files.js";
 import { inForce } from "../unit/in_force.js";
+import { sensorsCard } from "../unit/sensors.js";
 import { trendCard } from "../trend/card.js";
 import { uncertaintyInUse } from "../unit/uncertainty.js";
 import { versionFacts } from "../unit/version_facts.js";
@@ -41,12 +42,13 @@ import { versionFacts } from "../unit/version_facts.js";
 /** @param {PageContext} context */
 export async function page({ params, signal }) {
   const path = { serial: params.serial };
-  const [unit, rows, history, issued, waiting] = await Promise.all([
+  const [unit, rows, history, issued, waiting, sensors] = await Promise.all([
     get("/api/units/{serial}", { path, signal }),
     get("/api/units/{serial}/calibrations", { path, signal }),
     get("/api/units/{serial}/certifications", { path, signal }),
     get("/api/units/{serial}/certificates", { path, signal }),
     get("/api/units/{serial}/release-requests", { path, signal }),
+    get("/api/units/{serial}/sensors", { path, signal }),
   ]);
   const force = history.find((act) => act.version === unit.certified_version && act.act === "certify");
   const explore = `/explore?unit=${encodeURIComponent(unit.serial)}`;
@@ -72,6 +74,7 @@ export async function page({ params, signal }) {
           h("p", {}, "No calibration yet."),
           h("p", {}, h("a", { class: "button primary", href: explore }, "Fit a model")),
         ),
+    sensorsCard(sensors),
     issued.length ? card("Certificates", certificateTable(issued)) : null,
     unit.recordings.length ? datasheetCard(unit.serial, signal) : null,
     h(

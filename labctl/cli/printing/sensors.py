@@ -1,0 +1,82 @@
+"""Prints calibrations of accelerometers and magnetometers, and their versions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from labctl.cli.output import console, format_number, table
+from labctl.services.schemas.reports.accelerometer import AccelerometerResponse
+from labctl.services.schemas.reports.magnetometer import MagnetometerResponse
+from labctl.services.schemas.sensors import AccelerometerVersion, MagnetometerVersion, SensorVersionResponse
+
+
+def print_sensor(answer: AccelerometerResponse | MagnetometerResponse) -> None:
+    """Print the parameters with their uncertainty, the verdict and what it stands on."""
+    if isinstance(answer, AccelerometerResponse):
+        _print_accelerometer(answer)
+    else:
+        _print_magnetometer(answer)
+
+
+def print_kept(answer: AccelerometerVersion | MagnetometerVersion) -> None:
+    """Print a version that was kept: its parameters, who and when, and its data."""
+    print_sensor(answer.result)
+    files = ", ".join(f"{each.name} ({each.sha256[:12]})" for each in answer.data.files)
+    console.print(
+        f"{answer.sensor} of {answer.serial}, version {answer.version}: stored {answer.at:%Y-%m-%d %H:%M} UTC by "
+        f"{answer.by}; hash {answer.hash[:12]}",
+        markup=False, soft_wrap=True,
+    )  # fmt: skip
+    console.print(f"data: {files}; {answer.data.read_as}", markup=False, soft_wrap=True, style="dim")
+
+
+def print_versions(answers: Sequence[SensorVersionResponse]) -> None:
+    """Print the versions of a unit's sensors."""
+    rows = table("accelerometer and magnetometer", "sensor", "version", "verdict", "stored, UTC", "by", "files", "hash")
+    for each in answers:
+        rows.add_row(
+            each.sensor, str(each.version), each.verdict, f"{each.at:%Y-%m-%d %H:%M}", each.by,
+            str(len(each.data.files)), each.hash[:12],
+        )  # fmt: skip
+    console.print(rows)
+
+
+def _print_accelerometer(answer: AccelerometerResponse) -> None:
+    rows = table("accelerometer", "coefficient", "unit", "value", "u", numbers=2)
+    for name, unit, values in (
+        ("bias", "g", answer.bias_g),
+        ("scale factor", "1", answer.scale_factor),
+        ("misalignment", "1", answer.misalignment),
+    ):
+        for place, found in values.items():
+            rows.add_row(f"{name} {place}", unit, format_number(found.value, 5), format_number(found.u, 2))
+    console.print(rows)
+    _print_verdict(answer)
+    density = max(answer.noise_density_m_s2.values())
+    console.print(
+        f"{answer.rests - answer.left_out} of {answer.rests} rests used, in {answer.poses} poses; white noise up to "
+        f"{density:.2g} m/s2/sqrt(Hz)",
+        style="dim",
+    )
+
+
+def _print_magnetometer(answer: MagnetometerResponse) -> None:
+    rows = table("magnetometer", "coefficient", "unit", "value", "u", numbers=2)
+    for axis, found in answer.hard_iron_ut.items():
+        rows.add_row(f"hard iron {axis}", "uT", format_number(found.value), format_number(found.u, 2))
+    for place, found in answer.soft_iron.items():
+        rows.add_row(f"soft iron {place}", "1", format_number(found.value, 5), format_number(found.u, 2))
+    rows.add_row("field", "uT", format_number(answer.field_ut.value), format_number(answer.field_ut.u, 2))
+    console.print(rows)
+    _print_verdict(answer)
+    console.print(
+        f"{answer.readings - answer.left_out} of {answer.readings} readings used; from any direction to the nearest "
+        f"measured one: up to {answer.largest_gap_deg:.0f} deg",
+        style="dim",
+    )
+
+
+def _print_verdict(answer: AccelerometerResponse | MagnetometerResponse) -> None:
+    console.print(f"verdict: {answer.verdict}", style="green" if answer.verdict == "adequate" else "bold red")
+    for line in answer.text:
+        console.print(line, soft_wrap=True, markup=False)

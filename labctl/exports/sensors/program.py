@@ -1,0 +1,61 @@
+"""A sensor's calibration for programs: a JSON document, a Python module, a C99 header."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+
+from labctl.exports.comments import commented, plain
+from labctl.exports.sensors.parameters import Parameters
+
+SCHEMA = "labctl-sensor/1"
+FORMULA = "corrected = matrix (reading - offset), along x, y, z of the sensor"
+
+
+def json_text(found: Parameters, head: Sequence[str]) -> str:
+    """Return offset and matrix, with the parameters' covariance, as a JSON document."""
+    document = {
+        "schema": SCHEMA, "sensor": found.sensor, "formula": FORMULA, "unit": found.unit,
+        "offset": found.offset.tolist(), "matrix": found.matrix.tolist(),
+        "covariance": {"of": list(found.labels), "values": found.covariance.tolist()}, "text": list(head),
+    }  # fmt: skip
+    return json.dumps(document, indent=2) + "\n"
+
+
+def python_text(found: Parameters, head: Sequence[str]) -> str:
+    """Return a module that needs nothing but Python."""
+    lines = [*map(plain, head), f"{FORMULA}; offset, readings and results in {found.unit}."]
+    return commented(lines) + (
+        f"OFFSET = {found.offset.tolist()!r}\n"
+        f"MATRIX = {found.matrix.tolist()!r}\n\n\n"
+        "def correct(reading):\n"
+        f'    """Return the corrected {found.sensor} reading (x, y, z), {found.unit}, as a list."""\n'
+        "    away = [float(value) - offset for value, offset in zip(reading, OFFSET, strict=True)]\n"
+        "    return [sum(factor * value for factor, value in zip(row, away)) for row in MATRIX]\n"
+    )
+
+
+def c_text(found: Parameters, head: Sequence[str]) -> str:
+    """Return a C99 header with one function; `#define LABCTL_REAL float` before it for single precision."""
+    name = found.sensor
+    lines = [*map(plain, head), f"{FORMULA}; offset, readings and results in {found.unit}."]
+    comment = "\n * ".join(line.replace("*/", "* /") for line in lines)
+    rows = ", ".join("{" + ", ".join(f"{value:.17g}" for value in row) + "}" for row in found.matrix)
+    offset = ", ".join(f"{value:.17g}" for value in found.offset)
+    return (
+        f"/* {comment} */\n"
+        f"#ifndef LABCTL_{name.upper()}_H\n#define LABCTL_{name.upper()}_H\n\n"
+        "#ifndef LABCTL_REAL\n#define LABCTL_REAL double\n#endif\n\n"
+        f"static const double {name}_offset[3] = {{{offset}}};\n"
+        f"static const double {name}_matrix[3][3] = {{{rows}}};\n\n"
+        f"static inline void {name}_correct(const LABCTL_REAL *reading, LABCTL_REAL *corrected)\n"
+        "{\n"
+        "    LABCTL_REAL away[3];\n"
+        "    int i, j;\n"
+        f"    for (i = 0; i < 3; i++) away[i] = reading[i] - (LABCTL_REAL){name}_offset[i];\n"
+        "    for (i = 0; i < 3; i++) {\n"
+        "        corrected[i] = 0;\n"
+        f"        for (j = 0; j < 3; j++) corrected[i] += (LABCTL_REAL){name}_matrix[i][j] * away[j];\n"
+        "    }\n"
+        "}\n\n#endif\n"
+    )

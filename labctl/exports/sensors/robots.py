@@ -1,0 +1,46 @@
+"""An accelerometer's calibration for robots: the intrinsic matrix of Kalibr, and the file of imu_calib on ROS."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.exports.comments import commented, plain
+from labctl.exports.sensors.parameters import AccelerometerParameters
+
+
+def lower_triangle(errors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the lower triangular M with M force' = (1 + errors) force, where force' is force in turned axes.
+
+    Kalibr's x axis is the accelerometer's own, labctl's z axis is: the turn between the two changes no size.
+    """
+    _, upper = np.linalg.qr((np.eye(3) + errors).T)
+    return np.tril((upper * np.sign(np.diag(upper))[:, None]).T) + 0.0  # no minus before a zero
+
+
+def kalibr(found: AccelerometerParameters, head: Sequence[str]) -> str:
+    """Return Kalibr's keys of the model scale-misalignment: reading = M force + bias (IccScaledMisalignedImu)."""
+    offset = ", ".join(f"{value:.6g}" for value in found.offset)
+    notes = [
+        "The keys of the file that Kalibr writes with --imu-models scale-misalignment: reading = M force + bias.",
+        "M is lower triangular: the x axis is the accelerometer's own, the y axis lies in the plane of its x and y.",
+        f"LOST bias: Kalibr estimates it over time; here x, y, z = {offset} m/s2.",
+        "accelerometer_random_walk is not in this file: rests of seconds do not tell it.",
+    ]
+    body = ["model: scale-misalignment", "accelerometers:", "  M:"]
+    body += ["  - [" + ", ".join(f"{value:.12g}" for value in row) + "]" for row in lower_triangle(found.errors)]
+    body.append(f"accelerometer_noise_density: {found.noise_density_m_s2:.9e}  # m/s^2/sqrt(Hz), the largest axis")
+    return commented([*map(plain, head), *notes]) + "\n".join(body) + "\n"
+
+
+def ros(found: AccelerometerParameters, head: Sequence[str]) -> str:
+    """Return the file that the node apply_calib of imu_calib reads: corrected = SM reading - bias, in m/s2."""
+    matrix = found.matrix
+    notes = ["For the node apply_calib of the ROS package imu_calib: corrected = SM reading - bias, m/s2."]
+    body = [
+        "SM: [" + ", ".join(f"{value:.12g}" for value in matrix.ravel()) + "]",
+        "bias: [" + ", ".join(f"{value:.12g}" for value in matrix @ found.offset) + "]",
+    ]
+    return commented([*map(plain, head), *notes]) + "\n".join(body) + "\n"

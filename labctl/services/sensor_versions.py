@@ -1,0 +1,187 @@
+"""Versions of a unit's accelerometer and magnetometer: kept, listed, shown again."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+import numpy as np
+
+from labctl.canonical_json import canonical
+from labctl.errors import BadInput, NotFound
+from labctl.exports.sensors.formats import SENSOR_FORMATS
+from labctl.fitting.magnetometer.calibrate import AXES
+from labctl.fitting.magnetometer.ellipsoid import PLACES
+from labctl.fitting.poses.triad import UPPER
+from labctl.json_types import JsonDocument
+from labctl.recording.files import FILE_NAMES
+from labctl.recording.info import SERIAL_PATTERN
+from labctl.services.schemas.reports.accelerometer import AccelerometerResponse
+from labctl.services.schemas.reports.magnetometer import Estimate, MagnetometerResponse
+from labctl.services.schemas.sensors import (
+    AccelerometerRequest,
+    AccelerometerVersion,
+    MagnetometerRequest,
+    MagnetometerVersion,
+    MeasuredData,
+    MeasuredFile,
+    SensorName,
+    SensorVersionResponse,
+)
+from labctl.services.sensor_exports import export_of
+from labctl.store import NewSensorVersion, SensorVersionRow, Store
+
+#: Largest difference between a stated uncertainty and that of the covariance, relative.
+ROUNDING = 1e-6
+
+
+def measured_data(paths: Sequence[Path], read_as: str) -> MeasuredData:
+    """Return the names and hashes of files, and of the files in the folders of recordings."""
+    files = []
+    for path in paths:
+        inside = sorted(each for each in path.glob("*") if each.name in FILE_NAMES) if path.is_dir() else [path]
+        files += [MeasuredFile(name=each.name, sha256=hashlib.sha256(each.read_bytes()).hexdigest()) for each in inside]
+    return MeasuredData(files=files, read_as=read_as)
+
+
+@dataclass(frozen=True)
+class VersionFile:
+    """A version in a format."""
+
+    name: str
+    content: str
+    media_type: str
+    etag: str
+
+
+def keep_accelerometer(store: Store, serial: str, asked: AccelerometerRequest, at: datetime) -> AccelerometerVersion:
+    """Keep a result as a unit's next version. Raises BadInput for one that contradicts itself; VersionTaken."""
+    return AccelerometerVersion.model_validate(_kept(store, serial, "accelerometer", asked, at))
+
+
+def keep_magnetometer(store: Store, serial: str, asked: MagnetometerRequest, at: datetime) -> MagnetometerVersion:
+    """Keep a result as a unit's next version. Raises BadInput for one that contradicts itself; VersionTaken."""
+    return MagnetometerVersion.model_validate(_kept(store, serial, "magnetometer", asked, at))
+
+
+def _kept(
+    store: Store, serial: str, sensor: SensorName, asked: AccelerometerRequest | MagnetometerRequest, at: datetime
+) -> dict[str, object]:
+    if re.fullmatch(SERIAL_PATTERN, serial) is None:
+        raise BadInput(
+            f"serial number {serial[:80]!r}: give 1 to 64 characters: a letter or digit, then also . _ + # - and spaces"
+        )
+    result = asked.result.model_dump(mode="json")
+    problem = _problem(_estimates(asked.result), asked.result.covariance) or _not_json(result)
+    if problem is not None:
+        raise BadInput(f"result of the {sensor}: {problem}; send what `labctl {sensor} FILE --json` prints, unchanged")
+    data = asked.data.model_dump(mode="json")
+    new = NewSensorVersion(serial, sensor, asked.result.verdict, data, result, asked.by)
+    return _fields(store.sensor_versions.add(new, at), whole=True)
+
+
+def list_versions(store: Store, serial: str) -> list[SensorVersionResponse]:
+    """Return every version of a unit's accelerometer and magnetometer, newest first. Raises NotFound."""
+    unit = store.units.get(serial).serial
+    return [_answer(row) for row in store.sensor_versions.of_unit(unit)]
+
+
+def one_accelerometer(store: Store, serial: str, version: int | None = None) -> AccelerometerVersion:
+    """Return a version, or the newest. Raises NotFound."""
+    row = store.sensor_versions.get(serial, "accelerometer", version)
+    return AccelerometerVersion.model_validate(_fields(row, whole=True))
+
+
+def one_magnetometer(store: Store, serial: str, version: int | None = None) -> MagnetometerVersion:
+    """Return a version, or the newest. Raises NotFound."""
+    row = store.sensor_versions.get(serial, "magnetometer", version)
+    return MagnetometerVersion.model_validate(_fields(row, whole=True))
+
+
+def one_version(
+    store: Store, serial: str, sensor: str, version: int | None = None
+) -> AccelerometerVersion | MagnetometerVersion:
+    """Return a version of a sensor by its name, or the newest. Raises NotFound."""
+    if sensor == "accelerometer":
+        return one_accelerometer(store, serial, version)
+    if sensor == "magnetometer":
+        return one_magnetometer(store, serial, version)
+    raise NotFound(f"sensor {sensor!r}: name accelerometer or magnetometer")
+
+
+def version_file(
+    store: Store,
+    serial: str,
+    sensor: str,
+    version: int | None,
+    format_name: str,
+    instance: int | None = None,
+    device_id: int | None = None,
+) -> VersionFile:
+    """Return a version in a format: the bytes that its fit exported. Raises NotFound, BadInput."""
+    found = one_version(store, serial, sensor, version)
+    content = export_of(found.result, format_name, instance, device_id)
+    chosen = SENSOR_FORMATS[found.sensor][format_name]
+    etag = hashlib.sha256(content.encode()).hexdigest()
+    return VersionFile(f"{found.sensor}-{found.version}.{chosen.suffix}", content, chosen.media_type, etag)
+
+
+def _estimates(result: AccelerometerResponse | MagnetometerResponse) -> list[Estimate | None]:
+    """Return the estimates of a result in the order of its covariance; None: one that is not there."""
+    if isinstance(result, AccelerometerResponse):
+        errors: Mapping[str, Estimate] = {
+            **{a + a: each for a, each in result.scale_factor.items()},
+            **result.misalignment,
+        }
+        return [result.bias_g.get(a) for a in AXES] + [errors.get(AXES[i] + AXES[j]) for i, j in UPPER]
+    return [
+        *(result.hard_iron_ut.get(a) for a in AXES), *(result.soft_iron.get(AXES[i] + AXES[j]) for i, j in PLACES),
+        result.field_ut,
+    ]  # fmt: skip
+
+
+def _not_json(result: JsonDocument) -> str | None:
+    """Return in words why a result cannot be written as JSON; None: it can."""
+    try:
+        canonical(result)
+    except ValueError as error:  # not a number, or half a character
+        return f"a value cannot be stored ({error})"
+    return None
+
+
+def _problem(estimates: Sequence[Estimate | None], covariance: Sequence[Sequence[float]]) -> str | None:
+    """Return in words why a result does not come from a fit; None: it may."""
+    found, size = [each for each in estimates if each is not None], len(estimates)
+    if len(found) != size:
+        return f"{size - len(found)} of {size} parameters are missing"
+    if len(covariance) != size or any(len(row) != size for row in covariance):
+        return f"the covariance is not {size} by {size}"
+    matrix = np.array(covariance, dtype=np.float64)
+    with np.errstate(over="ignore"):
+        if not (np.isfinite(matrix).all() and np.allclose(matrix, matrix.T, rtol=ROUNDING, atol=0)):
+            return "the covariance is not finite and symmetric"
+    if np.diag(matrix).min() < 0:
+        return "a variance is negative"
+    for each, u in zip(found, np.sqrt(np.diag(matrix)), strict=True):
+        if each.u is not None and not abs(each.u - u) <= ROUNDING * u:
+            return f"u = {each.u:.3g} where the covariance says {u:.3g}"
+    return None
+
+
+def _answer(row: SensorVersionRow) -> SensorVersionResponse:
+    return SensorVersionResponse.model_validate(_fields(row))
+
+
+def _fields(row: SensorVersionRow, *, whole: bool = False) -> dict[str, object]:
+    result = {"result": row.result} if whole else {}
+    adequate = row.sensor == "accelerometer" or row.verdict == "adequate"
+    formats = SENSOR_FORMATS[row.sensor] if adequate else {}
+    return result | {
+        "serial": row.serial, "sensor": row.sensor, "version": row.version, "verdict": row.verdict, "at": row.at,
+        "by": row.by, "by_key": row.by_key, "data": row.data, "hash": row.hash, "summary": row.result["text"],
+        "formats": [{"id": name, "title": each.title, "suffix": each.suffix} for name, each in formats.items()],
+    }  # fmt: skip

@@ -1,0 +1,90 @@
+"""Formats of sensors: the formula that each file states, run on its numbers, gives what the parameters mean."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from labctl.errors import BadInput
+from labctl.exports.sensors.formats import written
+from labctl.exports.sensors.parameters import AccelerometerParameters, MagnetometerParameters, Parameters
+from tests.helpers.magnetic_turns import HARD_IRON_UT, SOFT_IRON, fields
+from tests.helpers.poses_at_rest import BIAS_G, ERRORS, poses
+
+G = 9.80665
+ACCELEROMETER = AccelerometerParameters(BIAS_G, ERRORS, 1.0, np.eye(9), 0.0013)
+MAGNETOMETER = MagnetometerParameters(HARD_IRON_UT, SOFT_IRON, np.eye(10))
+FORCE = poses(20, 1) * G
+#: Parameters, true inputs and readings without noise.
+CASES = [
+    pytest.param(ACCELEROMETER, FORCE, FORCE @ (np.eye(3) + ERRORS).T + BIAS_G * G, id="accelerometer"),
+    pytest.param(MAGNETOMETER, fields(20), fields(20) @ np.linalg.inv(SOFT_IRON).T + HARD_IRON_UT, id="magnetometer"),
+]
+
+
+@pytest.mark.parametrize(("found", "true", "readings"), CASES)
+def test_json_and_python_correct_a_reading(found: Parameters, true: np.ndarray, readings: np.ndarray) -> None:
+    document = json.loads(written(found, ["head"], "json", None, None))
+    corrected = (readings - document["offset"]) @ np.array(document["matrix"]).T
+    assert corrected == pytest.approx(true, abs=1e-12)
+    assert len(document["covariance"]["of"]) == len(document["covariance"]["values"])
+    module: dict[str, object] = {}
+    exec(written(found, ["a */ line"], "python", None, None), module)
+    correct = module["correct"]
+    assert callable(correct)
+    assert np.array([correct(row) for row in readings]) == pytest.approx(true, abs=1e-12)
+
+
+@pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
+@pytest.mark.parametrize(("found", "true", "readings"), CASES)
+def test_the_c_header_corrects_a_reading(
+    tmp_path: Path, found: Parameters, true: np.ndarray, readings: np.ndarray
+) -> None:
+    (tmp_path / "sensor.h").write_text(written(found, ["a */ line"], "c", None, None), encoding="ascii")
+    (tmp_path / "main.c").write_text(
+        '#include <stdio.h>\n#include "sensor.h"\n'
+        "int main(void) { double r[3], c[3];\n"
+        'while (scanf("%lf %lf %lf", r, r + 1, r + 2) == 3) {\n'
+        f'{found.sensor}_correct(r, c); printf("%.17g %.17g %.17g\\n", c[0], c[1], c[2]); }} return 0; }}\n',
+        encoding="ascii",
+    )
+    program = str(tmp_path / "program")
+    options = ("-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic")
+    subprocess.run(["cc", *options, str(tmp_path / "main.c"), "-o", program], check=True)
+    given = "\n".join(" ".join(f"{value:.17g}" for value in row) for row in readings)
+    out = subprocess.run([program], input=given, capture_output=True, text=True, check=True).stdout
+    assert np.array([line.split() for line in out.splitlines()], dtype=float) == pytest.approx(true, abs=1e-12)
+
+
+def test_ros_corrects_as_its_node_does() -> None:
+    _, true, readings = CASES[0].values
+    document = yaml.safe_load(written(ACCELEROMETER, ["head"], "ros", None, None))
+    corrected = np.asarray(readings) @ np.array(document["SM"]).reshape(3, 3).T - document["bias"]
+    assert corrected == pytest.approx(true, abs=1e-9)
+
+
+def test_the_matrix_of_kalibr_is_lower_triangular_and_changes_no_size() -> None:
+    _, true, readings = CASES[0].values
+    document = yaml.safe_load(written(ACCELEROMETER, ["head"], "kalibr", None, None))
+    matrix = np.array(document["accelerometers"]["M"])
+    assert np.triu(matrix, 1) == pytest.approx(0)
+    assert np.diag(matrix).min() > 0
+    force = np.linalg.solve(matrix, (np.asarray(readings) - BIAS_G * G).T).T
+    assert np.linalg.norm(force, axis=1) == pytest.approx(np.linalg.norm(np.asarray(true), axis=1), abs=1e-9)
+    # turned, and only turned
+    assert force @ force.T == pytest.approx(np.asarray(true) @ np.asarray(true).T, abs=1e-8)
+
+
+def test_what_a_format_has_not_is_refused() -> None:
+    with pytest.raises(BadInput, match="this magnetometer is exported to px4, ardupilot, json, python, c"):
+        written(MAGNETOMETER, [], "kalibr", None, None)
+    with pytest.raises(BadInput, match="--export json takes no --instance"):
+        written(MAGNETOMETER, [], "json", 1, None)
+    with pytest.raises(BadInput, match="--export ros takes no --device-id"):
+        written(ACCELEROMETER, [], "ros", None, 7)

@@ -1,0 +1,87 @@
+"""Versions of sensors on the command line and in the database: numbered, sealed, shown again as they were."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import Result
+from typer.testing import CliRunner
+
+from labctl.cli.app import app
+from labctl.recording.files import write_recording
+from labctl.store import check
+from studies.poses_simulation import Session, simulate_session
+from tests.helpers.magnetic_turns import fields, readings_of
+from tests.helpers.poses_at_rest import poses, readings_in, write_readings
+
+
+@pytest.fixture
+def database(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    path = tmp_path / "lab.sqlite"
+    monkeypatch.setenv("LABCTL_DATABASE", str(path))
+    return path
+
+
+def run(*arguments: str, status: int = 0) -> Result:
+    result = CliRunner().invoke(app, list(arguments))
+    assert result.exit_code == status, result.output + result.stderr
+    return result
+
+
+def answer(*arguments: str) -> Any:
+    return json.loads(run(*arguments, "--json").stdout)
+
+
+def test_a_version_is_shown_and_exported_as_its_fit_was(tmp_path: Path, database: Path) -> None:
+    path = write_readings(tmp_path / "a.csv", readings_in(poses(26, 1), 1))
+    out, again = tmp_path / "acc.yaml", tmp_path / "again.yaml"
+    fitted = answer("accelerometer", path)
+    options = ("--latitude", "48.1", "--by", "Ada", "--export", "kalibr", "--out", str(out))
+    kept = answer("accelerometer", path, "--serial", "IMU-7", *options)
+    assert (kept["version"], kept["by"], kept["verdict"]) == (1, "Ada", "adequate")
+    assert kept["data"]["read_as"].endswith("gravity at latitude 48.1 deg")
+    assert answer("accelerometer", path, "--serial", "IMU-7")["result"] == fitted
+    shown = answer(
+        "sensors", "show", "IMU-7", "accelerometer", "--version", "1", "--export", "kalibr", "--out", str(again)
+    )
+    assert shown == kept
+    assert again.read_bytes() == out.read_bytes()
+    text = run("sensors", "show", "IMU-7", "accelerometer").stdout
+    assert "version 2" in text
+    assert "a.csv" in text
+    field = tmp_path / "m.csv"
+    np.savetxt(field, readings_of(fields(600), 1), delimiter=",", header="mag_x,mag_y,mag_z", comments="")
+    run("magnetometer", str(field), "--serial", "IMU-7")
+    rows = answer("sensors", "list", "IMU-7")
+    assert [(row["sensor"], row["version"]) for row in rows] == [
+        ("accelerometer", 2), ("accelerometer", 1), ("magnetometer", 1),
+    ]  # fmt: skip
+    assert check(str(database)).findings == ()
+    assert "name accelerometer or magnetometer" in run("sensors", "show", "IMU-7", "gyro", status=2).stderr
+    assert "has no version 9" in run("sensors", "show", "IMU-7", "magnetometer", "--version", "9", status=2).stderr
+
+
+def test_a_version_that_was_changed_is_found(tmp_path: Path, database: Path) -> None:
+    path = write_readings(tmp_path / "a.csv", readings_in(poses(26, 1), 1))
+    run("accelerometer", path, "--serial", "IMU-7")
+    with closing(sqlite3.connect(database)) as connection, connection:
+        connection.execute("UPDATE sensor_versions SET document = replace(document, 'adequate', 'Adequate')")
+    findings = [each.text for each in check(str(database)).findings]
+    assert any("accelerometer IMU-7 version 1: document changed" in text for text in findings)
+    assert "was changed after it was stored" in run("sensors", "show", "IMU-7", "accelerometer", status=2).stderr
+
+
+def test_a_recording_of_another_unit_is_refused(tmp_path: Path, database: Path) -> None:
+    recording, _ = simulate_session(2, Session(rests=24))
+    write_recording(recording, tmp_path / "poses")
+    said = run("accelerometer", str(tmp_path / "poses"), "--serial", "IMU-7", status=2).stderr
+    assert f"is of unit {recording.info.serial}, but --serial is IMU-7" in said
+    kept = answer("accelerometer", str(tmp_path / "poses"), "--serial", recording.info.serial)
+    assert [each["name"] for each in kept["data"]["files"]] == ["recording.toml", "samples.parquet"]
+    assert database.is_file()
