@@ -25,7 +25,7 @@ class ChamberState:
     setpoint_c: float
     alarms: tuple[str, ...] = ()
     given_c: float | None = None  #: the set point that labctl gave last; None before it did
-    foreign: tuple[str, ...] = ()  #: what somebody else has changed since then, in words
+    foreign: tuple[str, ...] = ()  #: what others have changed since then, in words
 
 
 class Chamber(Protocol):

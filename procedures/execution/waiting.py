@@ -76,7 +76,7 @@ def hold(context: ExecutionContext) -> None:
 
 
 def take_back(context: ExecutionContext) -> None:
-    """Give the chamber the set point again that it had before somebody else changed it. Raises StepFailed."""
+    """Give the chamber the set point again that it had before others changed it. Raises StepFailed."""
     if (given_c := context.given_c) is None:
         return
     chamber = context.bench.chamber

@@ -38,7 +38,7 @@ class BenchSnapshot:
     chamber_c: float | None  #: absent without a chamber
     setpoint_c: float | None  #: as labctl gave it
     alarms: tuple[str, ...] = ()
-    foreign: tuple[str, ...] = ()  #: what somebody else has changed at the chamber, in words
+    foreign: tuple[str, ...] = ()  #: what others have changed at the chamber, in words
     attended: bool = False  #: a person was asked to do something at the bench
     gyro_c: Mapping[str, float] = field(default_factory=dict)  #: by the units' own thermometers
     silent_s: Mapping[str, float] = field(default_factory=dict)  #: device -> time since its last answer

@@ -19,7 +19,7 @@ GuardKind = Literal[
     "unit_temperature",  # a unit's own thermometer against its limits
     "chamber_deviation",  # air off its set point while readings are taken
     "chamber_alarm",  # the controller itself says so
-    "foreign_change",  # somebody else has changed the set point or the mode of the chamber
+    "foreign_change",  # others have changed the set point or the mode of the chamber
     "stale",  # a chamber or a unit has said nothing for too long
     "damaged_readings",
     "invalid_readings",

@@ -152,7 +152,7 @@ class SetpointChamber(ABC):
         return ""
 
     def _foreign(self, setpoint_c: float) -> tuple[str, ...]:
-        """Return what somebody else has changed since this driver gave a set point; nothing before it did."""
+        """Return what others have changed since this driver gave a set point; nothing before it did."""
         if self._given_c is None:
             return ()
         found = [self._hindrance()]

@@ -316,7 +316,7 @@ def test_a_host_is_reached_by_a_socket() -> None:
 @pytest.mark.parametrize("driver", ALL)
 def test_what_others_change_at_the_panel_is_in_the_next_reading(chamber: Callable[..., Any], driver: str) -> None:
     s = chamber(driver)
-    s.state.setpoint_c = 31.0  # before labctl gave one it is nobody else's
+    s.state.setpoint_c = 31.0  # labctl gave none yet
     assert (s.driver.read().given_c, s.driver.read().foreign) == (None, ())
     s.driver.set_temperature_c(40.0)
     assert (s.driver.read().given_c, s.driver.read().foreign) == (40.0, ())

@@ -85,7 +85,7 @@ def test_the_rule_of_the_recipe_decides(rig: Any, action: str, state: CampaignSt
 
 
 def test_what_a_person_does_who_was_asked_to_is_no_foreign_change(rig: Any) -> None:
-    """Whoever mounts a unit may switch something at the chamber; it is as it was when they have answered."""
+    """A person who mounts a unit may switch something at the chamber; it is as it was when they have answered."""
     rig.operator = HumanOperator()
     polled: list[float] = []
 
