@@ -2,13 +2,14 @@
 
 A process that was stopped (SIGSTOP, a debugger, a frozen cgroup) hears no signal: a request to end waits in the kernel
 until it goes on. The other processes see that request there, and carry it out in its place. A request that came with
-the stop waits no more: the kernel has entered its handler, which blocks the signal, before the process stood still.
+the stop waits no more: the kernel has entered its handler, which blocks the signal, before the process stood still. On
+a busy computer that is the handler of any thread: the kernel gives a signal to one that has none to handle yet.
 """
 
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 
@@ -30,10 +31,12 @@ def unheard_end(pid: int) -> bool:
     """Return whether a process that stands still was asked to end by a signal that it could not hear yet."""
     if not is_stopped(pid):
         return False
-    status, asked = _status(pid), 0
-    for waiting_or_in_handler in ("ShdPnd", "SigPnd", "SigBlk"):  # the supervisor itself blocks none of these signals
-        asked |= int(status.get(waiting_or_in_handler, "0"), 16)
-    return any(asked & (1 << (number - 1)) for number in ENDING)
+    ending, asked = sum(1 << (number - 1) for number in ENDING), 0
+    for status in _statuses(pid):
+        waiting, own, blocked = (int(status.get(each, "0"), 16) & ending for each in ("ShdPnd", "SigPnd", "SigBlk"))
+        in_handler = blocked if blocked != ending else 0  # a thread of a library may block them all, a handler its own
+        asked |= waiting | own | in_handler
+    return bool(asked)
 
 
 class SupervisorWatch:
@@ -61,9 +64,9 @@ class SupervisorWatch:
                 return
 
 
-def _status(pid: int) -> dict[str, str]:
-    """Return the fields of /proc/<pid>/status; none for a process that is gone."""
-    with suppress(OSError):
-        lines = Path(f"/proc/{pid}/status").read_text(encoding="utf-8", errors="replace").splitlines()
-        return {name: value.strip() for name, _, value in (line.partition(":") for line in lines)}
-    return {}
+def _statuses(pid: int) -> Iterator[dict[str, str]]:
+    """Yield the fields of /proc/<pid>/task/<thread>/status of each thread; none for a process that is gone."""
+    for thread in Path(f"/proc/{pid}/task").glob("*/status"):
+        with suppress(OSError):
+            lines = thread.read_text(encoding="utf-8", errors="replace").splitlines()
+            yield {name: value.strip() for name, _, value in (line.partition(":") for line in lines)}

@@ -85,6 +85,16 @@ FAILURES: tuple[Failure, ...] = (
         f"Check the controller's panel for a profile, a lock or a limit, {RESUME}.",
     ),
     Failure(
+        r": changed by others \(|cannot be taken back",
+        "A person changed the chamber at its panel while the campaign needed it.",
+        f"Find out who changed it and why; end a profile at the panel, {RESUME}.",
+    ),
+    Failure(
+        r"is set otherwise than before",
+        "A unit came back with other settings than it had before.",
+        f"Set the unit as it was and save that in the unit, {RESUME}.",
+    ),
+    Failure(
         r": alarms \(",
         "The chamber's controller reports an alarm.",
         f"Read the alarm at the controller, remove its cause and reset it, {RESUME}.",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import signal
 import subprocess
@@ -88,6 +89,35 @@ def test_a_request_to_end_is_seen_that_a_process_cannot_hear(
     os.kill(sleeper.pid, signal.SIGCONT)
     sleeper.wait()
     assert (known.lives, known.stands_still, unheard_end(sleeper.pid)) == (False, False, False)
+
+
+THREADS = """
+import signal, sys, threading, time
+def work(ending):
+    if ending:
+        signal.pthread_sigmask(signal.SIG_BLOCK, ending)
+    print(threading.get_native_id(), flush=True)
+    time.sleep(600)
+signal.signal(signal.SIGTERM, lambda *_: None)
+for ending in ((), (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)):
+    threading.Thread(target=work, args=(ending,), daemon=True).start()
+    time.sleep(0.1)
+time.sleep(600)
+"""
+
+
+def test_a_request_that_another_thread_was_given_is_seen_and_one_that_blocks_all_is_none() -> None:
+    with subprocess.Popen([sys.executable, "-c", THREADS], stdout=subprocess.PIPE) as threaded:
+        try:
+            assert threaded.stdout is not None
+            first, _ = int(threaded.stdout.readline()), threaded.stdout.readline()
+            os.kill(threaded.pid, signal.SIGSTOP)
+            eventually(lambda: is_stopped(threaded.pid))
+            assert not unheard_end(threaded.pid)
+            assert ctypes.CDLL(None).tgkill(threaded.pid, first, int(signal.SIGTERM)) == 0
+            assert unheard_end(threaded.pid)
+        finally:
+            threaded.kill()
 
 
 HANDLES = """
