@@ -114,18 +114,14 @@ class DescribedTable:
         return Spin(rate_dps, demand_dps, found.t_s, self._clock.now_s() + steady_s + SPARE_S, found.angle_deg)
 
     def settle(self, spin: Spin) -> None:
-        """Control the end of a run: return when the table is at rest, after a stop where the motion has no end.
+        """Control the end of a run: stop the table, and return when it is at rest.
 
         Raises RequestRejected where it stopped by itself too early, MalformedReply, NoReply, LinkError.
         """
         if spin.rate_dps == 0:
             return
         early = not self.is_moving() and self._clock.now_s() < spin.steady_until_s - SPARE_S
-        if self._described.move and not early:
-            self._await_rest(spin.steady_until_s + 2 * SPARE_S + self._ramp_s(spin.rate_dps))
-            self._rate_dps, self._last = 0.0, None
-        else:
-            self._come_to_rest()
+        self._come_to_rest()  # the end of a finite move lies behind that of the longest wait for its rate
         if early:
             raise RequestRejected(
                 self.name,

@@ -50,8 +50,11 @@ def with_line(given: object) -> object:
     description = given.get("format")
     if isinstance(description, str) and description in shipped_descriptions():
         description = read_toml(shipped_descriptions()[description])
-    line = description.get("line") if isinstance(description, dict) else getattr(description, "line", None)
-    usual = line if isinstance(line, dict) else {} if line is None else line.model_dump()
+    usual: dict[str, object] = {}
+    if isinstance(description, Description):
+        usual = description.line.model_dump()
+    elif isinstance(description, dict) and isinstance(line := description.get("line"), dict):
+        usual = line
     kept = {key: usual[key] for key in ("baudrate", "tcp_port") if usual.get(key) is not None}
     return {**kept, **{key: value for key, value in given.items() if value is not None}, "format": description}
 

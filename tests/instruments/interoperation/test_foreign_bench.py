@@ -17,8 +17,9 @@ import tomli_w
 
 from instruments.bench import open_bench
 from instruments.bench_config import BenchFile, read_bench
-from instruments.clock import SystemClock
+from instruments.clock import ScaledClock, SystemClock
 from instruments.errors import RequestRejected
+from labctl.services.described_instruments import check_description
 from labctl.stop.instruments_stop import stop_instruments
 from labctl.store import open_store
 from tests.helpers.forked_commands import run_labctl
@@ -135,6 +136,17 @@ def test_every_request_is_tried(foreign: Foreign) -> None:
         answer = json.loads(run.stdout)
         assert answer["ok"], answer
         assert run.returncode == 0
+    assert foreign.end()["rate_dps"] == 0.0
+
+
+@pytest.mark.parametrize("foreign", [SPEED], indirect=True)
+def test_finite_moves_and_rates_by_positions_alone(foreign: Foreign) -> None:
+    path = foreign.folder / "esp301-table.toml"
+    text = path.read_text().replace("run = ", "move = ").replace("{axis}MV{sign}", "{axis}PR{angle:.3f}")
+    path.write_text(text[: text.index("[rate]")])
+    answer = check_description(str(path), foreign.at["table"], None, move=True, clock=ScaledClock(SPEED))
+    assert answer.ok, answer
+    assert [each.what for each in answer.checks][-3:] == ["move forwards", "move backwards", "stop in a run"]
     assert foreign.end()["rate_dps"] == 0.0
 
 
