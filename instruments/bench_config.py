@@ -278,17 +278,21 @@ def read_bench(source: str | Path) -> BenchFile:
 
 
 def _with_formats(document: dict[str, object], folder: Path) -> dict[str, object]:
-    """Return a document whose gyros have their stream formats in place of the names of files beside it.
+    """Return a document whose instruments have their formats in place of the names of files beside it.
 
-    A campaign keeps its bench file, and so the format. The name of a file that is not there stays: its driver says so.
+    A campaign keeps its bench file, and so the formats. The name of a file that is not there stays: its driver says so.
     Raises tomllib.TOMLDecodeError naming the file.
     """
-    gyros = document.get("gyros")
-    for gyro in gyros if isinstance(gyros, list) else ():
-        given = gyro.get("format") if isinstance(gyro, dict) else None
+    sections: list[object] = [document.get("table"), document.get("chamber")]
+    for several in (document.get("gyros"), document.get("references")):
+        sections += several if isinstance(several, list) else []
+    for section in sections:
+        if not isinstance(section, dict):
+            continue
+        given = section.get("format")
         if isinstance(given, str) and given.endswith(".toml") and (folder / given).is_file():
             try:
-                gyro["format"] = read_toml(folder / given)
+                section["format"] = read_toml(folder / given)
             except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-                raise tomllib.TOMLDecodeError(f"stream format {folder / given}: {error}") from error
+                raise tomllib.TOMLDecodeError(f"format {folder / given}: {error}") from error
     return document

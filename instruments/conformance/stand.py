@@ -89,6 +89,7 @@ def _with_trial(name: str, kind: Kind, trial: Trial) -> BenchFile:
         record["references"] = [{"name": "reference"} | wanted]
     else:
         record[kind] = record[kind] | wanted
+        record["simulation"]["table"] |= dict(trial.table)
     try:
         return resolve(BenchFile.model_validate(record))
     except ValidationError as error:

@@ -31,12 +31,14 @@ class Trial:
     """Where `labctl driver test` tries a driver: on a simulated bench that ships with labctl, in place of its own part.
 
     `section` is what the bench file says of the driver's table, chamber, reference or first gyro: the address of the
-    driver's simulator, and what else it needs; `unit` is the table of the gyro in [simulation.units].
+    driver's simulator, and what else it needs; `unit` is the table of the gyro in [simulation.units], `table`
+    what [simulation.table] has beside what the bench says.
     """
 
     bench: str = "single-axis-sim"
     section: Mapping[str, object] = field(default_factory=dict)
     unit: Mapping[str, object] = field(default_factory=dict)
+    table: Mapping[str, object] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import logging
 import re
+from collections.abc import Sequence
 
 from instruments.clock import Clock
 from instruments.errors import InstrumentError, LinkError, MalformedReply, NoReply, RequestRejected
@@ -40,16 +41,17 @@ class LineLink:
         self._port: SerialPort | None = None
         self._line = RtuLine(device, clock)
         self._earliest_s = 0.0
+        self.openings = 0  #: how often the port was opened: what was set over an earlier one may be forgotten
 
-    def ask(self, request: str, reply: str, what: str) -> re.Match[str]:
+    def ask(self, request: str, reply: str, what: str, *, tries: int = TRIES) -> re.Match[str]:
         """Return the reply to a request as the match of the pattern `reply` with the whole line; tried three times.
 
-        `what` names the request in messages. Raises the failure of the last try: NoReply, MalformedReply or LinkError;
-        RequestRejected at once where the device refuses.
+        A request that must not be executed twice gets one try. `what` names the request in messages. Raises the failure
+        of the last try: NoReply, MalformedReply or LinkError; RequestRejected at once where the device refuses.
         """
         begun_s = self._clock.now_s()
         failure: LinkError | None = None
-        for attempt, pause_s in enumerate((0.0, *RETRY_PAUSES_S), start=1):
+        for attempt, pause_s in enumerate((0.0, *RETRY_PAUSES_S)[:tries], start=1):
             if failure is not None:
                 log.warning("link.retry", extra={"device": self.device, "attempt": attempt, "reason": str(failure)})
             self._clock.sleep(pause_s)
@@ -62,7 +64,8 @@ class LineLink:
         assert failure is not None
         text = str(failure).removeprefix(f"{self.device}: ")
         spent_s = self._clock.now_s() - begun_s
-        raise type(failure)(self.device, f"{text} ({TRIES} tries in {spent_s:.2g} s)") from failure
+        count = "1 try" if tries == 1 else f"{tries} tries"
+        raise type(failure)(self.device, f"{text} ({count} in {spent_s:.2g} s)") from failure
 
     def tell(self, request: str, what: str) -> None:
         """Send a request that has no reply; raises LinkError."""
@@ -71,6 +74,21 @@ class LineLink:
         except BROKEN as error:
             raise self._broken(what, error) from error
         finally:
+            self._earliest_s = self._clock.now_s() + self._syntax.pause_s
+
+    def send_at_once(self, requests: Sequence[str], what: str) -> None:
+        """Send requests without waiting for anything, whatever is under way; their replies are dropped later.
+
+        Each is sent twice: the first may end a line that another process left half sent. Raises LinkError.
+        """
+        try:
+            port = self._opened()
+            for request in requests:
+                port.write(self._encoded(request) * 2)
+        except BROKEN as error:
+            raise self._broken(what, error) from error
+        finally:
+            self._line.doubt(self._clock.now_s())
             self._earliest_s = self._clock.now_s() + self._syntax.pause_s
 
     def close(self) -> None:
@@ -99,16 +117,24 @@ class LineLink:
     def _send(self, request: str) -> SerialPort:
         """Send a request on a silent line; returns the open port."""
         self._clock.sleep(self._earliest_s - self._clock.now_s())
+        port = self._opened()
+        self._line.await_silence(port)
+        port.reset_input_buffer()
+        data = self._encoded(request)
+        self._line.send(data)
+        port.write(data)
+        return port
+
+    def _opened(self) -> SerialPort:
         if self._port is None:
             self._port = self._ports.serial(
                 self.url, device=self.device, baudrate=self._baudrate, timeout_s=self._timeout_s, line=self._settings
             )
-        self._line.await_silence(self._port)
-        self._port.reset_input_buffer()
-        data = (request + self._syntax.end).encode(self._syntax.encoding)
-        self._line.send(data)
-        self._port.write(data)
+            self.openings += 1
         return self._port
+
+    def _encoded(self, request: str) -> bytes:
+        return (request + self._syntax.end).encode(self._syntax.encoding)
 
     def _receive(self, port: SerialPort, what: str) -> str:
         """Return the next line that is not empty, without its end; raises NoReply, MalformedReply, one of BROKEN."""

@@ -21,18 +21,23 @@ from instruments.transport.line_link import LineLink
 from instruments.transport.serial_stream import line_of
 
 
-def open_link(device: str, settings: LineChamberSettings, ports: Ports, clock: Clock, syntax: LineSyntax) -> LineLink:
+def open_link(
+    device: str, settings: LineChamberSettings, ports: Ports, clock: Clock, syntax: LineSyntax, timeout_s: float = 1.0
+) -> LineLink:
     """Return the link of a chamber; nothing is opened yet."""
     return LineLink(
-        device, settings.address_url, ports, clock, syntax, baudrate=settings.baudrate, line=line_of(settings.options)
-    )
+        device, settings.address_url, ports, clock, syntax, baudrate=settings.baudrate, timeout_s=timeout_s,
+        line=line_of(settings.options),
+    )  # fmt: skip
 
 
 class TextChamber(SetpointChamber):
     """A chamber on a line link, with a safe state that may be "off"."""
 
-    def __init__(self, settings: LineChamberSettings, ports: Ports, clock: Clock, syntax: LineSyntax) -> None:
-        self._lines = open_link(self.name, settings, ports, clock, syntax)
+    def __init__(
+        self, settings: LineChamberSettings, ports: Ports, clock: Clock, syntax: LineSyntax, timeout_s: float = 1.0
+    ) -> None:
+        self._lines = open_link(self.name, settings, ports, clock, syntax, timeout_s)
         super().__init__(settings, self._lines, clock)
         self._ends_off = settings.safe_state == "off"
 

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from instruments.clock import Clock
 from instruments.drivers.driver import ReferenceDriver, Trial
 from instruments.errors import MalformedReply, WrongInstrument
 from instruments.interfaces.gyro import Channel
 from instruments.interfaces.reference import ReferenceState
 from instruments.protocols.text_lines.line_syntax import LineSyntax
-from instruments.protocols.text_lines.reference_lines import LineReferenceSettings, Quantity
+from instruments.protocols.text_lines.quantity import Quantity
+from instruments.protocols.text_lines.reference_lines import LineReferenceSettings
 from instruments.transport.factory import Ports
 from instruments.transport.line_link import LineLink
 from instruments.transport.serial_stream import line_of
@@ -33,9 +36,12 @@ class LineReference:
             Channel(column_of(settings, name), each.unit, each.resolution, settings.corrections.get(name, 0.0))
             for name, each in self._model.quantities.items()
         )
+        described = settings.format
+        syntax = LineSyntax() if described is None else described.line.syntax
+        reply_s = REPLY_S if described is None else described.line.timeout_s
         self._lines = LineLink(
-            self.name, settings.address_url, ports, clock, LineSyntax(end=self._model.end),
-            baudrate=self._model.baudrate, timeout_s=REPLY_S, line=line_of(settings.options),
+            self.name, settings.address_url, ports, clock, replace(syntax, end=self._model.end),
+            baudrate=self._model.baudrate, timeout_s=reply_s, line=line_of(settings.options),
         )  # fmt: skip
 
     def identify(self) -> str:

@@ -5,40 +5,17 @@ Any other instrument of the kind needs no code: a bench file gives `identity` an
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass
+from typing import Any
 
 from pydantic import Field, field_validator, model_validator
 
-from instruments.bench_config import ReferenceSettings, Strict
+from instruments.bench_config import ReferenceSettings
+from instruments.protocols.request_reply.reference import ReferenceDescription
+from instruments.protocols.request_reply.settings import found_description, with_line
 from instruments.protocols.serial_options import SerialOptions
 from instruments.protocols.text_lines.chamber_settings import line_address
-
-NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-VALUE = rf"\s*(?P<value>{NUMBER})\s*"
-#: Extended replies of Hart and Fluke readouts name the unit: `t: 25.587 C`.
-CELSIUS = rf"\s*t:\s*(?P<value>{NUMBER})\s*(?P<unit>[A-Z])\b.*"
-
-
-class Quantity(Strict):
-    """One quantity: how it is asked for, and how its reply is read."""
-
-    ask: str  #: the request, without its line end
-    pattern: str = VALUE  #: of the whole reply; group `value`, and `unit` where the reply names it
-    unit: str = "deg C"
-    says_unit: str = "C"  #: what the reply's group `unit` must be
-    resolution: float = Field(default=1e-4, gt=0)  #: readings are kept as whole numbers of this
-
-    @field_validator("pattern")
-    @classmethod
-    def _has_value(cls, pattern: str) -> str:
-        try:
-            groups = re.compile(pattern).groupindex
-        except re.error as error:
-            raise ValueError(f"pattern {pattern!r} is not a regular expression ({error}); correct it") from error
-        if "value" not in groups:
-            raise ValueError(f"pattern {pattern!r} has no group (?P<value>...) for the number; add one")
-        return pattern
+from instruments.protocols.text_lines.quantity import CELSIUS, Quantity
 
 
 @dataclass(frozen=True)
@@ -84,8 +61,9 @@ MODELS: dict[str, ReferenceModel] = {
 
 
 class LineReferenceSettings(ReferenceSettings):
-    """A model that is known, or identity and quantities of any other."""
+    """A model that is known, a description of another, or identity and quantities of any other."""
 
+    format: ReferenceDescription | None = None
     model: str = ""
     baudrate: int | None = Field(default=None, gt=0)
     tcp_port: int = 0
@@ -94,6 +72,21 @@ class LineReferenceSettings(ReferenceSettings):
     end: str | None = None  #: line end of a request
     identity: str | None = None
     quantities: dict[str, Quantity] = Field(default_factory=dict)  #: column -> how it is asked for
+
+    @model_validator(mode="before")
+    @classmethod
+    def _as_described(cls, given: Any) -> Any:
+        """Take what the description says where the bench file says nothing."""
+        if not isinstance(given, dict) or given.get("format") is None:
+            return given
+        lined = with_line(given)
+        if not isinstance(lined, dict) or not isinstance(description := lined["format"], dict):
+            return lined
+        line = description.get("line")
+        usual = {key: description[key] for key in ("identity", "quantities") if key in description}
+        return usual | {"end": line.get("end", "\r\n") if isinstance(line, dict) else "\r\n"} | lined
+
+    _found = field_validator("format", mode="before")(found_description)
 
     @field_validator("model")
     @classmethod
@@ -109,6 +102,8 @@ class LineReferenceSettings(ReferenceSettings):
     def _is_complete(self) -> LineReferenceSettings:
         if (self.port is None) == (self.host is None):
             raise ValueError("give either port (a serial port), or host with tcp_port (a network address)")
+        if self.model and self.format is not None:
+            raise ValueError("model and format both say which instrument it is; keep one of the two")
         if not self.model and not self.quantities:
             raise ValueError(
                 f"model and quantities are missing; give model ({', '.join(MODELS)}), or for "
@@ -119,7 +114,9 @@ class LineReferenceSettings(ReferenceSettings):
     @property
     def known(self) -> ReferenceModel:
         """The model, with what the bench file says otherwise."""
-        known = MODELS.get(self.model) or ReferenceModel("reference", "the bench file", "", IDN, {})
+        known = MODELS.get(self.model) or ReferenceModel(
+            "reference" if self.format is None else self.format.name, "the bench file", "", IDN, {}
+        )
         return ReferenceModel(
             known.title, known.source, known.identity if self.identity is None else self.identity, known.serial or IDN,
             self.quantities or known.quantities, known.end if self.end is None else self.end,

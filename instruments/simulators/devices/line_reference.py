@@ -6,7 +6,8 @@ import numpy as np
 
 from instruments.bench_config import part_of
 from instruments.protocols.text_lines.line_syntax import LineSyntax
-from instruments.protocols.text_lines.reference_lines import CELSIUS, HUMIDITY, LineReferenceSettings
+from instruments.protocols.text_lines.quantity import CELSIUS
+from instruments.protocols.text_lines.reference_lines import HUMIDITY, LineReferenceSettings
 from instruments.simulators.links.line_device import LineDevice
 from instruments.simulators.setup import InstrumentSetup
 

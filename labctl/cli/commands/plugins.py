@@ -36,7 +36,13 @@ def plugins(as_json: Json = False, database: Database = None) -> None:  # noqa: 
 
 @driver_app.command("test")
 def driver_checks(
-    name: Annotated[str, typer.Argument(metavar="NAME", help="Name of the driver, as bench files give it.")],
+    name: Annotated[
+        str,
+        typer.Argument(
+            metavar="NAME|FILE",
+            help="Name of the driver, as bench files give it; or the description of an instrument, a .toml file.",
+        ),
+    ],
     bench: Annotated[
         str | None,
         typer.Option(
@@ -46,10 +52,65 @@ def driver_checks(
             "default: the bench of the driver's package, else a shipped bench.",
         ),
     ] = None,
+    port: Annotated[
+        str | None, typer.Option("--port", metavar="PORT", help="With a FILE: serial port of the instrument.")
+    ] = None,
+    host: Annotated[
+        str | None, typer.Option("--host", metavar="HOST:PORT", help="With a FILE: network address of the instrument.")
+    ] = None,
+    move: Annotated[
+        bool,
+        typer.Option(
+            "--move",
+            help="With a FILE: also send its commands. The table homes, turns both ways and is stopped; the set point "
+            "of the chamber moves by one step and back.",
+        ),
+    ] = False,
     as_json: Json = False,
     database: Database = None,  # noqa: ARG001  every command takes it
 ) -> None:
-    """Try a driver on its simulated instrument, in virtual time; exit 1 if it does not meet a requirement."""
+    """Try a driver on its simulator, or a description on its instrument; exit 1 if a requirement is not met."""
+    if name.endswith(".toml"):
+        if bench is not None:
+            raise typer.BadParameter("a description is tried on --port or --host, not on a bench file; leave it out")
+        _try_description(name, port, host, move=move, as_json=as_json)
+    elif port is not None or host is not None or move:
+        raise typer.BadParameter(
+            "a driver of a package is tried on its simulator; --port, --host and --move belong to the description of "
+            "an instrument, a .toml file"
+        )
+    else:
+        _try_driver(name, bench, as_json=as_json)
+
+
+def _try_description(file: str, port: str | None, host: str | None, *, move: bool, as_json: bool) -> None:
+    from labctl.services.described_instruments import check_description
+    from labctl.services.schemas.admin import DescribedCheckResponse
+
+    sends = port is not None or host is not None
+
+    def show(each: DescribedCheckResponse) -> None:
+        if not as_json:
+            mark = Text("fails  ", "red") if each.problem else Text("does   " if sends else "sends  ", "green")
+            console.print(mark, end="")
+            console.print(f"{each.what:18} {each.problem or each.answer}", soft_wrap=True, markup=False)
+
+    with one_clear_line():
+        answer = check_description(file, port, host, show, move=move)
+    if as_json:
+        print_json(answer)
+    elif not sends:
+        console.print(f"{answer.name}, a {answer.kind}: the description is valid; give --port or --host to try it")
+    else:
+        failed = sum(1 for each in answer.checks if each.problem)
+        said = f"{failed} of {len(answer.checks)} failed" if failed else f"all {len(answer.checks)} passed"
+        left = "" if move or answer.kind == "reference" else "; its commands were not tried (--move)"
+        console.print(f"{answer.name}, a {answer.kind} at {answer.address}: {said}{left}", soft_wrap=True)
+    if not answer.ok:
+        raise typer.Exit(1)
+
+
+def _try_driver(name: str, bench: str | None, *, as_json: bool) -> None:
     from labctl.services.plugins import check_driver
     from labctl.services.schemas.admin import DriverCheckResponse
 

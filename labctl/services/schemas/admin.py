@@ -172,6 +172,27 @@ class DriverCheckResponse(ResponseModel):
     problem: str = Field(default="", description="How the driver fails this check; empty: it passes.")
 
 
+class DescribedCheckResponse(ResponseModel):
+    """One request of a description, or one action."""
+
+    what: str = Field(description="Key of the description, or the action.")
+    answer: str = Field(
+        default="", description="What the instrument answered; for a request that was not sent, its text."
+    )
+    problem: str = Field(default="", description="What was wrong; empty: nothing.")
+
+
+class DescriptionTestResponse(ResponseModel):
+    """A description of an instrument, tried on an address; without an address only its document was checked."""
+
+    file: str
+    name: str
+    kind: str
+    address: str | None = Field(default=None, description="Null: nothing was sent.")
+    ok: bool
+    checks: list[DescribedCheckResponse]
+
+
 class DriverTestResponse(ResponseModel):
     """A driver, tried on its simulator."""
 

@@ -1,0 +1,1 @@
+"""Drivers of chambers and tables that a TOML document describes."""

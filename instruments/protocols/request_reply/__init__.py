@@ -1,0 +1,1 @@
+"""Instruments that answer requests in lines of text, described by a TOML document: chambers, tables, thermometers."""

@@ -1,0 +1,104 @@
+"""Descriptions of instruments (`labctl-lines/1`): a file is checked, and its requests tried on an address."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from instruments.clock import Clock, SystemClock
+from instruments.conformance.described import Described, requests_of, try_description
+from instruments.protocols.request_reply.chamber import ChamberDescription
+from instruments.protocols.request_reply.reference import ReferenceDescription
+from instruments.protocols.request_reply.settings import shipped_descriptions
+from instruments.protocols.request_reply.table import TableDescription
+from instruments.toml_documents import listed, read_toml, shown
+from labctl.errors import BadInput
+from labctl.services.schemas.admin import DescribedCheckResponse, DescriptionTestResponse
+
+MODELS: dict[str, type[Described]] = {
+    "table": TableDescription, "chamber": ChamberDescription, "reference": ReferenceDescription
+}  # fmt: skip
+
+
+def read_description(source: str) -> Described:
+    """Return a description by path, or a shipped one by name; raises BadInput naming the file, the place and the value.
+
+    Every mistake that was found is named.
+    """
+    path = shipped_descriptions().get(source, Path(source))
+    try:
+        document = read_toml(path)
+    except FileNotFoundError:
+        known = ", ".join(shipped_descriptions())
+        raise BadInput(f"{source!r} is neither a file nor a description that ships with labctl ({known})") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, IsADirectoryError) as error:
+        raise BadInput(f"description {source}: not TOML: {error}; correct it") from error
+    kind = document.get("kind")
+    if not isinstance(kind, str) or kind not in MODELS:
+        raise BadInput(
+            f"description {source}: kind: is {shown(kind)}, but it must say what is described: choose one of "
+            f"{', '.join(MODELS)}"
+        )
+    try:
+        return MODELS[kind].model_validate(document)
+    except ValidationError as error:
+        complaints = listed(_complaint(one["loc"], one["msg"], one["type"], one["input"]) for one in error.errors())
+        raise BadInput(f"description {source}: {complaints}; correct the file") from error
+
+
+def check_description(
+    source: str,
+    port: str | None,
+    host: str | None,
+    done: Callable[[DescribedCheckResponse], None] | None = None,
+    *,
+    move: bool = False,
+    clock: Clock | None = None,
+) -> DescriptionTestResponse:
+    """Check a description, and try it on a serial port or on a host (HOST:PORT); `done` is called after each request.
+
+    Without an address nothing is sent, and the answer lists the requests. `move` also sends the commands. Raises
+    BadInput for a description or an address that is none.
+    """
+    description = read_description(source)
+    address = _address(port, host)
+    checks: list[DescribedCheckResponse] = []
+    if address is None:
+        if move:
+            raise BadInput("--move needs an instrument to move; add --port or --host")
+        found = (DescribedCheckResponse(what=key, answer=text) for key, text in requests_of(description))
+    else:
+        tried = try_description(description, address, clock or SystemClock(), move=move)
+        found = (DescribedCheckResponse(what=each.what, answer=each.answer, problem=each.problem) for each in tried)
+    try:
+        for each in found:
+            checks.append(each)
+            if done is not None:
+                done(each)
+    except ValidationError as error:
+        raise BadInput(f"description {source}: {error.errors()[0]['msg']}; correct the address or the file") from error
+    return DescriptionTestResponse(
+        file=source, name=description.name, kind=description.kind, address=port or host,
+        ok=not any(each.problem for each in checks), checks=checks,
+    )  # fmt: skip
+
+
+def _complaint(place: tuple[str | int, ...], message: str, kind: str, given: object) -> str:
+    where = ".".join(str(part) for part in place) or "the whole file"
+    value = "" if kind == "missing" or not place else f" (is {shown(given)})"
+    return f"{where}: {message.removeprefix('Value error, ')}{value}"
+
+
+def _address(port: str | None, host: str | None) -> dict[str, object] | None:
+    """Return the address as a bench file gives it; raises BadInput."""
+    if port is not None and host is not None:
+        raise BadInput(f"both --port {port} and --host {host} are given; keep one of the two")
+    if host is None:
+        return None if port is None else {"port": port}
+    name, _, number = host.rpartition(":")
+    if not name or not number.isdecimal() or not 0 < int(number) <= 65535:
+        raise BadInput(f"--host {host!r} is not HOST:PORT with a port from 1 to 65535; write it like 192.168.0.7:5025")
+    return {"host": name, "tcp_port": int(number)}
