@@ -76,25 +76,42 @@ def _would_move(series: Series, rows: slice, gain: float, step: float) -> bool:
 
 
 def check_repeated(series: Series, frozen: Rows) -> Iterator[Marked]:
-    """Yield rows that hold in every measured channel what the row before holds."""
-    channels = [*series.outputs.values(), *series.thermometers.values(), *series.others.values()]
+    """Yield rows that hold in every output what the row before holds; a thermometer may be read by itself."""
+    channels = list(series.outputs.values())
     equal = _equal(channels, 1) & ~frozen[1:] & (series.dataset[1:] == series.dataset[:-1])
     apart = _equal(channels, 3) & ~frozen[3:] & (series.dataset[3:] == series.dataset[:-3])
     n = len(series)
-    share, usual = equal.sum() / n, apart.sum() / n
+    share, usual = equal.sum() / n, max(apart.sum() / n, _chance_of_equal(series))
     if share - usual <= max(REPEATED_SHARE, DEVIATIONS * np.sqrt((share + usual) / n)):
         return
     rows = np.concatenate([[False], equal])
     yield Marked(
         Finding(
             "repeated", "likely", rows_in_words(rows),
-            f"{int(rows.sum())} rows repeat the readings of the row before ({100 * share:.2g} % of all)",
+            f"{int(rows.sum())} rows repeat the outputs of the row before ({100 * share:.2g} % of all)",
             100 * float(share), "%", f"at most {100 * usual:.2g} %, as by chance",
             "leave the repeated rows out: they are no new readings, and make the noise look smaller than it is",
             n=int(rows.sum()), may_leave_out=True,
         ),
         rows,
     )  # fmt: skip
+
+
+def _chance_of_equal(series: Series) -> float:
+    """Return how often a row equals the row before by chance, by how often its outputs differ by one code and by two.
+
+    Differences of neighbours thin out evenly from code to code, as a normal distribution does, also where an output
+    that was smoothed differs by few codes; of readings that are written again only those that do not differ are more.
+    """
+    chance = 1.0
+    for name, values in series.outputs.items():
+        step = series.code_steps[name]
+        if not step:
+            return 0.0
+        codes = np.abs(np.round(np.diff(values) / step))
+        one, two = (max(float(np.mean(codes == k)) / 2, 0.5 / len(codes)) for k in (1, 2))
+        chance *= min(one * max(one / two, 1.0) ** (1.0 / 3.0), 1.0)
+    return chance
 
 
 def _equal(channels: list[Array], lag: int) -> Rows:
