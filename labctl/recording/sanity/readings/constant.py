@@ -63,7 +63,10 @@ def frozen_rows(series: Series, name: str, values: Array) -> Rows:
     ends = (float(values.min()), float(values.max()))
     gain = gain_of(values, series.rate_dps)
     for begin, end in steady:
-        if end - begin < least or (values[begin] in ends and ends[0] != ends[1] and not is_coarse):
+        at_end = values[begin] in ends and ends[0] != ends[1] and not is_coarse
+        if at_end and series.motion == "rest" and np.sum(values == values[begin]) == end - begin:
+            at_end = False  # all in one stretch: noise at the end of a range comes to it again and again
+        if end - begin < least or at_end:
             continue
         if is_coarse and not _would_move(series, slice(begin, end), gain, series.code_steps[name]):
             continue
@@ -76,8 +79,12 @@ def _would_move(series: Series, rows: slice, gain: float, step: float) -> bool:
 
 
 def check_repeated(series: Series, frozen: Rows) -> Iterator[Marked]:
-    """Yield rows that hold in every output what the row before holds; a thermometer may be read by itself."""
-    channels = list(series.outputs.values())
+    """Yield rows that hold in every output, of an accelerometer too, what the row before holds.
+
+    A thermometer may be read by itself.
+    """
+    forces = [values for name, values in series.others.items() if name.startswith("accel_")]
+    channels = [*series.outputs.values(), *forces]
     equal = _equal(channels, 1) & ~frozen[1:] & (series.dataset[1:] == series.dataset[:-1])
     apart = _equal(channels, 3) & ~frozen[3:] & (series.dataset[3:] == series.dataset[:-3])
     n = len(series)

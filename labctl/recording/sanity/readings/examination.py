@@ -32,7 +32,7 @@ EXPLAINS = {
     "moved": frozenset({"mains", "vibration"}),
     "repeated": frozenset({"mains", "vibration", "noise_changes"}),
     "thermometer": frozenset({"spikes"}),
-    "frozen": frozenset({"moved", "quantised", "noise_changes", "level_step"}),
+    "frozen": frozenset({"moved", "quantised", "noise_changes", "level_step", "clipped"}),
     "clipped": frozenset({"noise_changes"}),
 }
 #: Findings that explain others of their own channel only.

@@ -12,8 +12,9 @@ from labctl.recording.sanity.readings.series import ROBUST, Array, Marked, Rows,
 
 #: Blocks in which the noise of long data sets is compared, and readings of one.
 BLOCKS, LEAST_IN_BLOCK = 40, 50
-#: The ratio of deg/s to rad/s, and how near to it, as a logarithm, a ratio of noises must be.
-DEG_PER_RAD, NEAR = 180.0 / np.pi, 0.4
+#: The ratio of deg/s to rad/s, and how near to it, as a logarithm, a ratio of noises must be; that of
+#: one output alone.
+DEG_PER_RAD, NEAR, VERY_NEAR = 180.0 / np.pi, 0.4, 0.12
 #: The same of a gain, in which the bias of the outputs is too.
 GAIN_NEAR = 1.0
 #: Rates from this size on (root mean square), deg/s, show the gain of the outputs.
@@ -62,7 +63,8 @@ def _units_of(series: Series, names: list[str]) -> Iterator[Marked]:
     rows = np.zeros(len(series), dtype=bool)
     for block, value in zip(blocks, size, strict=True):
         rows[block] = value < split
-    if not _gains_agree(series, names, rows):
+    off = float(np.max(np.abs(apart - np.log(DEG_PER_RAD))))
+    if not _gains_agree(series, names, rows, off=off):
         return
     ratio = float(np.exp(np.mean(apart)))
     outputs = "every output" if len(names) == len(series.outputs) else names[0]
@@ -80,13 +82,14 @@ def _units_of(series: Series, names: list[str]) -> Iterator[Marked]:
     )  # fmt: skip
 
 
-def _gains_agree(series: Series, names: list[str], rows: Rows) -> bool:
+def _gains_agree(series: Series, names: list[str], rows: Rows, *, off: float) -> bool:
     """Whether the gain over the table's rate is as much smaller as the noise is: noise alone may change with the rate.
 
-    At rest the noise of two outputs or more must do, or of one the noise and the level.
+    At rest the noise of two outputs or more must do, or of one the noise and the level, or its noise alone if that is
+    `off` the ratio, as a logarithm, by little.
     """
     if series.rate_dps is None or min(_rms(series.rate_dps[rows]), _rms(series.rate_dps[~rows])) < LEAST_RATE_DPS:
-        return len(names) > 1 or _levels_agree(series.outputs[names[0]], rows)
+        return len(names) > 1 or _levels_agree(series.outputs[names[0]], rows) or off < VERY_NEAR
     rate = series.rate_dps
     gains = [
         [abs(float(values[part] @ rate[part])) / float(rate[part] @ rate[part]) for part in (rows, ~rows)]

@@ -14,6 +14,8 @@ NO_THERMOMETER_C = (-127.0, 85.0, 0.0, -273.15)
 #: Below this no gyro is measured, deg C. Other words count where the reading jumps to them by this much, K, or by so
 #: many times its usual step.
 IMPOSSIBLE_C, JUMP_K, JUMP_STEPS = -100.0, 2.5, 20.0
+#: Few gyros work above this, deg C; a thermometer of which so many readings are above it has another unit.
+HOT_C, HOT_SHARE = 150.0, 0.02
 #: A temperature jumps where it changes faster than this, K/s, over the time since it changed last; of that time at most
 #: so many usual ones between two changes count. And a jump is so many usual changes.
 JUMP_K_S, USUAL_HOLDS, USUAL_STEPS = 0.2, 2.0, 5.0
@@ -32,6 +34,7 @@ def check_thermometers(series: Series) -> Iterator[Marked]:
             if at_word.any() and _jumps(series, values, at_word):
                 rows = rows | at_word
         n = int(rows.sum())
+        yield from _check_hot(name, values)
         yield from _check_jumps(series, name, values, ~rows)
         if not n:
             continue
@@ -57,6 +60,22 @@ def _jumps(series: Series, values: Array, at_word: Rows) -> bool:
     usual = steps[~crossing & (steps > 0)]
     limit = max(JUMP_K, JUMP_STEPS * float(np.median(usual)) if len(usual) else 0.0)
     return bool(np.median(steps[crossing]) > limit)
+
+
+def _check_hot(name: str, values: Array) -> Iterator[Marked]:
+    rows = values > HOT_C
+    if float(rows.mean()) > HOT_SHARE:  # single ones are spikes
+        highest = float(values.max())
+        yield Marked(
+            Finding(
+                "thermometer", "likely", f"{name}, {rows_in_words(rows)}",
+                f"{int(rows.sum())} readings are above {HOT_C:g} deg C, up to {highest:.4g} deg C",
+                highest, "deg C", f"at most {HOT_C:g} deg C",
+                "check the unit of the column: deg F, tenths of a degree, or words of a converter?",
+                channel=name, n=int(rows.sum()),
+            ),
+            rows,
+        )  # fmt: skip
 
 
 def _check_jumps(series: Series, name: str, values: Array, usable: Rows) -> Iterator[Marked]:
