@@ -23,7 +23,7 @@ import pyarrow.parquet as pq
 from labctl.errors import LabctlError
 from labctl.services.recordings.examination import inspection_of_file
 from studies.blind.clean import CLEAN
-from studies.blind.kinds import KINDS
+from studies.blind.fault_kinds import KINDS
 from studies.blind.records import Record
 
 RECORDS = int(os.environ.get("LABCTL_STUDY_FORENSICS", "20"))

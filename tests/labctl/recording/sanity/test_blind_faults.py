@@ -10,7 +10,7 @@ import pytest
 
 from labctl.errors import BadInput
 from labctl.services.recordings.examination import inspection_of_file
-from studies.blind.kinds import KINDS
+from studies.blind.fault_kinds import KINDS
 from studies.blind.records import Record, rest
 from studies.blind_forensics import outcome, said_of, written
 
