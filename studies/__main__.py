@@ -35,6 +35,7 @@ STUDIES = (
     "attacks",
     "damaged_imports",
     "forensics",
+    "blind_forensics",
     "endurance",
     "log_size",
     "c_points",

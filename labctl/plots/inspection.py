@@ -32,16 +32,13 @@ def inspection_picture(courses: Sequence[CourseJson], marks: Sequence[MarkJson])
     figure = grid_of([_heading(course, _marks_of(course, marks)) for course in courses], 1, shared_xaxes=True)
     height = ROW_PX * len(courses) + GAP_PX
     figure.update_layout(template=TEMPLATE, height=height)
+    bands: list[dict[str, object]] = []
     for panel, course in enumerate(courses):
         where = place(panel, 1)
         figure.add_trace(_envelope(course), **where)
         figure.update_yaxes(title=course["unit"], **where)
-        for mark in _marks_of(course, marks):
-            for begin, end in zip(mark["from_s"], mark["until_s"], strict=True):
-                figure.add_vrect(
-                    x0=begin, x1=end, fillcolor=translucent(colours[mark["what"]]), layer="below",
-                    line={"color": colours[mark["what"]], "width": 1}, **where,
-                )  # fmt: skip
+        bands += [band for mark in _marks_of(course, marks) for band in _bands(mark, colours[mark["what"]], panel)]
+    figure.update_layout(shapes=bands)  # all at once: plotly copies its figure for each that is added by itself
     figure.update_xaxes(title="t_s, s", row=len(courses), col=1)
     return Picture("inspection", TITLE, CAPTION, figure)
 
@@ -60,6 +57,18 @@ def inspection_html(
 
 def _marks_of(course: CourseJson, marks: Sequence[MarkJson]) -> list[MarkJson]:
     return [mark for mark in marks if mark["channel"] in ("", course["channel"])]
+
+
+def _bands(mark: MarkJson, colour: str, panel: int) -> list[dict[str, object]]:
+    """Return the coloured bands of a finding in the panel of a channel, from 0, as plotly's shapes."""
+    number = str(panel + 1) if panel else ""
+    return [
+        {
+            "type": "rect", "xref": f"x{number}", "yref": f"y{number} domain", "x0": begin, "x1": end, "y0": 0, "y1": 1,
+            "fillcolor": translucent(colour), "layer": "below", "line": {"color": colour, "width": 1},
+        }
+        for begin, end in zip(mark["from_s"], mark["until_s"], strict=True)
+    ]  # fmt: skip
 
 
 def _heading(course: CourseJson, marks: Sequence[MarkJson]) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,10 +12,13 @@ from labctl.recording.columns import BY_NAME, needed
 from labctl.recording.info import Motion, RecordingInfo
 from labctl.recording.motions.constant_rate import rate_change
 from labctl.recording.recording import Columns
+from labctl.recording.sanity.finding import Finding
 
 Array = NDArray[np.float64]
 #: Poses that gravity distinguishes, from which on a gyro can be calibrated by them (imu_tk asks for 9 and more).
 LEAST_POSES = 6
+#: Findings of a log that is refused that are named, at most.
+MOST_NAMED = 3
 
 
 def motion_of(columns: Columns, kind: str, found: Movement, t_s: Array) -> Motion | None:
@@ -32,8 +37,11 @@ def motion_of(columns: Columns, kind: str, found: Movement, t_s: Array) -> Motio
     return "poses" if _poses(columns, found, t_s) >= LEAST_POSES else None
 
 
-def free_motion(columns: Columns, found: Movement, t_s: Array) -> str:
-    """Return why a log of a unit that moved cannot be used, and what would do instead, as one sentence."""
+def free_motion(columns: Columns, found: Movement, t_s: Array, at_rest: Sequence[Finding]) -> str:
+    """Return why a log of a unit that moved cannot be used, and what would do instead, as one sentence.
+
+    `at_rest` is what an inspection of the readings finds if the unit is taken to rest.
+    """
     n = _poses(columns, found, t_s)
     seen = f"; its accelerometer shows {n} poses at rest, {LEAST_POSES} are needed" if n else ""
     spread = f"its output varies by {found.spread_dps:.3g} deg/s"
@@ -41,8 +49,15 @@ def free_motion(columns: Columns, found: Movement, t_s: Array) -> str:
         f"the unit moves in {100 * found.share:.0f} % of the time ({spread}) and no column gives the rate or the "
         f"angle{seen}: free motion without a reference cannot calibrate a gyro; add a column with the table's rate "
         "(table_rate_dps), the angle of each turn (turn_deg), an accelerometer with rests in at least "
-        f"{LEAST_POSES} poses (accel_x_g, accel_y_g, accel_z_g), or a log at rest"
+        f"{LEAST_POSES} poses (accel_x_g, accel_y_g, accel_z_g), or a log at rest; if the unit was to rest, write "
+        f'motion = "rest" in a map{_named(at_rest)}'
     )
+
+
+def _named(findings: Sequence[Finding]) -> str:
+    shown = "; ".join(f"{each.what}: {each.where}: {each.said}" for each in findings[:MOST_NAMED])
+    more = f"; and {len(findings) - MOST_NAMED} more" if len(findings) > MOST_NAMED else ""
+    return f". Taken to rest, its readings have this wrong: {shown}{more}" if findings else ""
 
 
 def missing_columns(info: RecordingInfo, columns: Columns) -> list[str]:

@@ -27,6 +27,7 @@ from labctl.recording.columns import BY_NAME, holds_flags
 from labctl.recording.info import NO_DATE, Motion, OutputUnit, RecordingInfo
 from labctl.recording.raw_table import RawColumn, RawTable
 from labctl.recording.recording import Recording
+from labctl.recording.sanity.readings import examine
 
 Array = NDArray[np.float64]
 #: Readings that a recording has at least.
@@ -137,7 +138,11 @@ def _assembled(
     _refuse_steep(column_map, columns, times.t_s, problems)
     motion = column_map.motion or motion_of(columns, column_map.kind, moved, times.t_s)
     if motion is None:
-        problems.add(free_motion(columns, moved, times.t_s))
+        info = _info(table, column_map, "rest", {}, times, problems)
+        problems.raise_if_any()
+        assert info is not None
+        at_rest = [each.finding for each in examine(Recording(info, columns))]
+        problems.add(free_motion(columns, moved, times.t_s, at_rest))
         problems.raise_if_any()
     assert motion is not None
     output: dict[str, OutputUnit] = {}

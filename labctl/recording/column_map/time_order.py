@@ -5,14 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from labctl.recording.column_map.model import ColumnMap
 from labctl.recording.column_map.sources import source
+from labctl.recording.column_map.stamps import spread_between
 from labctl.recording.column_map.units import find_unit
 from labctl.recording.raw_table import RawTable
 from labctl.recording.sanity.finding import Finding
 from labctl.recording.sanity.readings.clock import check_clock, rows_in_order
-from labctl.recording.sanity.readings.series import Series
+from labctl.recording.sanity.readings.series import Series, rows_in_words
 
 
 def in_order_of_time(table: RawTable, column_map: ColumnMap) -> tuple[RawTable, Finding | None]:
@@ -27,6 +29,8 @@ def in_order_of_time(table: RawTable, column_map: ColumnMap) -> tuple[RawTable, 
     values = column.values
     if len(values) < 2 or not np.isfinite(values).all() or bool(np.all(np.diff(values) > 0)):
         return table, None
+    if bool(np.all(np.diff(values) >= 0)) and spread_between(values - values[0]) is not None:
+        return table, None  # stamps that several readings share: the times between are found when they are read
     unit = find_unit("s", mapped.unit or column.unit) if mapped.unit or column.unit else None
     n = len(values)
     series = Series(
@@ -38,5 +42,26 @@ def in_order_of_time(table: RawTable, column_map: ColumnMap) -> tuple[RawTable, 
         name: replace(each, values=each.values[kept], words=None if each.words is None else each.words[kept])
         for name, each in table.columns.items()
     }
-    found = next((marked.finding for marked in check_clock(series)), None)
+    found = _twice(table, values, kept) or next((marked.finding for marked in check_clock(series)), None)
     return replace(table, columns=columns, rows=int(kept.sum()), first_rows=()), found
+
+
+def _twice(table: RawTable, values: NDArray[np.float64], kept: NDArray[np.bool_]) -> Finding | None:
+    """Return the finding about rows that repeat an earlier row with its time, (n,) times; None where others are out."""
+    order = np.argsort(values, kind="stable")
+    same = values[order[1:]] == values[order[:-1]]
+    for each in table.columns.values():
+        cells = each.values if each.is_number else each.words
+        if cells is not None and len(cells) == len(values):
+            same &= cells[order[1:]] == cells[order[:-1]]
+    again = np.zeros(len(values), dtype=np.bool_)
+    again[order[1:][same]] = True
+    n = int(again.sum())
+    if not n or n != int((~kept).sum()):
+        return None
+    return Finding(
+        "time_back", "certain", f"t_s, {rows_in_words(again)}",
+        f"{n} rows repeat an earlier row with its time stamp: they were written twice",
+        float(n), "rows", "one row for each reading", "leave the repeated rows out: they hold nothing new",
+        channel="t_s", n=n, may_leave_out=True,
+    )  # fmt: skip

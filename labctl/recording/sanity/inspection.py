@@ -13,6 +13,7 @@ from labctl.recording.sanity.damage import check_damage
 from labctl.recording.sanity.finding import Finding
 from labctl.recording.sanity.gain import check_responses
 from labctl.recording.sanity.outlying import check_outlying
+from labctl.recording.sanity.ratios import check_ratios
 from labctl.recording.sanity.readings import examine
 from labctl.recording.sanity.reference import check_reference
 from labctl.recording.sanity.response import responses
@@ -20,6 +21,9 @@ from labctl.recording.sanity.summary import Summary, summarise
 from labctl.recording.sanity.timing import check_time
 from labctl.recording.sanity.turned import check_turned, off_turns
 from labctl.recording.sanity.within import check_at_rest, check_changes, check_codes, check_spread, with_two_rates
+
+#: Findings of the gain of an axis: what single data sets of it say follows from them.
+OF_AXIS = frozenset({"sign", "scale", "unit", "no_response", "crossed", "one_data_set"})
 
 
 def inspect_recording(recording: Recording) -> list[Finding]:
@@ -53,6 +57,14 @@ def _not_said(of_readings: Sequence[Finding], found: Sequence[Finding]) -> Itera
     yield from (each for each in of_readings if (each.what, each.channel) not in said)
 
 
+def _with_gross(found: Sequence[Finding], gross: Sequence[Finding]) -> list[Finding]:
+    """Return findings of rates and the gross ones: what wraps explains all else of its axis; none is said twice."""
+    wrapped = {each.where.partition(",")[0] for each in gross if each.what == "wrapped"}
+    said = {each.where for each in found} | {"of a whole axis" for each in found if each.what in OF_AXIS}
+    added = [each for each in gross if each.what == "wrapped" or not {each.where, "of a whole axis"} & said]
+    return [*(each for each in found if not wrapped & set(each.where.split(", "))), *added]
+
+
 def _order(finding: Finding) -> bool:
     return finding.severity != "certain"
 
@@ -67,10 +79,13 @@ def _findings(summary: Summary, environment: Columns | None) -> list[Finding]:
     sound[[turn.row for turn in off]] = False
     trusted = summary.take(sound) if off else summary
     whole = summary.take(~np.any([with_two_rates(summary, axis) for axis in summary.info.axes], axis=0))
-    return [
-        *check_turned(summary, off),
+    of_rates = [
         *check_responses(trusted, responses(trusted)),
         *(check_outlying(whole, responses(whole)) if summary.info.motion != "turns" else ()),
+    ]
+    return [
+        *check_turned(summary, off),
+        *_with_gross(of_rates, list(check_ratios(whole))),
         *check_changes(summary),
         *check_at_rest(summary),
         *check_spread(summary),

@@ -17,7 +17,9 @@ NEAR_UNIT = 0.25
 #: A table angle tells the unit of time from this rate on, deg/s; the angle may be off by this share.
 TELLING_DPS, ANGLE_SETS = 1.0, 3
 #: Readings this far apart, s, or recordings that last so long, are not in seconds.
-SLOW_STEP_S, LONG_S = 5.0, 1e7
+SLOW_STEP_S, LONG_S = 60.0, 1e7
+#: Whole numbers are what a counter of ms or us has: of them readings are in question that are this far apart, s.
+WHOLE_STEP_S = 5.0
 #: Readings within a data set that slow are no data set of a minute.
 LEAST_READINGS = 16
 #: Time stamps that begin later than this after `started_at`, s, count from somewhere else.
@@ -52,7 +54,7 @@ def _unit(summary: Summary, environment: Columns | None) -> Iterator[Finding]:
             return
     span = float(summary["t_end_s"][-1] - summary["t_begin_s"][0])
     slow = (
-        summary.info.sample_rate_hz is None and usual > SLOW_STEP_S
+        summary.info.sample_rate_hz is None and usual > (WHOLE_STEP_S if _whole(summary) else SLOW_STEP_S)
         and float(np.median(np.asarray(summary["n"], dtype=np.float64))) >= LEAST_READINGS
     )  # fmt: skip
     if slow or span > LONG_S:
@@ -62,6 +64,13 @@ def _unit(summary: Summary, environment: Columns | None) -> Iterator[Finding]:
         do = "if the time stamps are in ms or us, divide column t_s by 1e3 or 1e6; if not, give sample_rate_hz"
         value = usual if slow else span
         yield Finding("time_unit", "likely", "column t_s", said, value, "s", "seconds", do)
+
+
+def _whole(summary: Summary) -> bool:
+    """Whether the data sets begin and end at whole numbers, with whole steps between."""
+    ends = np.concatenate([np.asarray(summary[name], dtype=np.float64) for name in ("t_begin_s", "t_end_s", "step_s")])
+    ends = ends[np.isfinite(ends)]
+    return bool(np.all(ends == np.round(ends)))
 
 
 def _by_rate(summary: Summary, usual: float) -> float:

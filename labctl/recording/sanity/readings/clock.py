@@ -14,8 +14,12 @@ from labctl.recording.sanity.readings.series import ROBUST, Array, Marked, Rows,
 BESIDE = 25
 #: A clock was set back where it stays back by so many usual steps.
 SET_STEPS = 1.5
+#: Readings closer than this share of the usual step were taken twice over: by a clock that was set back.
+CLOSE = 0.5
+#: Readings whose usual step says whether one is wide; the steps of a log may change.
+STEPS = 51
 #: Readings are missing where a step of time is so many usual ones, and so many usual deviations from them.
-GAP_STEPS, GAP_DEVIATIONS = 2.5, 12.0
+GAP_STEPS, GAP_DEVIATIONS = 1.8, 12.0
 #: More rows out of order than this share are no accident, and are not left out.
 MOST_OUT = 0.02
 
@@ -49,7 +53,11 @@ def check_clock(series: Series) -> Iterator[Marked]:
     falls = np.flatnonzero(steps <= 0) + 1
     if not len(falls):
         return
-    lasting = [(int(row), shift) for row in falls if (shift := _shift_s(series, int(row))) < -SET_STEPS * series.step_s]
+    lasting = (
+        []
+        if _is_shuffled(series)
+        else [(int(row), shift) for row in falls if (shift := _shift_s(series, int(row))) < -SET_STEPS * series.step_s]
+    )
     if lasting:
         yield from _set_back(series, lasting)
         return
@@ -69,6 +77,12 @@ def check_clock(series: Series) -> Iterator[Marked]:
         ),
         out,
     )  # fmt: skip
+
+
+def _is_shuffled(series: Series) -> bool:
+    """Whether the rows, sorted by time, are as even as a clock that was never set back: only their order is wrong."""
+    steps = np.diff(np.sort(series.t_s))
+    return bool(np.all(steps > CLOSE * series.step_s))
 
 
 def _shift_s(series: Series, row: int) -> float:
@@ -101,23 +115,34 @@ def check_gaps(series: Series) -> Iterator[Marked]:
     """Yield the data sets in which readings are missing, or the clock was set on."""
     steps = np.diff(np.sort(series.t_s))  # rows out of order leave no gap
     same = series.dataset[1:] == series.dataset[:-1]
-    usual = series.step_s
-    spread = ROBUST * float(np.median(np.abs(steps[same] - usual))) if same.any() else 0.0
-    wide = same & (steps > max(GAP_STEPS * usual, usual + GAP_DEVIATIONS * spread))
+    usual = _usual_steps(np.diff(series.t_s), series.step_s)
+    spread = ROBUST * float(np.median(np.abs(steps[same] - usual[same]))) if same.any() else 0.0
+    wide = same & (steps > np.maximum(GAP_STEPS * usual, usual + GAP_DEVIATIONS * spread))
     if not wide.any():
         return
     rows = np.concatenate([[False], wide])
     lacking = np.unique(series.dataset[rows])
-    lost = np.maximum(np.round(steps[wide] / usual) - 1, 1)
+    lost = np.maximum(np.round(steps[wide] / usual[wide]) - 1, 1)
     longest = int(np.argmax(np.where(wide, steps, 0.0)))
     yield Marked(
         Finding(
             "gaps", "likely", f"{numbers_in_words(lacking)} ({len(lacking)} of {len(series.parts)})",
             f"readings are missing in {int(wide.sum())} places, the longest gap is {steps[longest]:.3g} s at row "
             f"{longest + 2}; or the clock was set on there",
-            float(steps[longest]), "s", f"a reading every {usual:.3g} s",
+            float(steps[longest]), "s", f"a reading every {usual[longest]:.3g} s",
             "check the logger and its clock; lost readings are missing from the mean", channel="t_s",
             n=int(lost.sum()),
         ),
         rows,
     )  # fmt: skip
+
+
+def _usual_steps(steps: Array, usual: float) -> Array:
+    """Return the usual step around each of (n,) steps of time; `usual` where they are too few to tell."""
+    blocks = len(steps) // STEPS
+    if blocks < 3:
+        return np.full(len(steps), usual)
+    of_blocks = np.pad(np.median(steps[: blocks * STEPS].reshape(blocks, STEPS), axis=1), 1, mode="edge")
+    around = np.median([of_blocks[:-2], of_blocks[1:-1], of_blocks[2:]], axis=0)
+    found = around[np.minimum(np.arange(len(steps)) // STEPS, blocks - 1)]
+    return np.asarray(np.where(found > 0, found, usual))  # stamps that several readings share say nothing

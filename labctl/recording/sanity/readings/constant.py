@@ -63,7 +63,10 @@ def frozen_rows(series: Series, name: str, values: Array) -> Rows:
     ends = (float(values.min()), float(values.max()))
     gain = gain_of(values, series.rate_dps)
     for begin, end in steady:
-        if end - begin < least or (values[begin] in ends and ends[0] != ends[1] and not is_coarse):
+        at_end = values[begin] in ends and ends[0] != ends[1] and not is_coarse
+        if at_end and series.motion == "rest" and np.sum(values == values[begin]) == end - begin:
+            at_end = False  # all in one stretch: noise at the end of a range comes to it again and again
+        if end - begin < least or at_end:
             continue
         if is_coarse and not _would_move(series, slice(begin, end), gain, series.code_steps[name]):
             continue
@@ -76,25 +79,46 @@ def _would_move(series: Series, rows: slice, gain: float, step: float) -> bool:
 
 
 def check_repeated(series: Series, frozen: Rows) -> Iterator[Marked]:
-    """Yield rows that hold in every measured channel what the row before holds."""
-    channels = [*series.outputs.values(), *series.thermometers.values(), *series.others.values()]
+    """Yield rows that hold in every output, of an accelerometer too, what the row before holds.
+
+    A thermometer may be read by itself.
+    """
+    forces = [values for name, values in series.others.items() if name.startswith("accel_")]
+    channels = [*series.outputs.values(), *forces]
     equal = _equal(channels, 1) & ~frozen[1:] & (series.dataset[1:] == series.dataset[:-1])
     apart = _equal(channels, 3) & ~frozen[3:] & (series.dataset[3:] == series.dataset[:-3])
     n = len(series)
-    share, usual = equal.sum() / n, apart.sum() / n
+    share, usual = equal.sum() / n, max(apart.sum() / n, _chance_of_equal(series))
     if share - usual <= max(REPEATED_SHARE, DEVIATIONS * np.sqrt((share + usual) / n)):
         return
     rows = np.concatenate([[False], equal])
     yield Marked(
         Finding(
             "repeated", "likely", rows_in_words(rows),
-            f"{int(rows.sum())} rows repeat the readings of the row before ({100 * share:.2g} % of all)",
+            f"{int(rows.sum())} rows repeat the outputs of the row before ({100 * share:.2g} % of all)",
             100 * float(share), "%", f"at most {100 * usual:.2g} %, as by chance",
             "leave the repeated rows out: they are no new readings, and make the noise look smaller than it is",
             n=int(rows.sum()), may_leave_out=True,
         ),
         rows,
     )  # fmt: skip
+
+
+def _chance_of_equal(series: Series) -> float:
+    """Return how often a row equals the row before by chance, by how often its outputs differ by one code and by two.
+
+    Differences of neighbours thin out evenly from code to code, as a normal distribution does, also where an output
+    that was smoothed differs by few codes; of readings that are written again only those that do not differ are more.
+    """
+    chance = 1.0
+    for name, values in series.outputs.items():
+        step = series.code_steps[name]
+        if not step:
+            return 0.0
+        codes = np.abs(np.round(np.diff(values) / step))
+        one, two = (max(float(np.mean(codes == k)) / 2, 0.5 / len(codes)) for k in (1, 2))
+        chance *= min(one * max(one / two, 1.0) ** (1.0 / 3.0), 1.0)
+    return chance
 
 
 def _equal(channels: list[Array], lag: int) -> Rows:

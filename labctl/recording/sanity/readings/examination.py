@@ -10,27 +10,33 @@ import numpy as np
 from labctl.json_types.inspection import CourseJson, MarkJson
 from labctl.recording.recording import Recording
 from labctl.recording.sanity.finding import Finding
+from labctl.recording.sanity.readings.changes import check_noise, check_sampling
 from labctl.recording.sanity.readings.clock import check_clock, check_gaps
 from labctl.recording.sanity.readings.constant import check_frozen, check_repeated
 from labctl.recording.sanity.readings.courses import courses_of, joined_courses, marks_of
-from labctl.recording.sanity.readings.limits import check_clipped, check_steps, check_thermometers
+from labctl.recording.sanity.readings.limits import check_clipped, check_steps
 from labctl.recording.sanity.readings.lines import check_lines
 from labctl.recording.sanity.readings.mixture import check_copies, check_devices, check_units
 from labctl.recording.sanity.readings.series import Marked, Rows, Series, series_of
 from labctl.recording.sanity.readings.sudden import check_moved, check_spikes
+from labctl.recording.sanity.readings.thermometers import check_thermometers
 
 #: What a finding explains of others: of any rows, or of rows that it covers.
 EXPLAINS = {
-    "mixed_units": frozenset({"two_devices", "moved", "mains", "vibration", "clipped", "spikes"}),
-    "two_devices": frozenset({"moved", "mains", "vibration", "clipped", "spikes", "copied"}),
+    "mixed_units": frozenset(
+        {"two_devices", "level_step", "moved", "mains", "vibration", "clipped", "spikes", "noise_changes"}
+    ),
+    "two_devices": frozenset({"moved", "mains", "vibration", "clipped", "spikes", "copied", "repeated"}),
+    "level_step": frozenset({"moved"}),
     "quantised": frozenset({"mains", "vibration", "clipped", "repeated"}),
     "moved": frozenset({"mains", "vibration"}),
-    "repeated": frozenset({"mains", "vibration"}),
+    "repeated": frozenset({"mains", "vibration", "noise_changes"}),
     "thermometer": frozenset({"spikes"}),
-    "frozen": frozenset({"moved", "quantised"}),
+    "frozen": frozenset({"moved", "quantised", "noise_changes", "level_step", "clipped"}),
+    "clipped": frozenset({"noise_changes"}),
 }
 #: Findings that explain others of their own channel only.
-OF_CHANNEL = frozenset({"thermometer", "frozen"})
+OF_CHANNEL = frozenset({"thermometer", "frozen", "level_step", "clipped"})
 
 
 @dataclass(frozen=True)
@@ -55,7 +61,7 @@ def examine(recording: Recording) -> list[Marked]:
         return []
     at = np.flatnonzero(valid)
     of_values = [replace(each, rows=_spread(each.rows, at, n)) for each in _of_values(series)]
-    return [*check_clock(whole), *check_gaps(whole), *of_values]
+    return [*check_clock(whole), *check_gaps(whole), *check_sampling(whole), *of_values]
 
 
 def _rows(recording: Recording, kept: Rows) -> Recording:
@@ -94,7 +100,7 @@ def _of_values(series: Series) -> list[Marked]:
         *frozen, *repeated, *clipped, *check_thermometers(series),
         *check_steps(series),
         *check_units(series), *check_devices(series), *check_copies(series), *check_spikes(series),
-        *check_moved(series), *check_lines(series),
+        *check_moved(series), *check_noise(series), *check_lines(series),
     ]  # fmt: skip
     return [each for each in found if not _is_explained(each, found)]
 

@@ -1,4 +1,4 @@
-"""Readings at a limit: an output that does not go beyond a value, and a thermometer that is not there."""
+"""Readings at a limit: an output that does not go beyond a value, or whose steps are larger than its noise."""
 
 from __future__ import annotations
 
@@ -16,11 +16,6 @@ LEAST_IN_STEPS, LEAST_EQUAL = 30, 8
 #: An output is clipped where so many readings are expected beyond its last code, or the last code has this many times
 #: the readings of the code before. Steps above this many noises leave no shape that could tell.
 BEYOND, PILE, COARSE = 20.0, 2.5, 1.2
-#: What thermometers answer that are not there: DS18B20 not connected and after power-on, zeros, an open input.
-NO_THERMOMETER_C = (-127.0, 85.0, 0.0, -273.15)
-#: Below this no gyro is measured, deg C. Other words count where the reading jumps to them by this much, K, or by so
-#: many times its usual step.
-IMPOSSIBLE_C, JUMP_K, JUMP_STEPS = -100.0, 2.5, 20.0
 
 
 def check_steps(series: Series) -> Iterator[Marked]:
@@ -83,38 +78,3 @@ def _is_pile(values: Array, at_end: Rows, top: float, step: float, noise: float)
     second = int(np.sum((values < below[1]) & (values >= below[2])))
     ratio = n_end / max(before, 1)
     return ratio > PILE or n_end * ratio * min(ratio / max(before / max(second, 1), 1e-9), 1.0) > BEYOND
-
-
-def check_thermometers(series: Series) -> Iterator[Marked]:
-    """Yield the thermometers that answer the word of one that is not there."""
-    for name, values in series.thermometers.items():
-        rows = values < IMPOSSIBLE_C
-        for word in NO_THERMOMETER_C:
-            at_word = np.abs(values - word) < 1e-6
-            if at_word.any() and _jumps(series, values, at_word):
-                rows = rows | at_word
-        n = int(rows.sum())
-        if not n:
-            continue
-        word = float(values[rows][0])
-        yield Marked(
-            Finding(
-                "thermometer", "certain", f"{name}, {rows_in_words(rows)}",
-                f"{n} readings are {word:g} deg C, which a thermometer answers that is not connected or not ready",
-                word, "deg C", "the temperature of the unit",
-                "leave these readings out, and check the thermometer's cable", channel=name, n=n,
-                may_leave_out=n < len(values),
-            ),
-            rows,
-        )  # fmt: skip
-
-
-def _jumps(series: Series, values: Array, at_word: Rows) -> bool:
-    """Whether a channel comes to a word, or leaves it, within a data set by more than a temperature can."""
-    steps = np.abs(np.diff(values))
-    crossing = (at_word[1:] != at_word[:-1]) & (series.dataset[1:] == series.dataset[:-1])
-    if not crossing.any():
-        return False
-    usual = steps[~crossing & (steps > 0)]
-    limit = max(JUMP_K, JUMP_STEPS * float(np.median(usual)) if len(usual) else 0.0)
-    return bool(np.median(steps[crossing]) > limit)

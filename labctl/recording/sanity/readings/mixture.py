@@ -8,12 +8,13 @@ from itertools import combinations, pairwise
 import numpy as np
 
 from labctl.recording.sanity.finding import Finding
-from labctl.recording.sanity.readings.series import Array, Marked, Rows, Series, noise_of, rows_in_words
+from labctl.recording.sanity.readings.series import ROBUST, Array, Marked, Rows, Series, noise_of, rows_in_words
 
 #: Blocks in which the noise of long data sets is compared, and readings of one.
 BLOCKS, LEAST_IN_BLOCK = 40, 50
-#: The ratio of deg/s to rad/s, and how near to it, as a logarithm, a ratio of noises must be.
-DEG_PER_RAD, NEAR = 180.0 / np.pi, 0.4
+#: The ratio of deg/s to rad/s, and how near to it, as a logarithm, a ratio of noises must be; that of
+#: one output alone.
+DEG_PER_RAD, NEAR, VERY_NEAR = 180.0 / np.pi, 0.4, 0.12
 #: The same of a gain, in which the bias of the outputs is too.
 GAIN_NEAR = 1.0
 #: Rates from this size on (root mean square), deg/s, show the gain of the outputs.
@@ -22,16 +23,30 @@ LEAST_RATE_DPS = 1.0
 COPY, LEAST_MOVING = 0.97, 50
 #: Two devices by turns: their readings differ by this many noises of readings of one.
 BY_TURNS = 3.0
+#: Two devices in any order: their levels are this many times the spread within one apart, and so many steps of a code;
+#: each has this share of the readings, and this share of them lie between two of the other. Levels are taken over so
+#: many readings, and at most this share of readings is in the middle between them.
+INTERMIXED, INTERMIXED_CODES, LEAST_SHARE, LEAST_TURNS, LEVEL_READINGS, BETWEEN = 6.0, 3.0, 0.1, 0.1, 101, 0.01
 #: Two devices one after the other: both levels last so many readings, and are this many noises apart in two outputs.
 BESIDE, LEAST_BESIDE, APART = 60, 10, 3.5
+#: One output alone changes its level by this many noises, with this share of the readings of its data set on each side.
+APART_ALONE, ALONE_SHARE = 6.0, 0.1
 
 
 def check_units(series: Series) -> Iterator[Marked]:
-    """Yield the rows whose outputs are all as much smaller than the others' as rad/s are than deg/s."""
+    """Yield the rows whose outputs are as much smaller than the others' as rad/s are than deg/s: of all, or of one."""
+    names = list(series.outputs)
+    found = list(_units_of(series, names))
+    if not found and len(names) > 1:
+        found = [each for name in names for each in _units_of(series, [name])]
+    yield from found
+
+
+def _units_of(series: Series, names: list[str]) -> Iterator[Marked]:
     blocks = _blocks(series)
     if len(blocks) < 4:
         return
-    noises = np.array([[noise_of(values[block]) for values in series.outputs.values()] for block in blocks])
+    noises = np.array([[noise_of(series.outputs[name][block]) for name in names] for block in blocks])
     known = (noises > 0).all(axis=1)
     if known.sum() < 4:
         return
@@ -48,36 +63,45 @@ def check_units(series: Series) -> Iterator[Marked]:
     rows = np.zeros(len(series), dtype=bool)
     for block, value in zip(blocks, size, strict=True):
         rows[block] = value < split
-    if not _gains_agree(series, rows):
+    off = float(np.max(np.abs(apart - np.log(DEG_PER_RAD))))
+    if not _gains_agree(series, names, rows, off=off):
         return
     ratio = float(np.exp(np.mean(apart)))
+    outputs = "every output" if len(names) == len(series.outputs) else names[0]
     yield Marked(
         Finding(
-            "mixed_units", "certain", rows_in_words(rows),
-            f"the noise of every output is {ratio:.3g} times smaller than in the other rows, near 180/pi: these "
+            "mixed_units", "certain", ("" if outputs == "every output" else f"{names[0]}, ") + rows_in_words(rows),
+            f"the noise of {outputs} is {ratio:.3g} times smaller than in the other rows, near 180/pi: these "
             "readings are in rad/s, the others in deg/s",
             ratio, "1", "one unit in a file",
-            "multiply these rows by 180/pi (57.2958), or import the two parts as recordings of their own",
-            n=int(rows.sum()),
+            "convert the rows of one part in the file (180/pi = 57.2958), or import the two parts as recordings of "
+            "their own",
+            channel="" if outputs == "every output" else names[0], n=int(rows.sum()),
         ),
         rows,
     )  # fmt: skip
 
 
-def _gains_agree(series: Series, rows: Rows) -> bool:
+def _gains_agree(series: Series, names: list[str], rows: Rows, *, off: float) -> bool:
     """Whether the gain over the table's rate is as much smaller as the noise is: noise alone may change with the rate.
 
-    At rest the noise of two outputs or more must do.
+    At rest the noise of two outputs or more must do, or of one the noise and the level, or its noise alone if that is
+    `off` the ratio, as a logarithm, by little.
     """
     if series.rate_dps is None or min(_rms(series.rate_dps[rows]), _rms(series.rate_dps[~rows])) < LEAST_RATE_DPS:
-        return len(series.outputs) > 1
+        return len(names) > 1 or _levels_agree(series.outputs[names[0]], rows) or off < VERY_NEAR
     rate = series.rate_dps
     gains = [
         [abs(float(values[part] @ rate[part])) / float(rate[part] @ rate[part]) for part in (rows, ~rows)]
-        for values in series.outputs.values()
+        for values in (series.outputs[name] for name in names)
     ]
     low, high = max(gains, key=max)
     return low > 0 and abs(np.log(high / low / DEG_PER_RAD)) < GAIN_NEAR
+
+
+def _levels_agree(values: Array, rows: Rows) -> bool:
+    low, high = (abs(float(np.median(values[part]))) for part in (rows, ~rows))
+    return low > 0 and abs(np.log(max(high / low, 1e-12) / DEG_PER_RAD)) < NEAR
 
 
 def _rms(values: Array) -> float:
@@ -152,7 +176,47 @@ def check_devices(series: Series) -> Iterator[Marked]:
             np.arange(len(series)) % 2 == 1,
         )  # fmt: skip
         return
+    mixed = {
+        name: found
+        for name, values in series.residuals.items()
+        if (found := _intermixed(values, series.code_steps[name])) is not None and series.motion in ("rest", "rates")
+    }
+    if mixed:
+        name, rows = max(mixed.items(), key=lambda each: float(np.median(np.abs(np.diff(series.residuals[each[0]])))))
+        values = series.residuals[name]
+        apart = abs(float(np.median(values[rows]) - np.median(values[~rows])))
+        yield Marked(
+            Finding(
+                "two_devices", "certain", f"{', '.join(mixed)}, {rows_in_words(rows)}",
+                f"readings change between two levels {apart:.3g} deg/s apart, in any order: two devices write into one "
+                "file",
+                apart, "deg/s", "one device in a recording", "divide the rows by device, and import each by itself",
+                channel=name, n=int(rows.sum()),
+            ),
+            rows,
+        )  # fmt: skip
+        return
     yield from _after(series)
+
+
+def _intermixed(values: Array, step: float) -> Rows | None:
+    """Return the rows of the smaller of two groups of (n,) readings whose levels are apart; None for one group."""
+    if len(values) < 2 * LEVEL_READINGS:
+        return None
+    padded = np.pad(values, LEVEL_READINGS // 2, mode="edge")
+    total = np.concatenate([[0.0], np.cumsum(padded)])
+    off = values - (total[LEVEL_READINGS:] - total[:-LEVEL_READINGS]) / LEVEL_READINGS
+    high = off > 0
+    if not LEAST_SHARE < high.mean() < 1 - LEAST_SHARE or np.mean(high[1:] != high[:-1]) < LEAST_TURNS:
+        return None
+    levels = [float(np.median(off[rows])) for rows in (high, ~high)]
+    spreads = [float(np.median(np.abs(off[rows] - level))) for rows, level in zip((high, ~high), levels, strict=True)]
+    within = ROBUST * max(spreads)
+    apart = levels[0] - levels[1]
+    middle = np.mean(np.abs(off - np.mean(levels)) < apart / 6)
+    if apart < INTERMIXED * within or apart < INTERMIXED_CODES * step or middle > BETWEEN:
+        return None
+    return high if high.mean() < 0.5 else ~high
 
 
 def _signed(values: Array) -> Array:
@@ -174,11 +238,15 @@ def _after(series: Series) -> Iterator[Marked]:
         n = part.stop - part.start
         if n < 4 * LEAST_BESIDE or not (series.still[part].all() or series.rate_dps is not None):
             continue  # turned by hand, a unit changes its rate on all axes at once
-        found = {name: _level_step(values[part], series.noises[name]) for name, values in series.residuals.items()}
+        found = {name: _steps_of_level(values[part], series.noises[name]) for name, values in series.residuals.items()}
         row = int(np.argmax(np.sum([np.abs(step) for step in found.values()], axis=0)))
         apart = {name: float(step[row]) for name, step in found.items() if abs(step[row]) > APART}
         lasting = {name for name in apart if _lasts(series.residuals[name][part], row, series.noises[name])}
         if len(lasting) < 2:
+            share = min(row, n - row) / n
+            lasting = lasting if series.motion == "rest" and share > ALONE_SHARE else set()  # else a rate changes
+            alone = [name for name in lasting if abs(apart[name]) > APART_ALONE]
+            yield from (_level_step(series, name, part.start + row, part, apart[name]) for name in alone)
             continue
         rows = np.zeros(len(series), dtype=bool)
         rows[part.start + row : part.stop] = True
@@ -196,7 +264,23 @@ def _after(series: Series) -> Iterator[Marked]:
         )  # fmt: skip
 
 
-def _level_step(values: Array, noise: float) -> Array:
+def _level_step(series: Series, name: str, row: int, part: slice, apart: float) -> Marked:
+    rows = np.zeros(len(series), dtype=bool)
+    rows[row : part.stop] = True
+    size = apart * series.noises[name]
+    return Marked(
+        Finding(
+            "level_step", "likely", f"{name}, from row {row + 1} on",
+            f"the level of this output alone changes at once by {size:.3g} deg/s, and stays: a shock, a contact, or "
+            "the unit was switched",
+            size, "deg/s", "a level that drifts slowly", f"divide the recording at row {row + 1}",
+            channel=name, n=int(rows.sum()),
+        ),
+        rows,
+    )  # fmt: skip
+
+
+def _steps_of_level(values: Array, noise: float) -> Array:
     """Return at each row of (n,) the mean after less that before, in noises; 0 near the ends."""
     n = len(values)
     if noise <= 0:

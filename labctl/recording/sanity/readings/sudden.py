@@ -33,8 +33,16 @@ ALONE = 2.5
 MOST_SPIKES = 0.02
 #: A rest is examined in blocks of this long, s, and at least so many readings, against the median of so many blocks.
 BLOCK_S, BLOCK_READINGS, LEVEL_BLOCKS = 0.5, 8, 601
-#: A unit moves where a block's median is off by so many usual distances, and by this much, deg/s.
-MOVED_NOISES, MOVED_DPS = 12.0, 0.3
+#: A unit moves where a block's median is off by so many usual distances, and by this much, deg/s, in a record at rest.
+MOVED_NOISES, MOVED_DPS = 12.0, 0.02
+#: The same of a data set at rest on a table, whose output has the turns before it to follow.
+MOVED_ON_TABLE_DPS = 0.3
+#: And by so many times what the level wanders by itself; of a motion as large as that on a table fewer are enough.
+WANDER, WANDER_LARGE = 8.0, 3.0
+#: Standard deviation of a median in that of a mean.
+MEDIAN_NOISE = 1.25
+#: Blocks on either side of the begin and the end of a motion within which it begins and ends.
+EDGE_BLOCKS = 3
 
 
 def check_spikes(series: Series) -> Iterator[Marked]:
@@ -111,10 +119,10 @@ def check_moved(series: Series) -> Iterator[Marked]:
     for name, values in series.outputs.items():
         rows = np.zeros(len(values), dtype=bool)
         size = np.zeros(len(values))
-        least = max(MOVED_DPS, 2.0 * series.code_steps[name])
+        least = max(MOVED_DPS if series.motion == "rest" else MOVED_ON_TABLE_DPS, 2.5 * series.code_steps[name])
         for part in series.parts:
             if series.still[part].all():
-                rows[part], size[part] = _moves(values[part], block, least)
+                rows[part], size[part] = _moves(values[part], block, least, series.noises[name])
         n = int(rows.sum())
         if not n:
             continue
@@ -132,7 +140,7 @@ def check_moved(series: Series) -> Iterator[Marked]:
         )  # fmt: skip
 
 
-def _moves(values: Array, block: int, least: float) -> tuple[Rows, Array]:
+def _moves(values: Array, block: int, least: float, noise: float) -> tuple[Rows, Array]:
     blocks = len(values) // block
     rows, size = np.zeros(len(values), dtype=bool), np.zeros(len(values))
     if blocks < 8:
@@ -142,15 +150,21 @@ def _moves(values: Array, block: int, least: float) -> tuple[Rows, Array]:
     level = medians_around(medians, min(LEVEL_BLOCKS, 2 * blocks + 1)) if blocks > LEVEL_BLOCKS else np.median(medians)
     off = medians - level
     usual = ROBUST * float(np.median(np.abs(np.diff(medians)))) / np.sqrt(2)
+    usual = max(usual, MEDIAN_NOISE * noise / np.sqrt(block))  # medians of few codes are often equal
     drift = ROBUST * float(np.median(np.abs(off)))
-    far = np.abs(off) > max(least, MOVED_NOISES * usual, 3.0 * drift)
+    quiet = max(least, MOVED_NOISES * usual)
+    far = np.abs(off) > min(max(quiet, WANDER * drift), max(quiet, MOVED_ON_TABLE_DPS, WANDER_LARGE * drift))
     # a creeping output, such as one that warms up, leaves its level too, but not at once
     for begin, end in runs(far):
-        before = off[max(begin - 2, 0)] if begin else 0.0
-        after = off[min(end + 1, blocks - 1)] if end < blocks else 0.0
         most = off[begin:end][int(np.argmax(np.abs(off[begin:end])))]
-        sudden = min(abs(most - before), abs(most - after))
-        if sudden > max(least, 0.5 * abs(most)):
+        edges = [_change(off, edge) for edge in (begin, end) if 0 < edge < blocks]
+        if edges and min(edges) > max(least, 0.5 * abs(most)):
             rows[begin * block : end * block] = True
             size[begin * block : end * block] = most
     return rows, size
+
+
+def _change(off: Array, edge: int) -> float:
+    """Return by how much (m,) levels change within a few blocks of the edge of a run."""
+    begin, end = max(edge - EDGE_BLOCKS, 0), min(edge + EDGE_BLOCKS, len(off))
+    return float(np.ptp(off[begin:end]))

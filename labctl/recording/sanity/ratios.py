@@ -1,0 +1,71 @@
+"""Gross faults of the rates of data sets, where few sets tell: an output that wraps round, a rate ten times too small.
+
+The statistics of `outlying` need many data sets in a position; what is off by 30 % and more is seen with three that
+agree.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labctl.recording.positions import Position
+from labctl.recording.sanity.finding import Finding, numbers_in_words
+from labctl.recording.sanity.summary import Summary
+
+Array = NDArray[np.float64]
+#: A rate below this share of the fastest is taken as that share; data sets that must agree, and their share.
+LEAST_SHARE, LEAST_AGREEING, AGREEING_SHARE = 0.1, 3, 0.5
+#: Fastest rate that a schedule has to have, deg/s.
+LEAST_DPS = 1.0
+#: An output disagrees that is off by this share of the rate; the jumps of one that wraps differ by at most this share.
+OFF_SHARE, SAME_JUMP = 0.3, 0.03
+
+
+def check_ratios(summary: Summary) -> Iterator[Finding]:
+    """Yield the outputs that wrap round at the end of their range, and data sets whose rate is grossly wrong."""
+    if summary.info.motion != "rates":
+        return
+    places = np.asarray(summary["position"]).astype(str)
+    for position in dict.fromkeys(places.tolist()):
+        along = Position.of(position)
+        if along.axis in summary.info.axes:
+            yield from _of_position(summary.take(places == position), along)
+
+
+def _of_position(sets: Summary, along: Position) -> Iterator[Finding]:
+    rate = along.sign * np.asarray(sets["table_rate_dps"], dtype=np.float64)
+    output = sets.of_axis("mean", along.axis)
+    fast = float(np.abs(rate).max(initial=0.0))
+    if fast < LEAST_DPS or not np.isfinite(output).all():
+        return
+    numbers = np.asarray(sets["dataset"])
+    apart = rate - (output - float(np.median(output - rate)))
+    off = np.abs(apart) > OFF_SHARE * np.maximum(np.abs(rate), LEAST_SHARE * fast)
+    agreeing = int((~off).sum())
+    if not off.any() or agreeing < LEAST_AGREEING or agreeing < AGREEING_SHARE * len(off):
+        return
+    jump = float(np.median(np.abs(apart[off])))
+    top = float(np.abs(output).max())
+    one_jump = bool(np.all(np.abs(np.abs(apart[off]) / jump - 1) < SAME_JUMP))
+    outward = bool(np.all(np.sign(apart[off]) == np.sign(rate[off])))
+    if one_jump and outward and jump / 2 > (1 - SAME_JUMP) * top and int(off.sum()) > 1:
+        yield Finding(
+            "wrapped", "certain", f"axis {along.axis}, {numbers_in_words(numbers[off])}",
+            f"the output is {jump:.6g} deg/s from the rate, always towards the other end of its range, and never "
+            f"beyond {top:.6g} deg/s: its number wraps round there",
+            jump, "deg/s", "an output that follows the rate",
+            "leave these data sets out, or give the words as unsigned or wider ones (signed_bits of the column map)",
+        )  # fmt: skip
+        return
+    for row in np.flatnonzero(off):
+        given, shown = float(rate[row]), float(rate[row] - apart[row])
+        yield Finding(
+            "one_data_set", "likely", f"data set {int(numbers[row])}, axis {along.axis}",
+            f"the rate is given as {along.sign * given:.6g} deg/s, but the output shows {along.sign * shown:.4g} "
+            f"deg/s, where {agreeing} other data sets agree with their rate",
+            along.sign * shown, "deg/s", f"{along.sign * given:.6g} deg/s",
+            "correct the rate, its sign or the number of the data set, or leave the data set out",
+        )  # fmt: skip
