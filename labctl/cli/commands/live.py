@@ -106,6 +106,7 @@ def live(
     """
     from labctl.cli.printing.live import LivePrinter, print_live
     from labctl.fitting.live import Target
+    from labctl.services.commands.open import DatabaseCommands
     from labctl.services.live.assessor import BackgroundAssessor, InlineAssessor
     from labctl.services.live.calibrate import calibrate_live, usual_folder
 
@@ -121,7 +122,7 @@ def live(
         folder = out or usual_folder(database, source.serial, f"{source.clock.utc():%Y%m%dT%H%M%SZ}")
         try:
             answer = calibrate_live(
-                database, source, target, assessor, folder, keep_folder=out is not None,
+                DatabaseCommands(database), source, target, assessor, folder, keep_folder=out is not None,
                 show=printer.show, say=printer.say, attended=ending_is_an_interrupt(),
             )  # fmt: skip
         finally:
