@@ -133,9 +133,7 @@ class LiveCalibration:
     def _plain(self, error: Exception) -> str:
         return str(error).removeprefix(f"{self.info.serial}: ")
 
-    def _state(
-        self, recording: Recording, found: _Rests, why: str, up: tuple[float, float, float] | None
-    ) -> LiveState:
+    def _state(self, recording: Recording, found: _Rests, why: str, up: tuple[float, float, float] | None) -> LiveState:
         target, (_, result, refused) = self.target, self._fitted
         covers = covered(found.up)
         coefficients = () if result is None else tuple(coefficients_of(result, target))

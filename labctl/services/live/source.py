@@ -13,7 +13,6 @@ from instruments.clock import Clock
 from labctl.fitting.live import PoseRequest
 from labctl.recording import RecordingInfo
 
-
 #: Why a live calibration ended: its target was reached, the stream ended or failed, a person or the service ended it.
 Reason = Literal["complete", "stream", "interrupted"]
 

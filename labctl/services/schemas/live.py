@@ -10,6 +10,8 @@ from pydantic import Field
 from labctl.services.schemas.base import Request, ResponseModel
 from labctl.services.schemas.calibrations import FitResponse
 
+#: A serial number, as a recording takes it.
+SERIAL = r"^[A-Za-z0-9][A-Za-z0-9._+# -]{0,63}$"
 #: Idle: none since the service began. The last three are the ends: with or without a version, and without a recording.
 LiveStage = Literal["idle", "running", "storing", "done", "ended", "failed"]
 LiveEnd = Literal["complete", "stream", "interrupted"]
@@ -20,8 +22,7 @@ class LiveRequest(Request):
 
     serial: str | None = Field(
         default=None,
-        min_length=1,
-        max_length=100,
+        pattern=SERIAL,
         description="Serial number of the unit; for the bench's own stream it may be left out: its first gyro.",
     )
     address: str | None = Field(

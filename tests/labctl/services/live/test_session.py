@@ -69,8 +69,8 @@ class Bench:
 
     def run(self, source: TurnedSource | LineSource, *, keep_folder: bool = False) -> LiveResponse:
         return calibrate_live(
-            DatabaseCommands(self.database), source, TARGET, InlineAssessor(), self.folder, keep_folder=keep_folder, show=lambda _: None,
-            say=self.said.append, attended=nullcontext(),
+            DatabaseCommands(self.database), source, TARGET, InlineAssessor(), self.folder, keep_folder=keep_folder,
+            show=lambda _: None, say=self.said.append, attended=nullcontext(),
         )  # fmt: skip
 
 
