@@ -178,9 +178,9 @@ class LabService:
         access = self.bench_access
         return self._event_stream.follow(campaign, after, over=lambda: access.stops and not access.runs(campaign))
 
-    def follow_live(self) -> AsyncIterator[LiveStateResponse | None]:
+    def follow_live(self, first: LiveStateResponse) -> AsyncIterator[LiveStateResponse | None]:
         """Yield how the live calibration stands, as `LiveEventStream.follow` does, until it or this service ends."""
-        return self._live_stream.follow(over=lambda: self.bench_access.stops)
+        return self._live_stream.follow(first, over=lambda: self.bench_access.stops)
 
     def pulse(self) -> PulseResponse:
         """Return what a caller without a key may know: that the service answers, and its version."""

@@ -56,11 +56,13 @@ async def events(service: ServiceDep) -> EventStream:
     """Server-sent events until it has ended. A page that follows them watches it (`end_unwatched`)."""
 
     async def stream() -> AsyncIterator[bytes]:
-        async for update in service.follow_live():
+        async for update in service.follow_live(first):
             if update is None:
                 yield b": alive\n\n"
             else:
                 yield f"event: state\ndata: {update.model_dump_json()}\n\n".encode()
 
-    await run_in_threadpool(service.bench_access.live_state)  # a bench process that is silent is a problem document
+    first = await run_in_threadpool(
+        service.bench_access.live_state
+    )  # a bench process that is silent is a problem document
     return EventStream(stream(), headers={"Cache-Control": "no-cache"})

@@ -20,18 +20,19 @@ class LiveEventStream:
         self._cache = StatusCache()
         listen(self._cache.ring)  # first of all: a client that is woken reads anew
 
-    async def follow(self, over: Callable[[], bool]) -> AsyncIterator[LiveStateResponse | None]:
-        """Yield the state whenever it has changed, and None to show that the stream lives, until it is over.
+    async def follow(
+        self, first: LiveStateResponse, over: Callable[[], bool]
+    ) -> AsyncIterator[LiveStateResponse | None]:
+        """Yield the state, `first` and whenever it has changed, and None to show that the stream lives, until it ends.
 
         A client that reads slowly gets the newest state next, never a queue of old ones.
         """
         bell, silent_s = Bell(), 0.0
         shown: LiveStateResponse | None = None
+        now = first
         stop = self._listen(bell.ring)
         try:
             while True:
-                bell.clear()
-                now = await self._cache.at("live", self._state)
                 if now != shown:
                     shown, silent_s = now, 0.0
                     yield now
@@ -42,5 +43,7 @@ class LiveEventStream:
                 if silent_s >= HEARTBEAT_S:
                     silent_s = 0.0
                     yield None
+                bell.clear()
+                now = await self._cache.at("live", self._state)
         finally:
             stop()
