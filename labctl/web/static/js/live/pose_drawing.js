@@ -42,11 +42,29 @@ function arrow(name, to) {
 }
 
 /**
- * The unit with the direction `up` of its body pointing up; `label` says the pose in words.
+ * What is up: an arrow above the cube, and the axes that point there.
+ * @param {number} high
+ * @param {string} name
+ */
+function upwards(high, name) {
+  const [from, tip] = [project([0, 0, high + 0.15]), project([0, 0, high + 0.75])];
+  const head = [-7, 7].map((x) => `${(tip[0] + x).toFixed(1)},${(tip[1] + 9).toFixed(1)}`);
+  return svg(
+    "g",
+    { class: "up" },
+    svg("line", { x1: from[0], y1: from[1], x2: tip[0], y2: tip[1] + 6 }),
+    svg("polygon", { points: [tip.map((v) => v.toFixed(1)).join(","), ...head].join(" ") }),
+    svg("text", { x: tip[0], y: tip[1] - 11, "text-anchor": "middle" }, name ? `${name} up` : "up"),
+  );
+}
+
+/**
+ * The unit with the direction `up` of its body pointing up; `label` says the pose in words, `name` the axes that do.
  * @param {readonly number[]} up
  * @param {string} label
+ * @param {string} [name]
  */
-export function poseDrawing(up, label) {
+export function poseDrawing(up, label, name = "") {
   const axes = axesInPicture(up);
   const low = -depthBelow(axes);
   const table = [
@@ -57,13 +75,14 @@ export function poseDrawing(up, label) {
   ];
   // an axis that points away from the eye is behind the cube
   const behind = NAMES.filter((_, k) => axes[k][0] + axes[k][1] + 0.84 * axes[k][2] < 0);
-  const arrows = NAMES.map((name, k) => ({ name, drawing: arrow(name, axes[k]) }));
+  const arrows = NAMES.map((each, k) => ({ name: each, drawing: arrow(each, axes[k]) }));
   return svg(
     "svg",
-    { viewBox: "0 0 300 270", class: "mounting pose", role: "img", "aria-label": label },
+    { viewBox: "0 -40 300 310", class: "mounting pose", role: "img", "aria-label": label },
     svg("polygon", { points: outline(table), class: "table top" }),
-    arrows.filter(({ name }) => behind.includes(name)).map(({ drawing }) => drawing),
+    arrows.filter((each) => behind.includes(each.name)).map(({ drawing }) => drawing),
     seenFaces(axes).map(({ corners, side }) => svg("polygon", { points: outline(corners), class: `cube ${side}` })),
-    arrows.filter(({ name }) => !behind.includes(name)).map(({ drawing }) => drawing),
+    arrows.filter((each) => !behind.includes(each.name)).map(({ drawing }) => drawing),
+    upwards(depthBelow(axes), name),
   );
 }

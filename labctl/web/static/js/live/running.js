@@ -61,9 +61,11 @@ function fallingPlot(history) {
       layout: {
         xaxis: { title: { text: "time, s" } },
         yaxis: { title: { text: "U / limit" }, type: "log" },
+        legend: { orientation: "h", y: -0.22, yanchor: "top", x: 0 },
         shapes: [{ type: "line", xref: "paper", x0: 0, x1: 1, y0: 1, y1: 1, line: { width: 1.5, dash: "dash" } }],
       },
     }),
+    { height: "28rem" },
   );
 }
 
@@ -125,7 +127,8 @@ export function runningLive(first, signal) {
     request.textContent = state.text;
     if (!moment || !target) return;
     const need = moment.request?.name ?? "";
-    if (need !== shown) setChildren(asked, moment.request ? poseDrawing(moment.request.up, moment.request.text) : null);
+    if (need !== shown)
+      setChildren(asked, moment.request ? poseDrawing(moment.request.up, moment.request.text, need) : null);
     shown = need;
     const at = moment.up?.map((v) => v.toFixed(2)).join() ?? "";
     if (at !== drawn) setChildren(now, moment.up ? poseDrawing(moment.up, "The pose of the unit now") : null);
