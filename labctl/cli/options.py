@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from datetime import UTC, date, datetime
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -110,10 +110,16 @@ ImporterName = Annotated[
         help="Name of the importer that reads the file; default: the importer that recognises the file best.",
     ),
 ]
-ImporterOptions = Annotated[
-    list[str] | None,
-    typer.Option("--option", metavar="KEY=VALUE", help="Option of the importer, as KEY=VALUE; may be repeated."),
-]
+
+
+def _key_values(what: str) -> Any:
+    """Return the option --option of what it is for."""
+    return typer.Option("--option", metavar="KEY=VALUE", help=f"{what}, as KEY=VALUE; may be repeated.")
+
+
+ImporterOptions = Annotated[list[str] | None, _key_values("Option of the importer")]
+FormatOptions = Annotated[list[str] | None, _key_values("Option of the format")]
+DriverOptions = Annotated[list[str] | None, _key_values("Setting of the driver")]
 MapFile = Annotated[
     Path | None,
     typer.Option(

@@ -29,7 +29,7 @@ LEAST_BEAT_S = 0.1
 #: Calls that are under way when the process ends have so long to be answered, s.
 UNDER_WAY_S = 2.0
 #: Acts of a person on a campaign; each is a method of CampaignControl.
-CONTROL = frozenset({"start", "schedule", "resume", "pause", "abort", "confirm", "check"})
+CONTROL = frozenset({"start", "schedule", "resume", "pause", "abort", "confirm", "check", "start_live", "end_live"})
 
 
 @dataclass(frozen=True)
@@ -101,6 +101,10 @@ class BenchCalls:
             return self._local.runs(*call.args), self._local.status(*call.args)
         if call.name == "bench.describe":
             return self._local.describe()
+        if call.name == "bench.live_state":
+            return self._local.live_state(watched=bool(call.args[0]))
+        if call.name == "bench.live_history":
+            return self._local.live_history()
         raise KeyError(call.name)
 
     def _watch(self, connection: Connection) -> None:

@@ -1,8 +1,9 @@
 """The bench process: engine, instruments, journal, schedule, and the one writing connection of the database.
 
-It computes no fit. Other processes call it over Unix sockets; a stop has a socket and a thread of its own that wait for
-no lock and no database. It outlives its supervisor: a campaign goes on or ends by the rule of its recipe, a page at the
-service's address can stop it, and another supervisor finds it again.
+It computes no fit but that of a live calibration, while no campaign runs. Other processes call it over Unix sockets; a
+stop has a socket and a thread of its own that wait for no lock and no database. It outlives its supervisor: a campaign
+goes on or ends by the rule of its recipe, a page at the service's address can stop it, and another supervisor finds it
+again.
 """
 
 from __future__ import annotations

@@ -25,6 +25,7 @@ from labctl.services.commands.requests import CampaignResume, CampaignStart, ToB
 from labctl.services.commands.service_control import NO_BENCH
 from labctl.services.schemas.benches import BenchCheckResponse, BenchDescription, CheckRequest, StopResponse
 from labctl.services.schemas.campaigns import CampaignResponse, ConfirmRequest, ReasonRequest
+from labctl.services.schemas.live import LiveEndRequest, LiveHistoryResponse, LiveRequest, LiveStateResponse
 from labctl.services.schemas.schedule import ScheduledResponse
 from labctl.stop.client import StopAttempt, not_stopped_text
 from labctl.stop.latch import LatchState, StopRequest
@@ -154,6 +155,14 @@ class RemoteControl:
     def check(self, _: CommandContext, asked: ToBench[CheckRequest]) -> BenchCheckResponse:
         """Ask every instrument of the bench what it is and how it does."""
         return self._ask("check", asked, timeout_s=OPENING_S)
+
+    def start_live(self, _: CommandContext, asked: LiveRequest) -> LiveStateResponse:
+        """Begin a live calibration."""
+        return self._ask("start_live", asked, timeout_s=OPENING_S)
+
+    def end_live(self, _: CommandContext, asked: LiveEndRequest) -> LiveStateResponse:
+        """End the live calibration that runs."""
+        return self._ask("end_live", asked, timeout_s=TRANSACTION_S)
 
     def _ask(self, act: str, asked: object, timeout_s: float) -> Any:
         return self._calls.call(f"control.{act}", asked, timeout_s=timeout_s)
@@ -289,6 +298,16 @@ class RemoteBench:
             stop = describe_stop(self._latch_state(), self.bench.name)
             silent = {"unconfirmed": self._silence, "stop": stop}
         return known.model_copy(update={**silent, "heard_s": round(self.heard_s, 1)})
+
+    def live_state(self, *, watched: bool = False) -> LiveStateResponse:
+        """Return the live calibration that runs, or the last. Raises BenchSilent."""
+        answer: LiveStateResponse = self._ask("bench.live_state", watched)
+        return answer
+
+    def live_history(self) -> LiveHistoryResponse:
+        """Return how U fell in it. Raises BenchSilent."""
+        answer: LiveHistoryResponse = self._ask("bench.live_history")
+        return answer
 
     def start(self) -> None:
         """Hear of the bench process from now on; what it begins, it begins by itself."""

@@ -10,6 +10,7 @@ from labctl.services.benches.bench_left import BenchLeft
 from labctl.services.commands.context import CampaignControl
 from labctl.services.schemas.benches import BenchDescription, StopResponse
 from labctl.services.schemas.campaigns import CampaignResponse
+from labctl.services.schemas.live import LiveHistoryResponse, LiveStateResponse
 
 
 class BenchAccess(Protocol):
@@ -68,6 +69,14 @@ class BenchAccess(Protocol):
 
     def describe(self) -> BenchDescription | None:
         """Return the bench and what it is doing; None without a bench."""
+        ...
+
+    def live_state(self, *, watched: bool = False) -> LiveStateResponse:
+        """Return the live calibration that runs, or the last; `watched`: a page follows it. Raises BenchSilent."""
+        ...
+
+    def live_history(self) -> LiveHistoryResponse:
+        """Return how U fell in it, fit by fit. Raises BenchSilent."""
         ...
 
     def start(self) -> None:

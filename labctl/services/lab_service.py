@@ -28,6 +28,7 @@ from labctl.services.commands.requests import ToCampaign
 from labctl.services.computation import Computation, InThreads, Pending
 from labctl.services.drafts.answers import with_drafts
 from labctl.services.drafts.watch import DraftWatch
+from labctl.services.live.live_stream import LiveEventStream
 from labctl.services.local_bench import LocalBench
 from labctl.services.recordings.staging import remove_abandoned
 from labctl.services.schemas.benches import BenchResponse, StopResponse
@@ -35,6 +36,7 @@ from labctl.services.schemas.campaigns import (
     CampaignResponse,
     EventResponse,
 )
+from labctl.services.schemas.live import LiveStateResponse
 from labctl.services.schemas.reports.drafts import DraftsRequest, DraftsResponse
 from labctl.services.schemas.service import HealthResponse, HeartbeatResponse, PulseResponse
 from labctl.services.standards.register import count_by_state
@@ -82,6 +84,9 @@ class LabService:
         self.bench_access: BenchAccess = access or LocalBench(store, clock, runner)
         self._executor = LocalExecutor(CommandContext(lambda: store, clock, self.bench_access.control))
         self._event_stream = CampaignEventStream(store, self.status, self.bench_access.listen)
+        self._live_stream = LiveEventStream(
+            lambda: self.bench_access.live_state(watched=True), self.bench_access.listen
+        )
         self._drafts = DraftWatch(store, clock, lambda: None if self.bench is None else self.bench.name, self._draft)
         self._opened_at = clock.utc()
         self._closed = False
@@ -172,6 +177,10 @@ class LabService:
         """Yield where a campaign is, as `CampaignEventStream.follow` does, until it ends or this service does."""
         access = self.bench_access
         return self._event_stream.follow(campaign, after, over=lambda: access.stops and not access.runs(campaign))
+
+    def follow_live(self, first: LiveStateResponse) -> AsyncIterator[LiveStateResponse | None]:
+        """Yield how the live calibration stands, as `LiveEventStream.follow` does, until it or this service ends."""
+        return self._live_stream.follow(first, over=lambda: self.bench_access.stops)
 
     def pulse(self) -> PulseResponse:
         """Return what a caller without a key may know: that the service answers, and its version."""

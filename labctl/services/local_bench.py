@@ -14,9 +14,11 @@ from labctl.services.benches.confirmation import describe_bench, describe_safe_s
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.stop_requests import NotHere
 from labctl.services.commands.service_control import NO_BENCH, ServiceControl
+from labctl.services.live.live_sessions import LiveSessions
 from labctl.services.schedule.scheduler import REAL_BENCH_LATE_LIMIT_S, Scheduler
 from labctl.services.schemas.benches import BenchDescription, StopResponse
 from labctl.services.schemas.campaigns import CampaignResponse
+from labctl.services.schemas.live import LiveHistoryResponse, LiveStateResponse
 from labctl.stop.client import not_stopped_text
 from labctl.stop.latch import StopRequest
 from labctl.stop.page import BenchNow
@@ -36,7 +38,8 @@ class LocalBench:
         self._store = store
         self.runner = runner
         self.scheduler = None if runner is None else _scheduler(store, clock, runner)
-        self.control = ServiceControl(runner)
+        self.live = LiveSessions(store, clock, runner)
+        self.control = ServiceControl(runner, self.live)
         self.stops = False
 
     @property
@@ -64,7 +67,23 @@ class LocalBench:
 
     def listen(self, listener: Callable[[], None]) -> Callable[[], None]:
         """Call `listener` at every change; returns the function that ends this. A listener may not block."""
-        return (lambda: None) if self.runner is None else self.runner.listen(listener)
+        ends = [self.live.listen(listener)]
+        if self.runner is not None:
+            ends.append(self.runner.listen(listener))
+
+        def end() -> None:
+            for each in ends:
+                each()
+
+        return end
+
+    def live_state(self, *, watched: bool = False) -> LiveStateResponse:
+        """Return the live calibration that runs, or the last; `watched`: a page follows it."""
+        return self.live.state(watched=watched)
+
+    def live_history(self) -> LiveHistoryResponse:
+        """Return how U fell in it, fit by fit."""
+        return self.live.history()
 
     def describe(self) -> BenchDescription | None:
         """Return the bench and what it is doing; None without a bench."""
@@ -134,6 +153,7 @@ class LocalBench:
     def end_soon(self) -> None:
         """Begin nothing more and let what runs go to its end in the safe state; returns at once."""
         self.stops = True
+        self.live.end_soon()
         if self.scheduler is not None:
             self.scheduler.end_soon()
         if self.runner is not None:
@@ -144,6 +164,7 @@ class LocalBench:
         self.end_soon()
         if self.scheduler is not None:
             self.scheduler.close()
+        self.live.close()
         if self.runner is None:
             return BenchLeft()
         self.runner.close()

@@ -14,7 +14,10 @@ FOLDER = Path(__file__).parent / "static"
 PLOTLY = Path(str(plotly.__file__)).parent / "package_data" / "plotly.min.js"
 STATIC = "/static/"
 #: Address prefixes of the pages; the router in the browser handles the rest of an address.
-PAGES = ("/start", "/bench", "/campaigns", "/units", "/explore", "/recordings", "/noise", "/effects", "/certificates")
+PAGES = (
+    "/start", "/bench", "/live", "/campaigns", "/units", "/explore", "/recordings", "/noise", "/effects",
+    "/certificates",
+)  # fmt: skip
 #: Scripts and styles of labctl only, and no embedding in a frame. Plotly writes inline styles, and compiles shaders for
 #: surfaces, which needs 'unsafe-eval'.
 POLICY = (

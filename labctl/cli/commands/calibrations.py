@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from labctl.cli.error_reporting import one_clear_line
-from labctl.cli.options import AcceptWarnings, Database, Json, RecordingIds, Serial, recording_numbers
+from labctl.cli.options import AcceptWarnings, Database, FormatOptions, Json, RecordingIds, Serial, recording_numbers
 from labctl.cli.output import console, print_json, stderr
 
 Version = Annotated[int, typer.Argument(metavar="VERSION", help="Calibration version of the unit: 1, 2, 3 ...")]
@@ -173,10 +173,7 @@ def calibration(
         int | None, typer.Option("--version", metavar="N", help="Calibration version; default: the certified version.")
     ] = None,
     format_: Annotated[str, typer.Option("--format", metavar="NAME", help="json, c ...")] = "json",
-    option: Annotated[
-        list[str] | None,
-        typer.Option("--option", metavar="KEY=VALUE", help="Option of the format, as KEY=VALUE; may be repeated."),
-    ] = None,
+    option: FormatOptions = None,
     out: Annotated[
         Path | None,
         typer.Option("--out", metavar="FILE", help="Path of a file to write; default: print the calibration."),

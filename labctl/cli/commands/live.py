@@ -9,11 +9,14 @@ import typer
 
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.interrupts import ending_is_an_interrupt
-from labctl.cli.options import BenchName, Database, Json
+from labctl.cli.options import BenchName, Database, DriverOptions, Json
 from labctl.cli.output import print_json
 
 if TYPE_CHECKING:
     from labctl.services.live.source import LiveSource
+
+#: Where ROS drivers of inertial units publish, by REP 145.
+TOPIC = "/imu/data"
 
 Unit = Annotated[
     str | None,
@@ -28,21 +31,22 @@ Port = Annotated[
     str | None,
     typer.Option("--port", metavar="PORT", help="Port of the gyro for --driver, such as /dev/ttyUSB0."),
 ]
-DriverOption = Annotated[
-    list[str] | None,
-    typer.Option("--option", metavar="KEY=VALUE", help="Setting of the driver, as KEY=VALUE; may be repeated."),
-]
 Lines = Annotated[
     str | None,
     typer.Option(
         "--lines",
         metavar="SOURCE",
-        help="Readings as lines of JSON or CSV: - for standard input, or tcp://HOST:PORT.",
+        help="Readings as lines of JSON or CSV: - for standard input, or tcp://HOST:PORT; of a rosbridge server: "
+        "ws://HOST:PORT.",
     ),
 ]
 LineColumns = Annotated[
     str | None,
     typer.Option("--columns", metavar="A,B,C", help="Names of the values of a CSV line, where it has no header."),
+]
+Topic = Annotated[
+    str,
+    typer.Option("--topic", metavar="NAME", help="Topic of a rosbridge server, of type sensor_msgs/Imu."),
 ]
 Rate = Annotated[
     float | None, typer.Option("--rate", metavar="HZ", help="Readings per second, for lines without a time.")
@@ -86,8 +90,9 @@ def live(
     bench: BenchName = None,
     driver: Driver = None,
     port: Port = None,
-    option: DriverOption = None,
+    option: DriverOptions = None,
     lines: Lines = None,
+    topic: Topic = TOPIC,
     columns: LineColumns = None,
     rate_hz: Rate = None,
     latitude_deg: Latitude = None,
@@ -106,6 +111,7 @@ def live(
     """
     from labctl.cli.printing.live import LivePrinter, print_live
     from labctl.fitting.live import Target
+    from labctl.services.commands.open import DatabaseCommands
     from labctl.services.live.assessor import BackgroundAssessor, InlineAssessor
     from labctl.services.live.calibrate import calibrate_live, usual_folder
 
@@ -115,13 +121,13 @@ def live(
         source = (
             _gyro_source(serial, bench, driver, port, option or [], latitude_deg, speed)
             if lines is None
-            else _line_source(serial, lines, columns, rate_hz, latitude_deg, speed)
+            else _line_source(serial, lines, topic, columns, rate_hz, latitude_deg, speed)
         )
         assessor = InlineAssessor() if source.is_simulated else BackgroundAssessor()  # a real stream goes on meanwhile
         folder = out or usual_folder(database, source.serial, f"{source.clock.utc():%Y%m%dT%H%M%SZ}")
         try:
             answer = calibrate_live(
-                database, source, target, assessor, folder, keep_folder=out is not None,
+                DatabaseCommands(database), source, target, assessor, folder, keep_folder=out is not None,
                 show=printer.show, say=printer.say, attended=ending_is_an_interrupt(),
             )  # fmt: skip
         finally:
@@ -132,27 +138,23 @@ def live(
 
 
 def _line_source(
-    serial: str | None, lines: str, columns: str | None, rate_hz: float | None, latitude_deg: float | None,
+    serial: str | None, lines: str, topic: str, columns: str | None, rate_hz: float | None, latitude_deg: float | None,
     speed: float | None,
 ) -> LiveSource:  # fmt: skip
     from instruments.clock import SystemClock
     from labctl.errors import BadInput
-    from labctl.recording import RecordingInfo
     from labctl.recording.line_stream import LineDecoder
-    from labctl.services.live.line_feed import feed_of
-    from labctl.services.live.line_source import LineSource
+    from labctl.services.live.feeds import feed_of
+    from labctl.services.live.line_source import LineSource, info_of
 
     if speed is not None:
         raise BadInput(f"--speed {speed:g}: lines arrive as they are sent; leave the option out")
     if serial is None:
         raise BadInput("the lines do not say which unit it is; give its serial number: labctl live SERIAL --lines ...")
     clock = SystemClock()
-    info = RecordingInfo(
-        serial=serial, axes=("x", "y", "z"), kind="samples", motion="poses", started_at=clock.utc(),
-        latitude_deg=latitude_deg, sample_rate_hz=rate_hz, notes="turned by hand, live",
-    )  # fmt: skip
+    info = info_of(serial, clock, latitude_deg, rate_hz)
     decoder = LineDecoder(columns.split(",") if columns else (), rate_hz)
-    return LineSource(feed_of(lines), decoder, info, clock)
+    return LineSource(feed_of(lines, topic), decoder, info, clock)
 
 
 def _gyro_source(

@@ -36,6 +36,8 @@ from labctl.recording import Recording, RecordingInfo
 
 #: Poses that are named in one message.
 MOST_NAMED = 6
+#: The present pose is that of the specific force over so long, s.
+NEWEST_S = 0.25
 #: Between these sizes lies the specific force at rest, by an accelerometer before its calibration, g.
 LEAST_G, MOST_G = 0.7, 1.4
 
@@ -95,15 +97,17 @@ class LiveCalibration:
     def assess(self, *, finally_: bool = False) -> LiveState:
         """Return what the readings so far determine; `finally_`: by a fit to all of them, whatever came last."""
         recording = self._buffer.recording()
+        up: tuple[float, float, float] | None = None
         try:
             readings = readings_of(recording)
+            up = _up(readings)
             found = self._rests(readings)
             why = ""
         except NotEnoughData as error:
             found, why = _Rests(np.zeros((0, 3)), 0, 0.0), self._plain(error)
         if not why and (len(found.up) != self._fitted[0] or finally_):
             self._fitted = (len(found.up), *self._fit(recording))
-        return self._state(recording, found, why)
+        return self._state(recording, found, why, up)
 
     def _rests(self, readings: PoseReadings) -> _Rests:
         rests = find_rests(readings)
@@ -129,7 +133,7 @@ class LiveCalibration:
     def _plain(self, error: Exception) -> str:
         return str(error).removeprefix(f"{self.info.serial}: ")
 
-    def _state(self, recording: Recording, found: _Rests, why: str) -> LiveState:
+    def _state(self, recording: Recording, found: _Rests, why: str, up: tuple[float, float, float] | None) -> LiveState:
         target, (_, result, refused) = self.target, self._fitted
         covers = covered(found.up)
         coefficients = () if result is None else tuple(coefficients_of(result, target))
@@ -148,7 +152,7 @@ class LiveCalibration:
             self._damaged, found.still_s, found.count,
             tuple(each.name for each, has in zip(DIRECTIONS[: target.poses], covers, strict=False) if has),
             target.poses, coefficients, tuple(missing), request,
-            turns_left(coefficients, turns), () if result is None else left_out_of(result), result,
+            turns_left(coefficients, turns), () if result is None else left_out_of(result), result, up,
         )  # fmt: skip
 
     def _pose(
@@ -161,6 +165,16 @@ class LiveCalibration:
             pose = next_pose(covers, self.target.poses, up[-1] if len(up) else None, needs)
             self._asked = (len(up), pose)
         return pose
+
+
+def _up(readings: PoseReadings) -> tuple[float, float, float] | None:
+    """Return the direction of the newest specific force, by the accelerometer as it is; None where it is 0."""
+    force = np.mean(readings.accel_g[readings.t_s > readings.t_s[-1] - NEWEST_S], axis=0)
+    size = float(np.linalg.norm(force))
+    if not size > 0:
+        return None
+    x, y, z = (float(each) for each in force / size)
+    return x, y, z
 
 
 def _poses_text(absent: list[str], target: Target) -> str:

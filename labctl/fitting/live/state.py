@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from labctl.fitting.estimation.result import FitResult
-from labctl.fitting.live.directions import Direction
+from labctl.fitting.live.directions import Direction, turn_between
 from labctl.fitting.live.target import Target
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.poses.readings import AXES
@@ -66,11 +66,19 @@ class LiveState:
     turns_left: int | None  #: turns until every U is within its limit, if it goes on falling with their number
     left_out: tuple[str, ...]  #: turns that the last fit could not use, and why, in order of time
     fit: FitResult | None
+    up: tuple[float, float, float] | None  #: direction of the newest specific force in the body; it points up at rest
 
     @property
     def done(self) -> bool:
         """Whether the target is reached."""
         return not self.missing
+
+    @property
+    def off_deg(self) -> float | None:
+        """Angle between the present pose and the one that is asked for, deg; None without either."""
+        if self.up is None or self.request is None:
+            return None
+        return turn_between(np.array(self.up), np.array(self.request.pose.up))[1]
 
     @property
     def worst(self) -> LiveCoefficient | None:

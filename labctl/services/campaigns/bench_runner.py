@@ -19,6 +19,7 @@ from labctl.services.campaigns.bench_lending import BenchLending
 from labctl.services.campaigns.campaign_job import CampaignJob
 from labctl.services.campaigns.execution import run
 from labctl.services.campaigns.listeners import ChangeListeners
+from labctl.services.campaigns.live_loan import LiveLoan
 from labctl.services.campaigns.preparation import Prepared, prepare, refuse_unconfirmed
 from labctl.services.campaigns.recovery import CampaignRecovery, secure_bench
 from labctl.services.campaigns.resume import prepare_resume, with_original_simulation
@@ -71,6 +72,7 @@ class BenchRunner:
         self._make_clock = make_clock
         self._guard = threading.Lock()
         self._job: CampaignJob | None = None
+        self.live = LiveLoan(bench.name)
         self._recovery = CampaignRecovery(store, bench, make_clock)
         self._stops = False
         self.stop_latch = BenchStops(store, bench.name)
@@ -106,15 +108,21 @@ class BenchRunner:
 
     @property
     def occupied(self) -> bool:
-        """Whether a campaign runs or waits to be resumed, or another process drives the bench."""
-        return self._job is not None or self._recovery.pending or not self._may_drive
+        """Whether something runs or waits to be resumed, or another process drives the bench."""
+        return self._job is not None or bool(self.live.serial) or self._recovery.pending or not self._may_drive
 
     @property
     def _may_drive(self) -> bool:
         return self._hold is None or self._hold.held
 
     def _is_idle(self) -> bool:
-        return self._job is None and self._may_drive
+        return self._job is None and not self.live.serial and self._may_drive
+
+    def lend(self, serial: str, end: Callable[[str], None], begin: Callable[[Clock], None]) -> None:
+        """Lend the bench to a live calibration, which `begin` begins. Raises BenchBusy, and what `begin` raises."""
+        with self._guard:
+            self._refuse_unless_free()
+            self.live.lend(serial, end, lambda: begin(self._make_clock()))
 
     def runs_or_was_stopped(self, campaign: int) -> bool:
         """Return whether a campaign runs, or was the last one asked to stop: its abort may not be recorded yet."""
@@ -172,6 +180,7 @@ class BenchRunner:
         if self._job is not None:
             number = self._job.row.id
             raise BenchBusy(f"bench {self._bench.name} runs campaign {number} now; wait for its end, or abort it")
+        self.live.refuse()
         self._recovery.record_end()
         if self._hold is not None:
             self._hold.check()
@@ -232,6 +241,7 @@ class BenchRunner:
 
     def _secure_now(self) -> str:
         """Make the bench safe, under the guard; returns what is not confirmed."""
+        self.live.end("the bench was stopped")
         self.used = True
         left = secure_bench(self._store, self._bench, self._make_clock())
         self.stops.is_safe = not left
@@ -352,7 +362,8 @@ class BenchRunner:
             unconfirmed = "; ".join(filter(None, (unconfirmed, f"stopping: {hindrance}")))
         running, clock = (None, None) if job is None else (job.row.id, job.prepared.clock)
         found = description(self._bench, running, unconfirmed, self._last_check, clock)
-        return found.model_copy(update={"stop": self.stop_latch.describe(hindrance, stopping=ends)})
+        stop = self.stop_latch.describe(hindrance, stopping=ends)
+        return found.model_copy(update={"stop": stop, "live": self.live.serial})
 
     @property
     def polls(self) -> tuple[int, int] | None:

@@ -12,6 +12,7 @@ from instruments.clock import Clock
 from labctl.services.commands.requests import CampaignResume, CampaignStart, ToBench, ToCampaign
 from labctl.services.schemas.benches import BenchCheckResponse, CheckRequest
 from labctl.services.schemas.campaigns import CampaignResponse, ConfirmRequest, ReasonRequest
+from labctl.services.schemas.live import LiveEndRequest, LiveRequest, LiveStateResponse
 from labctl.services.schemas.schedule import ScheduledResponse
 from labctl.store import Store
 
@@ -67,4 +68,24 @@ class CampaignControl(Protocol):
 
     def check(self, context: CommandContext, asked: ToBench[CheckRequest], /) -> BenchCheckResponse:
         """Ask every instrument of a bench what it is and how it does; nothing moves."""
+        ...
+
+    def start_live(self, context: CommandContext, asked: LiveRequest, /) -> LiveStateResponse:
+        """Begin a live calibration."""
+        ...
+
+    def end_live(self, context: CommandContext, asked: LiveEndRequest, /) -> LiveStateResponse:
+        """End the live calibration that runs."""
+        ...
+
+
+class LiveControl(Protocol):
+    """Control over live calibrations, by the process that reads their streams."""
+
+    def start(self, request: LiveRequest) -> LiveStateResponse:
+        """Begin one."""
+        ...
+
+    def end(self, request: LiveEndRequest) -> LiveStateResponse:
+        """End the one that runs."""
         ...

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from instruments.bench_config import BenchFile
 from instruments.clock import SystemClock
-from labctl.errors import BadInput
+from labctl.errors import BadInput, Conflict
 from labctl.services.benches.check import check_bench
 from labctl.services.campaigns.execution import AskClear, Attend, Observe, run_here
 from labctl.services.campaigns.resume import resume_here
@@ -20,6 +20,7 @@ from labctl.services.planning.loading import bench_for, load_bench, load_recipe
 from labctl.services.schedule import queue
 from labctl.services.schemas.benches import BenchCheckResponse, CheckRequest
 from labctl.services.schemas.campaigns import CampaignResponse, ConfirmRequest, ReasonRequest, StartRequest
+from labctl.services.schemas.live import LiveEndRequest, LiveRequest, LiveStateResponse
 from labctl.services.schemas.reports.drafts import DraftsRequest
 from labctl.services.schemas.schedule import ScheduledResponse
 from labctl.store import open_store
@@ -121,3 +122,11 @@ class ForegroundControl:
     def check(self, _: CommandContext, asked: ToBench[CheckRequest]) -> BenchCheckResponse:
         """Check a bench by its file or its shipped name, in this process."""
         return check_bench(asked.bench)
+
+    def start_live(self, _: CommandContext, asked: LiveRequest) -> LiveStateResponse:
+        """Raise Conflict: `labctl live` calibrates in its own process."""
+        raise Conflict(f"no service runs on this database; calibrate {asked.serial or 'the unit'} with `labctl live`")
+
+    def end_live(self, _: CommandContext, __: LiveEndRequest) -> LiveStateResponse:
+        """Raise Conflict: one that runs in a terminal is ended there."""
+        raise Conflict("no service runs on this database; end `labctl live` with Ctrl-C in its terminal")

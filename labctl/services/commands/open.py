@@ -104,6 +104,17 @@ def _remote(url: str) -> Iterator[HttpExecutor]:
         yield HttpExecutor(connection)
 
 
+class DatabaseCommands:
+    """Executes commands on a database that is opened for each, as `execute` does."""
+
+    def __init__(self, database: str | None) -> None:
+        self._database = database
+
+    def execute(self, command: Command[RequestT, ResponseT], request: RequestT) -> ResponseT:
+        """Execute one command. Raises LabctlError."""
+        return execute(self._database, command, request)
+
+
 def execute(database: str | None, command: Command[RequestT, ResponseT], request: RequestT) -> ResponseT:
     """Execute one command on a database. Raises LabctlError."""
     with open_commands(database) as commands:

@@ -52,6 +52,7 @@ from labctl.services.schemas.certification import (
     RevokeRequest,
 )
 from labctl.services.schemas.documents.certificates import CertificateRequest, CertificateResponse, WithdrawRequest
+from labctl.services.schemas.live import LiveEndRequest, LiveRequest, LiveStateResponse
 from labctl.services.schemas.recordings import (
     ExampleRequest,
     ImportResponse,
@@ -152,6 +153,14 @@ def _clear_bench(context: CommandContext, asked: ToBench[ClearRequest]) -> Bench
 
 def _check_bench(context: CommandContext, asked: ToBench[CheckRequest]) -> BenchCheckResponse:
     return context.control.check(context, asked)
+
+
+def _start_live(context: CommandContext, asked: LiveRequest) -> LiveStateResponse:
+    return context.control.start_live(context, asked)
+
+
+def _end_live(context: CommandContext, asked: LiveEndRequest) -> LiveStateResponse:
+    return context.control.end_live(context, asked)
 
 
 def _create_key(context: CommandContext, asked: KeyRequest) -> NewKeyResponse:
@@ -274,6 +283,8 @@ CLEAR_BENCH = Command(
 CHECK_BENCH = Command(
     method="POST", path="/api/benches/{bench}/check", handler=_check_bench, responses={200: BenchCheckResponse}
 )
+START_LIVE = Command(method="POST", path="/api/live/start", handler=_start_live, responses={201: LiveStateResponse})
+END_LIVE = Command(method="POST", path="/api/live/end", handler=_end_live, responses={200: LiveStateResponse})
 CREATE_KEY = Command(method="POST", path="/api/keys", handler=_create_key, responses={201: NewKeyResponse})
 REVOKE_KEY = Command(method="POST", path="/api/keys/{name}/revoke", handler=_revoke_key, responses={200: KeyResponse})
 NOTE_BACKUP = Command(method="POST", path="/api/backups", handler=_note_backup, responses={204: NoContent})

@@ -11,11 +11,12 @@ from labctl.errors import Conflict, NotFound, StoreError
 from labctl.log import get_logger
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.unattended import abort_abandoned, not_running, record_action
-from labctl.services.commands.context import CommandContext
+from labctl.services.commands.context import CommandContext, LiveControl
 from labctl.services.commands.requests import CampaignResume, CampaignStart, ToBench, ToCampaign
 from labctl.services.schedule import queue
 from labctl.services.schemas.benches import BenchCheckResponse, CheckRequest
 from labctl.services.schemas.campaigns import CampaignResponse, ConfirmRequest, ReasonRequest
+from labctl.services.schemas.live import LiveEndRequest, LiveRequest, LiveStateResponse
 from labctl.services.schemas.schedule import ScheduledResponse
 from labctl.stop.latch import StopRequest
 
@@ -27,8 +28,8 @@ NO_BENCH = "this service has no bench; start it with `labctl serve --bench FILE`
 class ServiceControl:
     """Campaigns run in a thread of the bench runner; those that do not run there are only rows."""
 
-    def __init__(self, runner: BenchRunner | None) -> None:
-        self._runner = runner
+    def __init__(self, runner: BenchRunner | None, live: LiveControl | None = None) -> None:
+        self._runner, self._live = runner, live
 
     def _bench_runner(self) -> BenchRunner:
         """Return the runner of this service's bench. Raises Conflict when it has none."""
@@ -123,6 +124,19 @@ class ServiceControl:
         found = runner.check()
         context.store.audit.record(context.now(), "bench check", f"bench {found.bench}", {"ok": found.ok})
         return found
+
+    def start_live(self, _: CommandContext, asked: LiveRequest) -> LiveStateResponse:
+        """Begin a live calibration in this service."""
+        return self._live_control().start(asked)
+
+    def end_live(self, _: CommandContext, asked: LiveEndRequest) -> LiveStateResponse:
+        """End the live calibration that runs in this service."""
+        return self._live_control().end(asked)
+
+    def _live_control(self) -> LiveControl:
+        if self._live is None:
+            raise Conflict("live calibrations run in the process that drives the bench; ask the service")
+        return self._live
 
     @staticmethod
     def _record(context: CommandContext, action: str, campaign: int, reason: str) -> None:

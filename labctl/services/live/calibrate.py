@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from collections.abc import Callable
 from contextlib import AbstractContextManager
@@ -11,15 +12,16 @@ from labctl.config import default_database
 from labctl.errors import LabctlError
 from labctl.fitting.live import Target
 from labctl.fitting.models.presets import POSES
-from labctl.services.commands.open import execute
+from labctl.services.commands.command import CommandExecutor
 from labctl.services.commands.registry import FIT, IMPORT_RECORDING
 from labctl.services.commands.requests import RecordingFolder, ToUnit
 from labctl.services.live.assessor import Assessor
+from labctl.services.live.figures import figures_of
 from labctl.services.live.session import Ending, Show, run_live
 from labctl.services.live.source import LiveSource
 from labctl.services.live.spool import Spool
 from labctl.services.schemas.calibrations import FitRequest, FitResponse
-from labctl.services.schemas.live import LiveCoefficientResponse, LiveResponse
+from labctl.services.schemas.live import LiveResponse
 from labctl.store import is_url
 
 #: Says one sentence to the person at the terminal.
@@ -27,20 +29,22 @@ Say = Callable[[str], None]
 
 
 def calibrate_live(
-    database: str | None, source: LiveSource, target: Target, assessor: Assessor, folder: Path, *, keep_folder: bool,
-    show: Show, say: Say, attended: AbstractContextManager[None],
+    commands: CommandExecutor, source: LiveSource, target: Target, assessor: Assessor, folder: Path, *,
+    keep_folder: bool, show: Show, say: Say, attended: AbstractContextManager[None],
+    fits_anyway: Callable[[], bool] = lambda: False,
 ) -> LiveResponse:  # fmt: skip
-    """Calibrate by a stream, then import its recording and, where the target is reached, fit it.
+    """Calibrate by a stream, then have `commands` import its recording and, where the target is reached, fit it.
 
     `folder` holds the readings meanwhile; it is removed once they are in the database, unless it is to be kept.
-    `attended` is entered for the time of the stream: what a signal does then. Raises LabctlError, InstrumentError;
-    where readings were taken, `say` has said where they are.
+    `attended` is entered for the time of the stream: what a signal does then. `fits_anyway` says at its end whether a
+    version is also fitted where the target is not reached. Raises LabctlError, InstrumentError; where readings were
+    taken, `say` has said where they are.
     """
     spool = Spool(folder)
     try:
         with attended:
             ending = run_live(source, target, spool, assessor, show, say)
-        imported = execute(database, IMPORT_RECORDING, RecordingFolder(folder))
+        imported = commands.execute(IMPORT_RECORDING, RecordingFolder(folder))
     except BaseException:
         if spool.readings:
             say(f"the {spool.readings} readings so far are kept; import them with `labctl import {folder}`")
@@ -51,17 +55,21 @@ def calibrate_live(
         shutil.rmtree(folder, ignore_errors=True)
     fitted: FitResponse | None = None
     refused = ""
-    if ending.state.done:
+    if ending.state.done or fits_anyway():
         request = FitRequest(recordings=[imported.recording], model=POSES, effects=[])
         try:
-            fitted = execute(database, FIT, ToUnit(imported.serial, request))
+            fitted = commands.execute(FIT, ToUnit(imported.serial, request))
         except LabctlError as error:
             refused = str(error)
     return _answer(imported.serial, ending, imported.recording, fitted, refused)
 
 
 def usual_folder(database: str | None, serial: str, stamp: str) -> Path:
-    """Return where the readings of a live calibration are until they are in the database: beside it."""
+    """Return where the readings of a live calibration are until they are in the database: beside it.
+
+    What of a serial number cannot be in the name of a file is a line there.
+    """
+    serial = re.sub(r"[^\w.-]", "_", serial)
     location = database or default_database()
     if is_url(location):
         from platformdirs import user_data_path  # noqa: PLC0415  the command line starts in a tenth of a second
@@ -71,29 +79,13 @@ def usual_folder(database: str | None, serial: str, stamp: str) -> Path:
 
 
 def _answer(serial: str, ending: Ending, recording: int, fitted: FitResponse | None, refused: str) -> LiveResponse:
-    state = ending.state
     return LiveResponse(
+        **figures_of(ending.state),
         serial=serial,
-        complete=state.done,
+        complete=ending.state.done,
         ended=ending.reason,
         text=ending.text,
         recording=recording,
-        readings=state.readings,
-        lost=state.lost,
-        damaged=state.damaged,
-        duration_s=state.t_s,
-        rests=state.rests,
-        poses=list(state.covered),
-        poses_asked=state.wanted,
-        coefficients=[
-            LiveCoefficientResponse(
-                axis=each.axis, name=each.name, value=each.value, expanded=each.expanded, unit=each.unit,
-                limit=each.limit,
-            )
-            for each in state.coefficients
-        ],
-        missing=list(state.missing),
-        left_out=list(state.left_out),
         fit=fitted,
         refused=refused,
-    )  # fmt: skip
+    )

@@ -21,6 +21,7 @@ from labctl.recording.columns import BY_NAME
 from labctl.services.benches.standards import standards_of
 from labctl.services.live.source import Block
 from labctl.services.planning.loading import with_drivers
+from labctl.services.recordings.importers import parsed_options
 
 #: Limits of a unit that is named by driver and port alone: no table turns it.
 USUAL_RATE_DPS = 2000.0
@@ -111,11 +112,7 @@ def bench_of_driver(
         "name": "unit", "driver": driver, "port": port, "serial": serial, "axes": ["x", "y", "z"],
         "max_rate_dps": USUAL_RATE_DPS,
     }  # fmt: skip
-    for option in options:
-        key, sign, value = option.partition("=")
-        if not sign or not key.strip():
-            raise BadInput(f"--option {option!r}: write KEY=VALUE, such as sample_rate_hz=100")
-        section[key.strip()] = value.strip()
+    section |= parsed_options(options)
     try:
         bench = BenchFile.model_validate({"name": "live", "latitude_deg": latitude_deg, "gyros": [section]})
     except ValidationError as error:

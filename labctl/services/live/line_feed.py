@@ -68,7 +68,10 @@ class TcpFeed:
         """Take tcp://HOST:PORT; raises BadInput for another form."""
         host, _, port = address.removeprefix(TCP).rpartition(":")
         if not address.startswith(TCP) or not host or not port.isdecimal() or not 0 < int(port) < 65536:
-            raise BadInput(f"--lines {address}: write - for standard input, or tcp://HOST:PORT")
+            raise BadInput(
+                f"{address}: no address of a stream; give tcp://HOST:PORT, ws://HOST:PORT of a rosbridge server, or, "
+                "at the terminal, - for standard input"
+            )
         self.name, self._place = address, (host.strip("[]"), int(port))
         self._socket: socket.socket | None = None
 
@@ -77,7 +80,7 @@ class TcpFeed:
             self._socket = socket.create_connection(self._place, CONNECT_WITHIN_S)
         except OSError as error:
             raise BadInput(
-                f"--lines {self.name}: cannot connect ({error}); check address, and that the sender listens there"
+                f"{self.name}: cannot connect ({error}); check address, and that the sender listens there"
             ) from error
         self._socket.setblocking(False)
 
@@ -100,8 +103,3 @@ class TcpFeed:
             with suppress(OSError):
                 self._socket.close()
             self._socket = None
-
-
-def feed_of(given: str) -> LineFeed:
-    """Return the feed that --lines names: - or tcp://HOST:PORT. Raises BadInput."""
-    return DescriptorFeed(0, "standard input") if given == "-" else TcpFeed(given)

@@ -14,6 +14,14 @@ from labctl.services.live.source import Block, StreamEnded
 SILENCE_S, FIRST_WITHIN_S = 10.0, 60.0
 
 
+def info_of(serial: str, clock: Clock, latitude_deg: float | None, rate_hz: float | None = None) -> RecordingInfo:
+    """Return what is known of a unit whose readings arrive as lines. Raises BadInput for a serial number."""
+    return RecordingInfo(
+        serial=serial, axes=("x", "y", "z"), kind="samples", motion="poses", started_at=clock.utc(),
+        latitude_deg=latitude_deg, sample_rate_hz=rate_hz, notes="turned by hand, live",
+    )  # fmt: skip
+
+
 class LineSource:
     """Lines of a feed, decoded. `info` is what is known of the unit; its time of start is filled in."""
 

@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
 
 from instruments.errors import InstrumentError
 from labctl.errors import BadInput
 from labctl.fitting.live import LiveCalibration, LiveState, Target
 from labctl.services.live.assessor import Assessor
-from labctl.services.live.source import Block, LiveSource, StreamEnded
+from labctl.services.live.source import Block, LiveSource, Reason, StreamEnded
 from labctl.services.live.spool import Spool
 
 #: Readings are taken, and what is shown changes, this often, s.
 BLOCK_S = 0.25
-#: Why a live calibration ended: its target was reached, the stream ended or failed, the person ended it.
-Reason = Literal["complete", "stream", "interrupted"]
 Show = Callable[[LiveState], None]
 
 
@@ -46,7 +43,7 @@ def run_live(
     except StreamEnded as error:
         if not spool.readings:
             raise BadInput(str(error)) from error
-        text = str(error)
+        reason, text = error.reason, str(error)
     except (BadInput, InstrumentError, OSError) as error:
         if not spool.readings:
             raise

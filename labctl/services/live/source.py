@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,9 +13,16 @@ from instruments.clock import Clock
 from labctl.fitting.live import PoseRequest
 from labctl.recording import RecordingInfo
 
+#: Why a live calibration ended: its target was reached, the stream ended or failed, a person or the service ended it.
+Reason = Literal["complete", "stream", "interrupted"]
+
 
 class StreamEnded(Exception):
     """No further reading will come; the text says why."""
+
+    def __init__(self, text: str, reason: Reason = "stream") -> None:
+        super().__init__(text)
+        self.reason: Reason = reason
 
 
 @dataclass(frozen=True)

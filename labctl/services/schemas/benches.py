@@ -134,6 +134,7 @@ class BenchDescription(ResponseModel):
     latitude_deg: float | None
     units: list[BenchUnit]
     campaign: int | None = Field(description="The campaign that runs now; null: none.")
+    live: str = Field(default="", description="The unit that is calibrated live on the bench now; empty: none.")
     unconfirmed: str = Field(
         description="What the last safe state of the bench could not confirm; empty when all is well."
     )

@@ -45,6 +45,9 @@ export type Joint = NonNullable<Schema<"CriticismResponse">["joint"]>;
 export type Ladder = Schema<"LadderResponse">;
 export type LadderRow = Schema<"LadderRow">;
 export type ModelLines = Schema<"ModelLines">;
+export type LiveHistory = Schema<"LiveHistoryResponse">;
+export type LiveMoment = Schema<"LiveMoment">;
+export type LiveState = Schema<"LiveStateResponse">;
 export type LogPreview = Schema<"LogPreview">;
 export type Motion = Schema<"MotionResponse">;
 export type Output = Schema<"OutputResponse">;
@@ -124,6 +127,7 @@ interface Untyped {
 
 /** Messages of the event streams: the data of each event by its name. */
 export interface Streams {
+  "/api/live/events": { state: LiveState };
   "/api/campaigns/{campaign}/events": { progress: Campaign; message: CampaignEvent };
   "/api/units/{serial}/calibrations/{version}/criticism/events": {
     stage: { stage: string };

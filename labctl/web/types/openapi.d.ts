@@ -1123,6 +1123,111 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
+    "/api/live/start": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Calibrate a unit live
+         * @description Read a unit while a person turns it: on this service's bench, which it has meanwhile, or by a network stream.
+         *
+         *     Refused while a campaign or another live calibration runs. At its target a version is fitted; however it ends, the
+         *     readings until then become a recording.
+         */
+        post: operations["start_api_live_start_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * The live calibration
+         * @description How the one that runs stands, or how the last one ended: what is asked for, what is missing, and U.
+         */
+        get: operations["state_api_live_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/history": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * How U fell
+         * @description U of every coefficient at every fit of it: all of them.
+         */
+        get: operations["history_api_live_history_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/end": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * End the live calibration
+         * @description End it: the readings so far become a recording, and, with `fit`, a version where they allow one.
+         *
+         *     Answered within 10 s; `stage` is `storing` while the recording is still being stored.
+         */
+        post: operations["end_api_live_end_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/live/events": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        /**
+         * Follow the live calibration
+         * @description Server-sent events until it has ended. A page that follows them watches it (`end_unwatched`).
+         */
+        get: operations["events_api_live_events_get"];
+        put?: never;
+        post?: never;
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
     "/api/recordings": {
         parameters: {
             query?: never;
@@ -2634,6 +2739,12 @@ export interface components {
              */
             campaign: number | null;
             /**
+             * Live
+             * @description The unit that is calibrated live on the bench now; empty: none.
+             * @default
+             */
+            live: string;
+            /**
              * Unconfirmed
              * @description What the last safe state of the bench could not confirm; empty when all is well.
              */
@@ -2677,6 +2788,12 @@ export interface components {
              * @description The campaign that runs now; null: none.
              */
             campaign: number | null;
+            /**
+             * Live
+             * @description The unit that is calibrated live on the bench now; empty: none.
+             * @default
+             */
+            live: string;
             /**
              * Unconfirmed
              * @description What the last safe state of the bench could not confirm; empty when all is well.
@@ -6482,6 +6599,412 @@ export interface components {
              * @default
              */
             why: string;
+        };
+        /**
+         * LiveCoefficientResponse
+         * @description One coefficient of a live calibration.
+         */
+        LiveCoefficientResponse: {
+            /** Axis */
+            axis: string;
+            /** Name */
+            name: string;
+            /** Value */
+            value: number;
+            /**
+             * Expanded
+             * @description Expanded uncertainty U with k = 2, in `unit`.
+             */
+            expanded: number;
+            /** Unit */
+            unit: string;
+            /**
+             * Limit
+             * @description Limit of U by the target; null: the target states none.
+             */
+            limit: number | null;
+        };
+        /**
+         * LiveEndRequest
+         * @description The end of the live calibration that runs.
+         */
+        LiveEndRequest: {
+            /**
+             * Fit
+             * @description Fit a version of what was measured, although the target is not reached. False: the recording alone is kept.
+             * @default false
+             */
+            fit?: boolean;
+            /**
+             * Reason
+             * @description Why it is ended.
+             * @default
+             */
+            reason?: string;
+        };
+        /**
+         * LiveHistoryResponse
+         * @description How U fell, fit by fit: all of them.
+         */
+        LiveHistoryResponse: {
+            /**
+             * Number
+             * @description Which calibration of this service process.
+             */
+            number: number;
+            /**
+             * T S
+             * @description Time of the last reading of each fit, s since the first.
+             */
+            t_s: number[];
+            /**
+             * Poses
+             * @description Poses that were covered.
+             */
+            poses: number[];
+            /** Coefficients */
+            coefficients: components["schemas"]["LiveUncertaintyColumn"][];
+        };
+        /**
+         * LiveMoment
+         * @description A live calibration while the unit is turned.
+         */
+        LiveMoment: {
+            /** Readings */
+            readings: number;
+            /**
+             * Lost
+             * @description Readings that are missing by the instrument's counter or by the clock.
+             */
+            lost: number;
+            /**
+             * Damaged
+             * @description Lines or frames of the stream that could not be read.
+             */
+            damaged: number;
+            /** Duration S */
+            duration_s: number;
+            /** Rests */
+            rests: number;
+            /**
+             * Poses
+             * @description Asked poses that rests cover, by the body axes that point up.
+             */
+            poses: string[];
+            /** Poses Asked */
+            poses_asked: number;
+            /**
+             * Coefficients
+             * @description By the fit to all readings; empty where they do not allow one.
+             */
+            coefficients: components["schemas"]["LiveCoefficientResponse"][];
+            /**
+             * Missing
+             * @description What is missing, in words; empty when the calibration is complete.
+             */
+            missing: string[];
+            /**
+             * Left Out
+             * @description Turns that the fit could not use, and why.
+             */
+            left_out: string[];
+            /**
+             * Still S
+             * @description How long the unit has been at rest now, s; 0 while it is turned.
+             */
+            still_s: number;
+            /**
+             * Up
+             * @description The direction in the body of the specific force now, of length 1, which points up where the unit is at rest; null before the first readings.
+             */
+            up: number[] | null;
+            /** @description The pose that is asked for; null when it is complete. */
+            request: components["schemas"]["LivePoseResponse"] | null;
+            /**
+             * Off Deg
+             * @description Angle between the pose the unit is in and the one that is asked for, deg; a rest covers a pose within 17 deg. Null without either.
+             */
+            off_deg: number | null;
+            /**
+             * Request Text
+             * @description What the person is asked for, in words.
+             */
+            request_text: string;
+            /**
+             * Pose List
+             * @description The poses that are asked for in all, in their order.
+             */
+            pose_list: components["schemas"]["LivePoseResponse"][];
+            /**
+             * Turns Left
+             * @description Turns until every U is within its limit, if U falls with the square root of their number; null before the first fit.
+             */
+            turns_left: number | null;
+            /**
+             * Fits
+             * @description Fits so far; each is a point of the history.
+             */
+            fits: number;
+            /**
+             * Example
+             * @description What is wrong with the first line that could not be read; empty without one.
+             */
+            example: string;
+        };
+        /**
+         * LivePoseResponse
+         * @description A pose of a unit.
+         */
+        LivePoseResponse: {
+            /**
+             * Name
+             * @description Body axes that point up, such as `z`, `x,-z` or `x,y,-z`.
+             */
+            name: string;
+            /** Text */
+            text: string;
+            /**
+             * Up
+             * @description The direction in the body that points up, of length 1: x, y, z.
+             */
+            up: number[];
+            /**
+             * Covered
+             * @description Whether a rest that is long enough covers it.
+             */
+            covered: boolean;
+        };
+        /**
+         * LiveRequest
+         * @description Which unit to calibrate while a person turns it, by which stream, and to which target.
+         */
+        LiveRequest: {
+            /**
+             * Serial
+             * @description Serial number of the unit; for the bench's own stream it may be left out: its first gyro.
+             */
+            serial?: string | null;
+            /**
+             * Address
+             * @description A stream of the network: `tcp://HOST:PORT` sends lines of JSON or CSV, `ws://HOST:PORT` is a rosbridge server. Default: the gyro of this service's bench.
+             */
+            address?: string | null;
+            /**
+             * Topic
+             * @description Topic of a rosbridge server, of type sensor_msgs/Imu (rad/s and m/s^2).
+             * @default /imu/data
+             */
+            topic?: string;
+            /**
+             * Latitude Deg
+             * @description Latitude, deg; for the bench's own stream that of its file is used.
+             */
+            latitude_deg?: number | null;
+            /**
+             * Target U
+             * @description Limit of the expanded uncertainty U (k = 2) of each scale factor and each misalignment (rad), 1.
+             * @default 0.001
+             */
+            target_u?: number;
+            /**
+             * Target Bias Dps
+             * @description Limit of U (k = 2) of each bias, deg/s; null: no limit.
+             */
+            target_bias_dps?: number | null;
+            /**
+             * Poses
+             * @description Poses to ask for, 12 to 26: six faces, twelve edges, eight corners.
+             * @default 18
+             */
+            poses?: number;
+            /**
+             * Rest S
+             * @description How long the unit is to rest in each pose, s.
+             * @default 2
+             */
+            rest_s?: number;
+            /**
+             * End Unwatched
+             * @description True: the calibration ends, and its recording is kept, once no page has followed it for 30 s. False: it goes on until its target, the end of its stream or an end that a person asks for.
+             * @default false
+             */
+            end_unwatched?: boolean;
+        };
+        /**
+         * LiveResponse
+         * @description Result of a live calibration: what was measured, what it determines, and what is missing.
+         */
+        LiveResponse: {
+            /** Readings */
+            readings: number;
+            /**
+             * Lost
+             * @description Readings that are missing by the instrument's counter or by the clock.
+             */
+            lost: number;
+            /**
+             * Damaged
+             * @description Lines or frames of the stream that could not be read.
+             */
+            damaged: number;
+            /** Duration S */
+            duration_s: number;
+            /** Rests */
+            rests: number;
+            /**
+             * Poses
+             * @description Asked poses that rests cover, by the body axes that point up.
+             */
+            poses: string[];
+            /** Poses Asked */
+            poses_asked: number;
+            /**
+             * Coefficients
+             * @description By the fit to all readings; empty where they do not allow one.
+             */
+            coefficients: components["schemas"]["LiveCoefficientResponse"][];
+            /**
+             * Missing
+             * @description What is missing, in words; empty when the calibration is complete.
+             */
+            missing: string[];
+            /**
+             * Left Out
+             * @description Turns that the fit could not use, and why.
+             */
+            left_out: string[];
+            /** Serial */
+            serial: string;
+            /**
+             * Complete
+             * @description Whether the target was reached.
+             */
+            complete: boolean;
+            /**
+             * Ended
+             * @description Why it ended: the target was reached, the stream ended or failed, or the person ended it.
+             * @enum {string}
+             */
+            ended: "complete" | "stream" | "interrupted";
+            /**
+             * Text
+             * @description Why it ended, in words.
+             */
+            text: string;
+            /**
+             * Recording
+             * @description Number of the recording, which holds every reading.
+             */
+            recording: number;
+            /** @description The new calibration version; null: none was to be fitted, or the fit was refused. */
+            fit: components["schemas"]["FitResponse"] | null;
+            /**
+             * Refused
+             * @description Why no version was kept although one was to be fitted.
+             * @default
+             */
+            refused: string;
+        };
+        /**
+         * LiveStateResponse
+         * @description The live calibration of this service: the one that runs, or the last that ran.
+         */
+        LiveStateResponse: {
+            /**
+             * Stage
+             * @description `idle`: none since the service began; `running`; `storing`: the recording is stored and fitted; `done`: with a version; `ended`: without one, the recording is kept; `failed`: see `text`.
+             * @enum {string}
+             */
+            stage: "idle" | "running" | "storing" | "done" | "ended" | "failed";
+            /**
+             * Number
+             * @description It counts the calibrations of this service process; 0: none.
+             */
+            number: number;
+            /** Serial */
+            serial: string;
+            /**
+             * Stream
+             * @description Where the readings come from.
+             */
+            stream: string;
+            /**
+             * Bench
+             * @description The bench that it has meanwhile; empty for a stream of the network.
+             */
+            bench: string;
+            /**
+             * By
+             * @description Who began it.
+             */
+            by: string;
+            /** Started At */
+            started_at: string | null;
+            /**
+             * End Unwatched
+             * @description Whether it ends once no page has followed it for 30 s.
+             */
+            end_unwatched: boolean;
+            target: components["schemas"]["LiveTargetResponse"] | null;
+            /** @description Null before the first readings. */
+            moment: components["schemas"]["LiveMoment"] | null;
+            /**
+             * Text
+             * @description What it is doing, or why it ended, in words.
+             */
+            text: string;
+            /** @description Once the recording is stored. */
+            result: components["schemas"]["LiveResponse"] | null;
+            /**
+             * Kept
+             * @description Folders with readings that are in no database yet, left by a process that ended early: `labctl import FOLDER` stores them.
+             */
+            kept: string[];
+        };
+        /**
+         * LiveTargetResponse
+         * @description When a live calibration is complete.
+         */
+        LiveTargetResponse: {
+            /**
+             * U
+             * @description Limit of U (k = 2) of each scale factor and each misalignment (rad), 1.
+             */
+            u: number;
+            /**
+             * Bias Dps
+             * @description Limit of U (k = 2) of each bias, deg/s; null: none.
+             */
+            bias_dps: number | null;
+            /** Poses */
+            poses: number;
+            /**
+             * Rest S
+             * @description How long the unit is to rest in a pose, s.
+             */
+            rest_s: number;
+        };
+        /**
+         * LiveUncertaintyColumn
+         * @description U of one coefficient over the fits of a live calibration.
+         */
+        LiveUncertaintyColumn: {
+            /** Axis */
+            axis: string;
+            /** Name */
+            name: string;
+            /** Unit */
+            unit: string;
+            /**
+             * Limit
+             * @description Limit of U by the target; null: the target states none.
+             */
+            limit: number | null;
+            /**
+             * Expanded
+             * @description U (k = 2) at each fit, in `unit`; null: the fit has none.
+             */
+            expanded: (number | null)[];
         };
         /**
          * LogColumn
@@ -11907,6 +12430,132 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    start_api_live_start_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["LiveRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            201: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["LiveStateResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    state_api_live_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["LiveStateResponse"];
+                };
+            };
+        };
+    };
+    history_api_live_history_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["LiveHistoryResponse"];
+                };
+            };
+        };
+    };
+    end_api_live_end_post: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody: {
+            content: {
+                "application/json": components["schemas"]["LiveEndRequest"];
+            };
+        };
+        responses: {
+            /** @description Successful Response */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["LiveStateResponse"];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
+                };
+            };
+        };
+    };
+    events_api_live_events_get: {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        requestBody?: never;
+        responses: {
+            /** @description Event `state`: how it stands, whenever it changes. */
+            200: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "text/event-stream": components["schemas"]["LiveStateResponse"];
                 };
             };
         };

@@ -12,7 +12,7 @@ import instruments.clock
 from instruments.clock import VirtualClock
 from labctl.fitting.live import PoseRequest
 from labctl.fitting.live.directions import DIRECTIONS
-from labctl.services.live import line_feed
+from labctl.services.live import feeds
 from tests.helpers.lab import Lab
 from tests.helpers.processes import WAIT_S, begin, kill, labctl
 from tests.helpers.turned_unit import TurnedUnit
@@ -53,7 +53,7 @@ def lab(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Lab:
 
 
 def test_a_stream_of_lines_to_a_version(lab: Lab, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(line_feed, "feed_of", lambda _: TurnedFeed(40))
+    monkeypatch.setattr(feeds, "feed_of", lambda *_: TurnedFeed(40))
     answer = lab.json("live", "IMU-1", "--lines", "-", "--columns", ",".join(NAMES), "--target", "0.002")
     assert answer["complete"]
     assert answer["fit"]["version"] == 1
@@ -64,7 +64,7 @@ def test_a_stream_of_lines_to_a_version(lab: Lab, monkeypatch: pytest.MonkeyPatc
 def test_an_incomplete_one_says_what_is_missing_and_keeps_the_recording(
     lab: Lab, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(line_feed, "feed_of", lambda _: TurnedFeed(6))
+    monkeypatch.setattr(feeds, "feed_of", lambda *_: TurnedFeed(6))
     out = lab.folder / "kept"
     found = lab.run(
         "live", "IMU-1", "--lines", "-", "--columns", ",".join(NAMES), "--out", str(out), status=1
@@ -84,13 +84,13 @@ def test_an_incomplete_one_says_what_is_missing_and_keeps_the_recording(
         ((), "name the stream of the unit by one of --bench FILE, --driver NAME with --port, or --lines SOURCE"),
         (("--bench", "by-hand-sim", "--driver", "stim300"), "by one of --bench FILE"),
         (("--lines", "-"), "give its serial number: labctl live SERIAL --lines ..."),
-        (("A", "--lines", "udp://x:1"), "--lines udp://x:1: write - for standard input, or tcp://HOST:PORT"),
+        (("A", "--lines", "udp://x:1"), "udp://x:1: no address of a stream; give tcp://HOST:PORT, ws://HOST:PORT"),
         (("A", "--driver", "stim300"), "--driver needs the serial number of the unit and its --port"),
         (("--bench", "by-hand-sim"), "driver stim300 gives no accel_x_g, accel_y_g, accel_z_g"),
         (("B", "--bench", "by-hand-sim"), "B: bench by-hand-sim has no such unit; choose one of STIM-0001"),
         (
             ("A", "--driver", "stim300", "--port", "sim://stim300/unit", "--option", "x"),
-            "--option 'x': write KEY=VALUE",
+            "--option x: write KEY=VALUE",
         ),
         (("A", "--driver", "nothing", "--port", "sim://stim300/unit"), "nothing"),
         (("A", "--lines", "-", "--target", "-1"), "--target -1: an uncertainty must be above 0"),

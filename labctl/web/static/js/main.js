@@ -22,6 +22,10 @@ const withPlots = (load) => () => {
 route("/", () => import("./pages/start.js"));
 route("/start", () => import("./pages/start.js"));
 route("/bench", () => import("./pages/bench.js"));
+route(
+  "/live",
+  withPlots(() => import("./pages/live.js")),
+);
 route("/campaigns", () => import("./pages/campaigns.js"));
 route(
   "/campaigns/new",

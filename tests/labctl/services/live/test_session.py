@@ -17,7 +17,8 @@ from labctl.errors import BadInput, StoreError
 from labctl.fitting.live import PoseRequest, Target
 from labctl.recording import RecordingInfo, read_recording
 from labctl.recording.line_stream import LineDecoder
-from labctl.services.live import calibrate
+from labctl.services.commands import open as opening
+from labctl.services.commands.open import DatabaseCommands
 from labctl.services.live.assessor import BackgroundAssessor, InlineAssessor
 from labctl.services.live.calibrate import calibrate_live, usual_folder
 from labctl.services.live.line_source import LineSource
@@ -68,8 +69,8 @@ class Bench:
 
     def run(self, source: TurnedSource | LineSource, *, keep_folder: bool = False) -> LiveResponse:
         return calibrate_live(
-            self.database, source, TARGET, InlineAssessor(), self.folder, keep_folder=keep_folder, show=lambda _: None,
-            say=self.said.append, attended=nullcontext(),
+            DatabaseCommands(self.database), source, TARGET, InlineAssessor(), self.folder, keep_folder=keep_folder,
+            show=lambda _: None, say=self.said.append, attended=nullcontext(),
         )  # fmt: skip
 
 
@@ -146,7 +147,7 @@ def test_readings_that_cannot_be_stored_stay_where_they_are(bench: Bench, monkey
     def refuse(*_: object) -> None:
         raise StoreError("the database is locked")
 
-    monkeypatch.setattr(calibrate, "execute", refuse)
+    monkeypatch.setattr(opening, "execute", refuse)
     with pytest.raises(StoreError):
         bench.run(TurnedSource(1, ends_after=10))
     assert bench.said == [f"the 500 readings so far are kept; import them with `labctl import {bench.folder}`"]

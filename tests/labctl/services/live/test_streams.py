@@ -11,8 +11,9 @@ import pytest
 from instruments.clock import VirtualClock
 from labctl.errors import BadInput
 from labctl.fitting.live import LiveCalibration, LiveState
+from labctl.services.live.feeds import feed_of
 from labctl.services.live.gyro_source import GyroSource, bench_of_driver
-from labctl.services.live.line_feed import DescriptorFeed, TcpFeed, feed_of
+from labctl.services.live.line_feed import DescriptorFeed, TcpFeed
 from labctl.services.planning.loading import load_bench
 
 
@@ -51,8 +52,8 @@ def test_a_server_gives_what_it_has_sent_and_its_end() -> None:
 def test_a_server_that_is_not_there_is_said() -> None:
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
-    with pytest.raises(BadInput, match=rf"--lines tcp://127.0.0.1:{port}: cannot connect .* check address"):
-        feed_of(f"tcp://127.0.0.1:{port}").open()
+    with pytest.raises(BadInput, match=rf"^tcp://127.0.0.1:{port}: cannot connect .* check address"):
+        feed_of(f"tcp://127.0.0.1:{port}", "").open()
 
 
 def test_a_simulated_gyro_by_driver_and_port() -> None:

@@ -29,7 +29,7 @@ export function noBenchCard() {
       { class: "muted" },
       "The first command runs a simulated tri-axial bench; --speed sets its speed. The second command drives the real instruments that the bench file names.",
     ),
-    h("div", { class: "row" }, linkButton("To the recordings", "/recordings")),
+    h("div", { class: "row" }, linkButton("To the recordings", "/recordings"), linkButton("Calibrate live", "/live")),
   );
 }
 
@@ -67,15 +67,18 @@ export function idleBench(bench, last, next) {
         {},
         bench.unconfirmed
           ? "No campaign starts until a person has inspected the bench and confirmed that it is safe."
-          : presentWords(
-              `${bench.units.map((unit) => unit.serial).join(", ")} ${bench.units.length > 1 ? "are" : "is"} on the bench and free.`,
-            ),
+          : bench.live
+            ? presentWords(`Unit ${bench.live} is being calibrated live.`)
+            : presentWords(
+                `${bench.units.map((unit) => unit.serial).join(", ")} ${bench.units.length > 1 ? "are" : "is"} on the bench and free.`,
+              ),
       ),
       h(
         "div",
         { class: "row" },
         linkButton("Plan a campaign", "/campaigns/new", "primary"),
         linkButton("All campaigns", "/campaigns"),
+        linkButton("Calibrate live", "/live"),
       ),
     ),
     card(

@@ -124,6 +124,7 @@ function overview(units, due, campaigns, benches) {
           { class: "row" },
           h("a", { class: "button primary", href: "/bench" }, "To the bench"),
           h("a", { class: "button", href: "/campaigns/new" }, "Plan a campaign"),
+          h("a", { class: "button", href: "/live" }, "Calibrate live"),
         ),
       ),
       card(

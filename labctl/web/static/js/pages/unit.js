@@ -59,6 +59,7 @@ export async function page({ params, signal }) {
       unit.serial,
       [unit.model, unit.technology?.toUpperCase()].filter(Boolean).join(" · "),
       h("a", { class: "button primary", href: explore }, "Explore"),
+      h("a", { class: "button", href: `/live?unit=${encodeURIComponent(unit.serial)}` }, "Calibrate live"),
     ),
     h("section", { class: "card", "aria-label": "In force" }, inForce(unit, rows, force)),
     waitingNotice(waiting),
