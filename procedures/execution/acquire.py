@@ -16,11 +16,14 @@ from procedures.execution.waiting import checkpoint, pass_time
 from procedures.monitoring.bench_snapshot import ReadingCounts
 from procedures.monitoring.campaign_time import CampaignTime
 from procedures.monitoring.event_recorder import warning
+from procedures.monitoring.host_stalls import not_run
 from procedures.monitoring.table_reference import EncoderLog, rate_event
 from procedures.monitoring.table_watch import TableWatch
 
 LEAD_S = 0.5  #: streams are cleared this long before the gate opens
 BLOCK_S = 1.0  #: readings are written down this often
+#: So often is a data set taken again because this computer did not run labctl, beside the attempts of the recipe.
+STALLED_ATTEMPTS = 5
 #: With several units each is read in turn while the others' ports buffer; half a second of the fastest stream fits.
 SHARED_BLOCK_S = 0.5
 
@@ -30,21 +33,29 @@ def acquire(context: ExecutionContext, step: Acquire) -> dict[str, float]:
 
     Raises StepFailed, InstrumentError, Aborted.
     """
-    attempt = 0
+    attempt = stalled = 0
     while True:
         attempt += 1
+        stalled_s = context.monitor.stalls.total_s()
         try:
             return _take(context, step)
         except (LinkError, BadData, GuardTripped) as error:
             unit = _unit_at_fault(context, error)
             if unit is None:
                 raise
+            why = str(error)
+            if (stalled_s := context.monitor.stalls.total_s() - stalled_s) > 0:
+                why = f"{not_run(stalled_s)} while it was taken, and readings of {unit} are missing"
+                stalled += 1
+                attempt -= stalled <= STALLED_ATTEMPTS  # no fault of the unit
             if attempt >= context.recipe.on_failure.acquire_attempts:
                 if not context.can_drop(unit):
                     raise
                 context.drop(unit, str(error))
                 attempt = 0  # the others had no fault of their own yet
-            context.recorder.event(warning("data_set_repeated", f"data set {step.dataset} is taken again: {error}"))
+            context.recorder.event(warning("data_set_repeated", f"data set {step.dataset} is taken again: {why}"))
+            tracker = context.recorder.tracker
+            tracker.update(repeated=tracker.progress.repeated + 1)
             context.bench.table.stop()
             reopen(context)
 
