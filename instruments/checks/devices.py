@@ -120,7 +120,7 @@ def _listen(gyro: Gyro) -> Readings:
 
 
 def _alarm(alarm: str) -> Finding:
-    text = f"{alarm} is active: remove its cause at the chamber, then clear the alarm at the controller's panel"
+    text = f"the chamber reports: {alarm}; remove the cause at the chamber, then clear it at the controller's panel"
     return Finding("alarms", text, "bad")
 
 

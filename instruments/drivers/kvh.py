@@ -143,6 +143,11 @@ class KvhGyro:
         return self._time.known
 
     @property
+    def is_late(self) -> bool:
+        """Get whether the stream is too far behind the clock, so that readings may be lost."""
+        return self._time.is_late
+
+    @property
     def counter_step(self) -> None:
         """Get None: a line has no counter."""
         return

@@ -165,6 +165,11 @@ class Stim300:
         return self._time.known
 
     @property
+    def is_late(self) -> bool:
+        """Get whether the stream is too far behind the clock, so that readings may be lost."""
+        return self._time.is_late
+
+    @property
     def counter_step(self) -> tuple[int, int] | None:
         """Get the usual step of the counter, and that of the bench file's rate; None before two datagrams came."""
         step = self._counter.step

@@ -112,6 +112,11 @@ class StreamFormatGyro:
         """Control the stream: close the port; safe to call twice."""
         self._stream.close()
 
+    @property
+    def is_late(self) -> bool:
+        """Get whether the stream is too far behind the clock, so that readings may be lost."""
+        return self._time.is_late
+
     def _new_counter(self) -> SampleCounter | None:
         given = self._format.counter
         if given is None:

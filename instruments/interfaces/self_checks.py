@@ -37,3 +37,13 @@ class StreamingGyro(Protocol):
     def counter_step(self) -> tuple[int, int] | None:
         """Get the usual step of the counter of its frames, and the one that the bench file means; None without."""
         ...
+
+
+@runtime_checkable
+class LateTelling(Protocol):
+    """A gyro that can say that its readings come late, and that it is still open whether some are lost."""
+
+    @property
+    def is_late(self) -> bool:
+        """Get whether the stream is too far behind the clock."""
+        ...

@@ -11,8 +11,11 @@ from instruments.transport.stream_period import COVERAGE, TOLERANCE, UNKNOWN, Pe
 
 #: Share of the distance to the clock that each read makes up: small, so that the times do not take on wire jitter.
 FOLLOW = 0.02
-#: A stream further behind than this many periods has lost readings that its counter does not show.
+#: A stream further behind than this many periods is late, or has lost readings that its counter does not show.
 LOST_PERIODS = 12.0
+#: Readings are lost only where the stream has stayed so far behind for so long, s: bytes that were held back come at
+#: last, and a stream that has caught up has lost nothing.
+LATE_FOR_S = 0.9
 #: Polling interval for one fresh reading, in periods: a short one keeps the reading's age below a fraction of a period.
 FRESH_PERIODS = 0.125
 #: After this many readings the period is known roughly, from the time that they took.
@@ -36,6 +39,13 @@ class StreamTime:
         self._dropped = False
         self._last_s = -np.inf
         self._last_now_s = now_s
+        self._late_since_s: float | None = None
+        self._least_behind = 0.0  # since then, in periods
+
+    @property
+    def is_late(self) -> bool:
+        """Whether the stream is too far behind the Clock, and it is still open whether readings are lost."""
+        return self._late_since_s is not None
 
     @property
     def line(self) -> PeriodLine:
@@ -54,7 +64,7 @@ class StreamTime:
         The device continues at its own even spacing, so its known phase is kept: times do not jump when
         reading resumes.
         """
-        self._dropped = True
+        self._dropped, self._late_since_s = True, None
 
     def times(
         self,
@@ -68,8 +78,9 @@ class StreamTime:
         """Return the clock times (n,) of readings that follow each other by `advance` (n,) periods, and the losses.
 
         The newest cannot be later than now; where it is known better, it arrived within the `width_s` seconds before
-        `newest_s`. `wrap` is how many lost readings leave a device's counter as it was; where the stream falls behind
-        the Clock by whole wraps, they are counted as lost (0: any number of readings).
+        `newest_s`. `wrap` is how many lost readings leave a device's counter as it was; where the stream stays behind
+        the Clock by whole wraps, they are counted as lost (0: any number of readings). Until that is decided the
+        readings follow each other as the counter says.
         """
         index = self._index + np.cumsum(advance)
         if self._dropped and self._started:
@@ -81,6 +92,8 @@ class StreamTime:
             lost = 0
             self._begin(int(index[-1]), now_s)
         index = index + lost
+        if self.is_late:  # these arrivals say nothing of the period or the phase
+            return self._late_times(index, now_s), 0
         period_s = self._period_with(int(index[-1]), now_s if newest_s is None else newest_s, width_s)
         if newest_s is not None and self._line.is_followed:
             now_s = newest_s
@@ -109,12 +122,26 @@ class StreamTime:
         # while the period is hardly known, a slow device falls behind without any loss
         slow = self._line.u_share * (now_s - self._last_now_s) / period_s
         if behind <= LOST_PERIODS + slow:
+            self._late_since_s = None
             return 0
+        if self._late_since_s is None:
+            self._late_since_s, self._least_behind = now_s, behind
+            return 0
+        self._least_behind = min(self._least_behind, behind)
+        if now_s - self._late_since_s < LATE_FOR_S:
+            return 0
+        self._late_since_s = None
         unit = wrap or 1
-        lost = unit * round(behind / unit)
+        lost = unit * round(self._least_behind / unit)
         if lost:
             self._line.restart()
         return lost
+
+    def _late_times(self, index: NDArray[np.int64], now_s: float) -> NDArray[np.float64]:
+        """Return the times (n,) of readings that may have been held back: at their period after the last one."""
+        times = self._last_s + (index - self._index) * self._line.period_s
+        self._index, self._last_s, self._last_now_s = int(index[-1]), float(times[-1]), now_s
+        return np.asarray(times, dtype=np.float64)
 
     def _period_with(self, newest: int, t_s: float, width_s: float | None) -> float:
         """Return the period after one more arrival; the time of the last reading does not change with it."""

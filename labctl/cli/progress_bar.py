@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from types import TracebackType
 from typing import TYPE_CHECKING, Self
 
+from rich.console import Console, RenderableType
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.text import Text
 
 from labctl.cli.output import stderr
 from labctl.cli.turn_text import turn_text
@@ -13,21 +16,32 @@ from labctl.cli.turn_text import turn_text
 if TYPE_CHECKING:
     from labctl.services.schemas.campaigns import CampaignResponse
 
+#: Widths of the bar: the other columns of its line take 27 characters.
+BAR_WIDTH, LEAST_BAR_WIDTH, OTHER_COLUMNS = 28, 8, 27
+
+
+class _TwoLines(Progress):
+    """The step on a line of its own, shortened to the terminal, above the bar and the times, which are never cut."""
+
+    def get_renderables(self) -> Iterable[RenderableType]:
+        for task in self.tasks:
+            yield Text(task.description, no_wrap=True, overflow="ellipsis")
+        yield self.make_tasks_table(self.tasks)
+
 
 class CampaignProgress:
-    """A progress bar on standard error: step, temperatures, rate, wall time gone and left."""
+    """Two lines on standard error: the step; then a bar, wall time gone and left."""
 
-    def __init__(self, *, quiet: bool = False, title: str = "") -> None:
+    def __init__(self, *, quiet: bool = False, title: str = "", console: Console = stderr) -> None:
         self._title = title
-        self._progress = Progress(
-            TextColumn("{task.description}"),
-            BarColumn(bar_width=28),
+        self._progress = _TwoLines(
+            BarColumn(bar_width=min(BAR_WIDTH, max(LEAST_BAR_WIDTH, console.width - OTHER_COLUMNS))),
             TaskProgressColumn(),
             TimeElapsedColumn(),
             TextColumn("left"),
             TimeRemainingColumn(elapsed_when_finished=False),
-            console=stderr,
-            disable=quiet or not stderr.is_terminal,
+            console=console,
+            disable=quiet or not console.is_terminal,
             transient=True,
         )
         self._task = self._progress.add_task(title or "starting", total=1.0)
@@ -50,4 +64,4 @@ class CampaignProgress:
         """Show where the campaign is now."""
         text = turn_text(answer) or answer.step_text
         step = f"{self._title} step {answer.step or 0}/{answer.steps} {text}".strip()
-        self._progress.update(self._task, completed=answer.progress, description=step[:64].ljust(64))
+        self._progress.update(self._task, completed=answer.progress, description=step)

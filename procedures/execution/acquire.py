@@ -5,21 +5,25 @@ from __future__ import annotations
 import numpy as np
 
 from instruments.errors import LinkError
-from instruments.interfaces.gyro import Readings
+from instruments.interfaces.gyro import Gyro, Readings
 from instruments.interfaces.table import Spin
 from procedures.contracts.errors import BadData, GuardTripped, StepFailed
 from procedures.contracts.journal import DataSetHeader, DataSetState
 from procedures.contracts.steps import Acquire
+from procedures.execution import late_readings
 from procedures.execution.context import UNIT_FAULTS, ExecutionContext, raise_violation
 from procedures.execution.waiting import checkpoint, pass_time
 from procedures.monitoring.bench_snapshot import ReadingCounts
 from procedures.monitoring.campaign_time import CampaignTime
 from procedures.monitoring.event_recorder import warning
+from procedures.monitoring.host_stalls import not_run
 from procedures.monitoring.table_reference import EncoderLog, rate_event
 from procedures.monitoring.table_watch import TableWatch
 
 LEAD_S = 0.5  #: streams are cleared this long before the gate opens
 BLOCK_S = 1.0  #: readings are written down this often
+#: So often is a data set taken again because this computer did not run labctl, beside the attempts of the recipe.
+STALLED_ATTEMPTS = 5
 #: With several units each is read in turn while the others' ports buffer; half a second of the fastest stream fits.
 SHARED_BLOCK_S = 0.5
 
@@ -29,21 +33,29 @@ def acquire(context: ExecutionContext, step: Acquire) -> dict[str, float]:
 
     Raises StepFailed, InstrumentError, Aborted.
     """
-    attempt = 0
+    attempt = stalled = 0
     while True:
         attempt += 1
+        stalled_s = context.monitor.stalls.total_s()
         try:
             return _take(context, step)
         except (LinkError, BadData, GuardTripped) as error:
             unit = _unit_at_fault(context, error)
             if unit is None:
                 raise
+            why = str(error)
+            if (stalled_s := context.monitor.stalls.total_s() - stalled_s) > 0:
+                why = f"{not_run(stalled_s)} while it was taken, and readings of {unit} are missing"
+                stalled += 1
+                attempt -= stalled <= STALLED_ATTEMPTS  # no fault of the unit
             if attempt >= context.recipe.on_failure.acquire_attempts:
                 if not context.can_drop(unit):
                     raise
                 context.drop(unit, str(error))
                 attempt = 0  # the others had no fault of their own yet
-            context.recorder.event(warning("data_set_repeated", f"data set {step.dataset} is taken again: {error}"))
+            context.recorder.event(warning("data_set_repeated", f"data set {step.dataset} is taken again: {why}"))
+            tracker = context.recorder.tracker
+            tracker.update(repeated=tracker.progress.repeated + 1)
             context.bench.table.stop()
             reopen(context)
 
@@ -87,8 +99,11 @@ def _take(context: ExecutionContext, step: Acquire) -> dict[str, float]:
             _read_gate(context, watch, encoder, number, gate, counts)
             if context.monitor.is_due(within_s=ramp_s + LEAD_S):
                 context.poll(read_latest=False)
+            _read_late(context, number, gate, counts, late_readings.STEADY_S)
             context.bench.table.settle(spin)  # a run that does not end as computed was not the run it was taken for
+            _read_late(context, number, gate, counts, late_readings.WAIT_S)
             _demand_readings(counts)
+            _count_missing(context, number, gate, counts)
             rates = _note_angles(context, encoder, spin, gate, number)
         except BaseException as error:
             reason = str(error) or type(error).__name__
@@ -184,6 +199,38 @@ def _read_gate(
         _read_round(context, number, gate, counts, 0.0)
         raise_violation(context.monitor.check_guards())
     encoder.read(now=True)
+
+
+def _read_late(
+    context: ExecutionContext, number: int, gate: tuple[float, float], counts: dict[str, ReadingCounts], wait_s: float
+) -> None:
+    """Wait for readings of the gate that are still on their way, until `wait_s` after its end."""
+    gyros, every_s = context.bench.gyros, late_readings.EVERY_S / len(context.bench.gyros)
+    while context.clock.now_s() < gate[1] + wait_s and any(
+        late_readings.is_late(gyro) or _missing(gyro, gate, counts[name]) for name, gyro in gyros.items()
+    ):
+        _read_round(context, number, gate, counts, every_s)
+        checkpoint(context)
+
+
+def _missing(gyro: Gyro, gate: tuple[float, float], count: ReadingCounts) -> int:
+    """Return how many readings of the gate neither came nor were counted as lost."""
+    return late_readings.promise_of(gyro, gate[1] - gate[0]).missing(count.valid + count.invalid + count.damaged)
+
+
+def _count_missing(
+    context: ExecutionContext, number: int, gate: tuple[float, float], counts: dict[str, ReadingCounts]
+) -> None:
+    """Count what never came as lost, and say it; too much of it raises GuardTripped."""
+    for name, gyro in context.bench.gyros.items():
+        if missing := _missing(gyro, gate, counts[name]):
+            lost = late_readings.lost_readings(gyro, missing)
+            counts[name].add(lost)
+            context.recorder.journal.readings(number, name, lost, context.monitor.air_c)
+            expected = round(late_readings.promise_of(gyro, gate[1] - gate[0]).readings)
+            text = f"{name}: {missing} of {expected} readings of a data set did not arrive; they are counted as lost"
+            context.recorder.event(warning("readings_lost", text, name))
+    raise_violation(context.monitor.check_guards())
 
 
 def _read_round(

@@ -90,9 +90,10 @@ class Engine:
         self._recorder.time.begin()
         state, reason = CampaignState.FAILED, "ended by an error of the program"
         try:
-            self._begin(start_at, restart)
-            for index in range(start_at, len(self.plan.steps)):
-                self._executor.run(index)
+            with self._context.monitor.stalls.watching():
+                self._begin(start_at, restart)
+                for index in range(start_at, len(self.plan.steps)):
+                    self._executor.run(index)
             state, reason = CampaignState.DONE, self._describe_done()
         except Interrupted as error:
             state, reason = CampaignState.INTERRUPTED, f"interrupted: {error}"

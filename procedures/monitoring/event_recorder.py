@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from instruments.clock import Clock
-from procedures.contracts.campaign_state import CampaignState
+from procedures.contracts.campaign_state import ENDED, CampaignState
 from procedures.contracts.journal import Event, Journal
 from procedures.contracts.steps import StepResult
 from procedures.monitoring.campaign_time import CampaignTime
@@ -25,10 +25,19 @@ class CampaignRecorder:
         return self.time.now_s()
 
     def change_state(self, state: CampaignState, reason: str) -> None:
-        """Record a change of the campaign's state."""
+        """Record a change of the campaign's state.
+
+        An end is shown once it is recorded, or could not be: who sees the end finds it in the database. Every other
+        state is shown at once.
+        """
         self.state = state
-        self.tracker.update(state=state, reason=reason)
-        self.journal.campaign_state(state, reason, self.t_s(), self.clock.utc())
+        if state not in ENDED:
+            self.tracker.update(state=state, reason=reason)
+        try:
+            self.journal.campaign_state(state, reason, self.t_s(), self.clock.utc())
+        finally:
+            if state in ENDED:
+                self.tracker.update(state=state, reason=reason)
 
     def event(self, event: Event) -> None:
         """Record something worth telling a person."""

@@ -6,6 +6,7 @@ from typing import Literal
 
 from procedures.contracts.journal import Event
 from procedures.monitoring.event_recorder import CampaignRecorder
+from procedures.monitoring.host_stalls import HostStalls
 
 LinkState = Literal["well", "degraded", "lost"]  #: degraded: silent for a moment; lost: silent for too long
 
@@ -13,9 +14,10 @@ LinkState = Literal["well", "degraded", "lost"]  #: degraded: silent for a momen
 class LinkStates:
     """The links of one bench. A change of state is an event; only what is not well is shown in the progress."""
 
-    def __init__(self, recorder: CampaignRecorder) -> None:
-        self._recorder = recorder
-        self._heard_s: dict[str, float] = {}  #: device -> campaign time
+    def __init__(self, recorder: CampaignRecorder, stalls: HostStalls) -> None:
+        self._recorder, self._stalls = recorder, stalls
+        #: device -> campaign time, and the stalls of this computer until then, s of the bench's clock
+        self._heard_s: dict[str, tuple[float, float]] = {}
         self._broken: dict[str, LinkState] = {}
 
     def restart(self) -> None:
@@ -24,7 +26,7 @@ class LinkStates:
 
     def heard(self, device: str) -> None:
         """Note that a device answered just now."""
-        self._heard_s[device] = self._recorder.t_s()
+        self._heard_s[device] = self._recorder.t_s(), self._stalls.total_clock_s()
 
     def forget(self, device: str, *, repaired: bool = False) -> None:
         """Note that a device no longer answers; with `repaired` a broken link is well again without an event."""
@@ -37,8 +39,12 @@ class LinkStates:
         return device in self._broken
 
     def silent_s(self, t_s: float) -> dict[str, float]:
-        """Return for how long each device has been silent at campaign time `t_s`, in s."""
-        return {device: t_s - heard_s for device, heard_s in self._heard_s.items()}
+        """Return how long each device has been silent at campaign time `t_s`, in s, without this computer's stalls."""
+        stalled_s = self._stalls.total_clock_s()
+        return {
+            device: max(t_s - heard_s - (stalled_s - before_s), 0.0)
+            for device, (heard_s, before_s) in self._heard_s.items()
+        }
 
     def change(self, device: str, state: LinkState, why: str = "") -> None:
         """Take in how a device can be reached. What is lost is not merely degraded again."""

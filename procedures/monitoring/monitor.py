@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 
@@ -14,6 +15,7 @@ from procedures.contracts.journal import EnvironmentSample, Event
 from procedures.monitoring.bench_snapshot import BenchSnapshot, ReadingCounts, gyro_temperature_c
 from procedures.monitoring.event_recorder import CampaignRecorder
 from procedures.monitoring.guards import Guards, GuardViolation
+from procedures.monitoring.host_stalls import HostStalls, not_run
 from procedures.monitoring.links import LinkStates
 from procedures.monitoring.references import ReferenceWatch
 
@@ -35,11 +37,14 @@ class BenchMonitor:
     trips. A limit that is passed is an event once, when it trips, and once more when it holds again.
     """
 
-    def __init__(self, bench: MonitoredBench, guards: Guards, recorder: CampaignRecorder) -> None:
+    def __init__(
+        self, bench: MonitoredBench, guards: Guards, recorder: CampaignRecorder, stalls: HostStalls | None = None
+    ) -> None:
         self._bench = bench
         self._guards = guards
         self._recorder = recorder
-        self.links = LinkStates(recorder)
+        self.stalls = stalls or HostStalls(recorder.clock)
+        self.links = LinkStates(recorder, self.stalls)
         self.references = ReferenceWatch(bench.references, self.links)
         self._listeners: list[Listener] = []
         self._tripped: set[tuple[str, str]] = set()
@@ -176,6 +181,7 @@ class BenchMonitor:
 
     def check_guards(self) -> list[GuardViolation]:
         """Return every limit that is passed by what was read last; records what has changed since the last check."""
+        self._tell_stalls()
         violations = self._guards.check(self._snapshot())
         for violation in violations:
             if violation.kind == "stale":
@@ -210,11 +216,11 @@ class BenchMonitor:
         """Read the chamber; returns whether it answered. Without one the units are all of the environment."""
         if (chamber := self._bench.air_chamber) is None:
             return True
-        name = chamber.name
+        name, stalled_s = chamber.name, self.stalls.total_s()
         try:
             self._chamber = chamber.read()
         except LinkError as error:
-            self._note_silence(name, error)
+            self._note_silence(name, error, stalled_s)
             return False
         self.links.heard(name)
         self.links.change(name, "well")
@@ -222,16 +228,27 @@ class BenchMonitor:
 
     def _poll_units(self) -> None:
         for name, gyro in self._bench.gyros.items():
+            stalled_s = self.stalls.total_s()
             try:
                 if self.links.is_broken(name):
                     gyro.start()  # a port that broke is opened again
                 readings = gyro.read_latest()
             except LinkError as error:
-                self._note_silence(name, error)
+                self._note_silence(name, error, stalled_s)
                 continue
             self.add_readings(name, gyro, readings)
             self.links.change(name, "well")
 
-    def _note_silence(self, device: str, error: InstrumentError) -> None:
+    def _note_silence(self, device: str, error: InstrumentError, stalled_before_s: float = math.inf) -> None:
+        """Note that a device did not answer, or that this computer was not there to hear it."""
         self._gyro_c.pop(device, None)
-        self.links.change(device, "degraded", f"{error}; labctl asks again at the next check")
+        why = str(error)
+        if (stalled_s := self.stalls.total_s() - stalled_before_s) > 0:
+            why = f"{device}: no answer in time, but {not_run(stalled_s)} meanwhile"
+        self.links.change(device, "degraded", f"{why}; labctl asks again at the next check")
+
+    def _tell_stalls(self) -> None:
+        """Record the stalls of this computer that were not reported yet."""
+        if (event := self.stalls.news()) is not None:
+            self._recorder.event(event)
+            self._recorder.tracker.update(stalled_s=self._recorder.tracker.progress.stalled_s + (event.value or 0.0))

@@ -51,6 +51,8 @@ class Progress:
     links: Mapping[str, str] = field(default_factory=dict)  #: devices that are not well: degraded or lost
     dropped: Mapping[str, str] = field(default_factory=dict)  #: units that are excluded, and why
     last_error: str = ""
+    repeated: int = 0  #: data sets that were taken again, since this run began
+    stalled_s: float = 0.0  #: how long this computer did not run labctl, real time, since this run began
     live: LiveOutput = field(default_factory=LiveOutput, compare=False, repr=False)  #: newer than the other fields
 
 

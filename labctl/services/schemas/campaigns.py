@@ -187,6 +187,10 @@ class CampaignResponse(ResponseModel):
         description="Present outputs of the units; empty if this process does not run the campaign.",
     )
     last_error: str | None = None
+    repeated: int = Field(default=0, ge=0, description="Data sets that were taken again.")
+    stalled_s: float = Field(
+        default=0.0, ge=0, description="How long the computer of the bench did not run labctl, s of real time."
+    )
     wish: Literal["pause", "abort"] | None = Field(
         default=None, description="A pause or abort that was requested and is not carried out yet."
     )

@@ -47,6 +47,8 @@ class CampaignSummary:
     last_at: datetime | None = None  #: of the last event
     last_t_s: float | None = None  #: of the last event, campaign time
     last_error: str | None = None
+    repeated: int = 0  #: data sets that were taken again
+    stalled_s: float = 0.0  #: how long the computer did not run labctl, s of real time
     environment: LastEnvironment = LastEnvironment()
     dropped: Mapping[str, str] = field(
         default_factory=dict
@@ -70,7 +72,7 @@ class CampaignSummaries:
 
 def _page(connection: sa.Connection, numbers: Sequence[int]) -> dict[int, CampaignSummary]:
     values: dict[int, dict[str, Any]] = {number: {} for number in numbers}
-    for part in (_step_sums, _current_steps, _last_events, _last_errors, _environments, _dropped):
+    for part in (_step_sums, _current_steps, _last_events, _last_errors, _hindrances, _environments, _dropped):
         for number, columns in part(connection, numbers):
             values[number] |= columns
     return {number: CampaignSummary(**columns) for number, columns in values.items()}
@@ -135,6 +137,21 @@ def _last_errors(connection: sa.Connection, numbers: Sequence[int]) -> _Found:
     )
     for number, message in connection.execute(query):
         yield number, {"last_error": message}
+
+
+def _hindrances(connection: sa.Connection, numbers: Sequence[int]) -> _Found:
+    e = tables.events.c
+    query = (
+        sa.select(
+            e.campaign_id,
+            sa.func.sum(sa.case((e.kind == "data_set_repeated", 1), else_=0)),
+            sa.func.coalesce(sa.func.sum(sa.case((e.kind == "host_stalled", e.value), else_=0.0)), 0.0),
+        )
+        .where(e.campaign_id.in_(numbers), e.kind.in_(("data_set_repeated", "host_stalled")))
+        .group_by(e.campaign_id)
+    )
+    for number, repeated, stalled_s in connection.execute(query):
+        yield number, {"repeated": repeated, "stalled_s": stalled_s}
 
 
 def _environments(connection: sa.Connection, numbers: Sequence[int]) -> _Found:

@@ -3335,6 +3335,18 @@ export interface components {
             /** Last Error */
             last_error: string | null;
             /**
+             * Repeated
+             * @description Data sets that were taken again.
+             * @default 0
+             */
+            repeated: number;
+            /**
+             * Stalled S
+             * @description How long the computer of the bench did not run labctl, s of real time.
+             * @default 0
+             */
+            stalled_s: number;
+            /**
              * Wish
              * @description A pause or abort that was requested and is not carried out yet.
              */

@@ -116,7 +116,7 @@ def test_a_sensor_break_an_alarm_and_a_manual_mode_are_each_a_line() -> None:
     ]
     alarm = chamber_of(alarm_words_at=1)
     assert [f.text for f in alarm.findings if f.state == "bad"] == [
-        "alarm 1 high is active: remove its cause at the chamber, then clear the alarm at the controller's panel"
+        "the chamber reports: alarm 1 high; remove the cause at the chamber, then clear it at the controller's panel"
     ]
 
 

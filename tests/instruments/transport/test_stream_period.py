@@ -92,10 +92,13 @@ def test_a_gap_is_lost_readings_and_no_slower_device() -> None:
     stream = StreamTime(1 / NOMINAL_HZ, 0.0)
     for second in range(1, 5):
         assert stream.times(np.ones(97, dtype=np.int64), float(second))[1] == 0
-    _, lost = stream.times(np.ones(97, dtype=np.int64), 7.0)  # two seconds of silence
+    assert stream.times(np.ones(97, dtype=np.int64), 7.0)[1] == 0  # two seconds of silence: the rest may still come
+    assert stream.is_late
+    _, lost = stream.times(np.ones(97, dtype=np.int64), 8.0)
     assert lost == pytest.approx(194, abs=1)
     assert stream.line.period_s == pytest.approx(1 / 97, rel=MEASURED)
-    assert stream.times(np.ones(97, dtype=np.int64), 8.0)[1] == 0
+    assert stream.times(np.ones(97, dtype=np.int64), 9.0)[1] == 0
+    assert not stream.is_late
 
 
 @pytest.mark.parametrize("rate_hz", [75.0, 95.0, 105.0, 150.0])

@@ -6,7 +6,7 @@ import { duration } from "../core/format.js";
 import { card, cardWithHeader, notice } from "../core/components.js";
 import { navigate } from "../core/router.js";
 import { planChart } from "../campaigns/plan_chart.js";
-import { campaignInstant } from "../campaigns/campaign_time.js";
+import { campaignInstant, hindrances } from "../campaigns/campaign_time.js";
 import { hasEnded } from "../campaigns/states.js";
 import { stateChip } from "../campaigns/state_chip.js";
 import { linkButton, pauseButton, resumeButton, stopButton } from "./actions.js";
@@ -239,6 +239,7 @@ function warnings(now) {
   return [
     ...listed(now.links, "does not answer normally"),
     ...listed(now.dropped, "is excluded from the rest of the campaign"),
+    ...hindrances(now).map((text) => notice("warn", text)),
     now.state === "paused" ? notice("warn", `Paused: ${now.reason || "no reason given"}.`) : null,
     now.last_error ? notice("bad", h("strong", {}, "Last fault: "), now.last_error) : null,
   ].filter(Boolean);

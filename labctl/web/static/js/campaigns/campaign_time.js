@@ -32,3 +32,20 @@ export const durationTaken = (campaign) =>
   campaign.started_at && campaign.ended_at
     ? `took ${campaignDuration(campaign, (Date.parse(campaign.ended_at) - Date.parse(campaign.started_at)) / 1000)}`
     : null;
+
+/**
+ * What held a campaign up that is no fault of an instrument; empty where nothing did.
+ * @param {Pick<Campaign, "repeated" | "stalled_s">} campaign
+ */
+export const hindrances = ({ repeated = 0, stalled_s = 0 }) =>
+  [
+    repeated ? `${repeated} data set${repeated > 1 ? "s were" : " was"} taken again.` : "",
+    stalled_s ? `The computer of the bench did not run labctl for ${stalled_s.toFixed(1)} s.` : "",
+  ].filter(Boolean);
+
+/**
+ * What the plan says of the duration, for a campaign that runs and for one that has ended.
+ * @param {Pick<Campaign, "ended_at">} campaign
+ */
+export const planNote = ({ ended_at }) =>
+  ended_at ? "computed before the start; pauses, repeats and a faster chamber change it" : "without interruptions";

@@ -13,7 +13,7 @@ import { remainingSeconds } from "../bench/campaign_history.js";
 import { planChart } from "../campaigns/plan_chart.js";
 import { draftsCard } from "../campaigns/drafts.js";
 import { adviceNotice } from "../campaigns/advice.js";
-import { campaignDuration, campaignInstant, durationTaken } from "../campaigns/campaign_time.js";
+import { campaignDuration, campaignInstant, durationTaken, hindrances, planNote } from "../campaigns/campaign_time.js";
 import { hasEnded, isRunning, stateKind } from "../campaigns/states.js";
 import { stateChip } from "../campaigns/state_chip.js";
 
@@ -166,7 +166,7 @@ function summary(now, plan) {
             `${campaignDuration(now, remainingSeconds(now, plan.expected_s))} left`,
           ]
         : ["Ended", campaignInstant(now, now.ended_at), "", durationTaken(now)],
-      ["Expected", campaignDuration(now, plan.expected_s), "", "as planned, without interruptions"],
+      ["Planned", campaignDuration(now, plan.expected_s), "", planNote(now)],
     ]),
   );
 }
@@ -186,6 +186,7 @@ function reasonNotices(now) {
           h("p", { class: "lead" }, now.reason || `It is ${now.state}.`),
           now.last_error && !now.last_error.includes(now.reason) ? h("p", {}, `Last fault: ${now.last_error}`) : null,
         )),
+    ...hindrances(now).map((text) => notice("warn", text)),
     ...Object.entries(now.dropped).map(([unit, why]) =>
       notice("warn", h("strong", {}, unit), ` was excluded from the rest of the campaign: ${why}`),
     ),

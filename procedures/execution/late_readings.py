@@ -1,0 +1,66 @@
+"""The end of a data set: readings of its gate that are still on their way are waited for, and missing ones are counted.
+
+The unit's rate and the length of the gate promise a number of readings. A wire, an adapter or a busy computer may hold
+bytes back: the unit is read for at most `WAIT_S` after the gate. What has not come by then is lost.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from instruments.interfaces.gyro import Gyro, Readings
+from instruments.interfaces.self_checks import LateTelling, StreamingGyro
+from instruments.transport.stream_period import COVERAGE, TOLERANCE
+
+#: Readings of a gate are waited for until this long after its end, s of the clock.
+WAIT_S = 2.0
+#: As long as the table is still steady after the gate, s.
+STEADY_S = 0.4
+#: From one read to the next meanwhile, s.
+EVERY_S = 0.1
+#: The first and the last reading of a gate may fall outside it.
+EDGES = 2.0
+
+
+@dataclass(frozen=True)
+class Promise:
+    """How many readings of a unit a gate has, and by how much its rate is uncertain."""
+
+    readings: float
+    u_readings: float  #: expanded
+
+    @property
+    def least(self) -> float:
+        """The least number with which nothing is missing."""
+        return self.readings - self.u_readings - EDGES
+
+    def missing(self, came: int) -> int:
+        """Return how many readings are missing where `came` readings came, or were counted as lost; 0 for none."""
+        return round(self.readings) - came if came < self.least else 0
+
+
+def promise_of(gyro: Gyro, gate_s: float) -> Promise:
+    """Return how many readings a unit promises in a gate of `gate_s` s.
+
+    By the measured period of its stream where that is known; before, by the rate of the bench file.
+    """
+    period = gyro.period if isinstance(gyro, StreamingGyro) else None
+    if period is not None and period.measured_s:
+        readings = gate_s / period.measured_s
+        return Promise(readings, COVERAGE * period.u_share * readings)
+    readings = gate_s * gyro.sample_rate_hz
+    own_clock = period is not None or isinstance(gyro, LateTelling)
+    return Promise(readings, TOLERANCE * readings if own_clock else 0.0)
+
+
+def is_late(gyro: Gyro) -> bool:
+    """Return whether it is open if readings of a unit are lost or late."""
+    return isinstance(gyro, LateTelling) and gyro.is_late
+
+
+def lost_readings(gyro: Gyro, missing: int) -> Readings:
+    """Return a block without a reading, in which `missing` readings are lost."""
+    raw = {channel.name: np.zeros(0, dtype=np.int64) for channel in gyro.channels}
+    return Readings(np.zeros(0), raw, np.zeros(0, dtype=bool), lost=missing)

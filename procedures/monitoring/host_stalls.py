@@ -1,0 +1,102 @@
+"""Stalls of this computer: for how long the process was not run, by the computer's monotonic clock.
+
+A thread reads the time every `PERIOD_S`; where it, or who asks, comes late, the process was not run meanwhile. What
+no instrument was asked for it cannot have failed to answer: a silence counts without the stalls in it.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from instruments.clock import Clock, SystemClock
+from procedures.contracts.journal import Event
+
+PERIOD_S = 0.1
+#: A shorter delay is the usual one of a scheduler, s of real time.
+LEAST_S = 0.1
+#: A stall is said from this length on, s of real time, and at most so often.
+SAID_FROM_S, SAY_EVERY_S = 0.5, 60.0
+#: A duration with which a clock tells how fast it runs, s.
+LONG_S = 1e6
+
+
+class HostStalls:
+    """Stalls while one campaign runs. In virtual and paced time there are none: the clock stands still meanwhile.
+
+    `wall` is the real time of this computer; any thread may ask.
+    """
+
+    def __init__(self, clock: Clock, wall: Clock | None = None) -> None:
+        self._wall = wall or SystemClock()
+        real = clock.wall_s(2 * LONG_S) > clock.wall_s(LONG_S)
+        self.speed = LONG_S / clock.wall_s(LONG_S) if real else 0.0  #: clock seconds in one of real time; 0: no stalls
+        self._lock = threading.Lock()
+        self._looked_s: float | None = None
+        self._total_s = self._longest_s = self._unsaid_s = 0.0
+        self._said_s: float | None = None
+
+    @contextmanager
+    def watching(self) -> Iterator[None]:
+        """Read the time while the block runs, in a thread of its own."""
+        if not self.speed:
+            yield
+            return
+        ended = threading.Event()
+        self._looked_s = self._wall.now_s()
+        thread = threading.Thread(target=self._run, args=(ended,), name="host stalls", daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            self._looked_s = None
+            ended.set()
+
+    def total_s(self) -> float:
+        """Return how long the process was not run so far, s of real time."""
+        with self._lock:
+            self._look()
+            return self._total_s
+
+    def total_clock_s(self) -> float:
+        """Return the same in seconds of the bench's clock."""
+        return self.total_s() * self.speed
+
+    def news(self) -> Event | None:
+        """Return what is to be said of stalls since it was last said; None where there is nothing, or too soon."""
+        with self._lock:
+            self._look()
+            now_s = self._wall.now_s()
+            early = self._said_s is not None and now_s - self._said_s < SAY_EVERY_S
+            if self._longest_s < SAID_FROM_S or early:
+                return None
+            longest_s, unsaid_s = self._longest_s, self._unsaid_s
+            self._said_s, self._longest_s, self._unsaid_s = now_s, 0.0, 0.0
+        text = not_run(longest_s)
+        if unsaid_s > 1.1 * longest_s:
+            text += f" at a time, {unsaid_s:.1f} s in all"
+        if self.speed != 1.0:
+            text += f" ({unsaid_s * self.speed:.0f} s of the bench's time)"
+        advice = "readings are counted against those expected; end other work on this computer"
+        return Event("host_stalled", f"{text}; {advice}", level="warning", value=unsaid_s, unit="s")
+
+    def _run(self, ended: threading.Event) -> None:
+        while not ended.wait(PERIOD_S):
+            self.total_s()
+
+    def _look(self) -> None:
+        """Take in the time since it was read last; holds the lock."""
+        if self._looked_s is None:
+            return
+        now_s = self._wall.now_s()
+        late_s, self._looked_s = now_s - self._looked_s - PERIOD_S, now_s
+        if late_s >= LEAST_S:
+            self._total_s += late_s
+            self._unsaid_s += late_s
+            self._longest_s = max(self._longest_s, late_s)
+
+
+def not_run(stalled_s: float) -> str:
+    """Return what a person reads of a stall of so many seconds of real time."""
+    return f"this computer did not run labctl for {stalled_s:.1f} s"

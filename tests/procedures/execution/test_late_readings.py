@@ -1,0 +1,119 @@
+"""A data set waits for readings that are on their way; what does not come is lost, and the data set is taken again."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from instruments.interfaces.gyro import Readings
+from instruments.interfaces.self_checks import StreamPeriod
+from procedures.contracts.campaign_state import CampaignState
+from procedures.execution.late_readings import Promise, promise_of
+from tests.helpers.engine_rig import Rig
+from tests.helpers.fake_instruments import FakeGyro
+
+
+class HeldBack(FakeGyro):
+    """A unit whose readings come `late_s` after they were made, from the read number `late_from` on."""
+
+    late_s = 0.0
+
+    def _index(self) -> int:
+        made = super()._index() - round(self.late_s * self.sample_rate_hz)
+        return max(made, self.next_sample)
+
+    def temperature_c(self) -> float:
+        return float(self.bench.chamber.air_c())
+
+
+class Deaf(FakeGyro):
+    """A unit of which every reading after the `alive` first of each data set is lost without a trace, `times` times."""
+
+    alive, times = 80, 1
+
+    def read(self, duration_s: float) -> Readings:
+        readings = super().read(duration_s)
+        opened = len(self.bench.journal.headers)
+        if not self.times or opened > self.times:
+            return readings
+        kept = readings.t_s < self.bench.clock.now_s() if self.alive > self._came(opened) else readings.t_s < 0
+        raw = {name: values[kept] for name, values in readings.raw.items()}
+        return Readings(readings.t_s[kept], raw, readings.valid[kept])
+
+    def _came(self, number: int) -> int:
+        return sum(len(block[2]) for block in self.bench.journal.blocks if block[0] == number)
+
+
+def with_unit(kind: type[FakeGyro]) -> Rig:
+    rig = Rig()
+    unit = kind(rig.clock, rig.trace, "imu")
+    unit.bench = rig
+    rig.gyros["imu"], rig.imu = unit, unit
+    return rig
+
+
+def came(rig: Any, number: int) -> int:
+    return sum(len(readings) for dataset, _, readings, _ in rig.journal.blocks if dataset == number)
+
+
+def lost(rig: Any, number: int) -> int:
+    return sum(readings.lost for dataset, _, readings, _ in rig.journal.blocks if dataset == number)
+
+
+@pytest.mark.parametrize("late_s", [0.3, 1.5])
+def test_readings_that_are_held_back_are_waited_for(late_s: float) -> None:
+    rig = with_unit(HeldBack)
+    rig.imu.late_s = late_s
+    assert rig.run().state is CampaignState.DONE
+    for number in range(1, len(rig.journal.headers) + 1):
+        assert came(rig, number) >= 98
+        assert lost(rig, number) == 0
+    assert "data_set_repeated" not in rig.journal.kinds()
+
+
+def test_a_data_set_of_readings_in_time_does_not_wait() -> None:
+    rig = with_unit(FakeGyro)
+    rig.run()
+    in_time = rig.clock.now_s()
+    other = Rig()
+    other.run()
+    assert other.clock.now_s() == in_time
+    assert {each for each in rig.journal.kinds() if "lost" in each} == set()
+
+
+def test_what_never_comes_is_lost_is_said_and_the_data_set_is_taken_again() -> None:
+    rig = with_unit(Deaf)
+    assert rig.run().state is CampaignState.DONE
+    assert rig.journal.closed[0][1] == "partial"
+    assert came(rig, 1) + lost(rig, 1) == pytest.approx(100, abs=1)
+    assert lost(rig, 1) >= 10
+    assert came(rig, 2) >= 98
+    (event,) = [each for each in rig.journal.events if each.kind == "readings_lost"]
+    assert (
+        event.message == f"imu: {lost(rig, 1)} of 100 readings of a data set did not arrive; they are counted as lost"
+    )
+    assert event.device == "imu"
+    assert rig.journal.kinds().count("data_set_repeated") == 1
+
+
+def test_where_they_are_lost_each_time_the_campaign_does_not_call_it_complete() -> None:
+    rig = with_unit(Deaf)
+    rig.imu.times = 10**6
+    outcome = rig.run()
+    assert outcome.state is CampaignState.FAILED
+    assert "lost or damaged" in outcome.reason
+    assert rig.journal.closed[0][1] == "partial"
+
+
+def test_the_promise_is_by_the_measured_period_and_its_uncertainty() -> None:
+    rig = Rig()
+    assert promise_of(rig.imu, 10.0) == Promise(100.0, 0.0)
+    unit: Any = rig.imu
+    unit.period, unit.counter_step = StreamPeriod(0.1, None, 0.5), None
+    assert promise_of(unit, 10.0) == Promise(100.0, 4.0)  # by the tolerance of a unit's own clock
+    unit.period = StreamPeriod(0.1, 10.0 / 97, 1e-3)
+    found = promise_of(unit, 10.0)
+    assert found.readings == pytest.approx(97.0)
+    assert found.u_readings == pytest.approx(0.388)
+    assert (found.missing(95), found.missing(90)) == (0, 7)

@@ -1,0 +1,147 @@
+"""A computer that was busy: its stalls are measured and said, and no silence of an instrument is made of them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from instruments.clock import PacedClock, ScaledClock, VirtualClock
+from instruments.errors import NoReply
+from procedures.contracts.campaign_state import CampaignState
+from procedures.execution.acquire import STALLED_ATTEMPTS
+from procedures.monitoring.host_stalls import PERIOD_S, HostStalls
+from tests.helpers.engine_rig import Rig
+
+SPEED = 30.0
+
+
+class Real(VirtualClock):
+    """Virtual time that says, as a real clock does, that a longer time-out takes longer."""
+
+    def wall_s(self, duration_s: float) -> float:
+        return duration_s / SPEED
+
+
+def stalls_of(wall: VirtualClock) -> HostStalls:
+    stalls = HostStalls(ScaledClock(SPEED), wall)
+    stalls._looked_s = wall.now_s()  # as `watching` does, without its thread
+    return stalls
+
+
+def stall(stalls: HostStalls, wall: VirtualClock, stalled_s: float) -> None:
+    wall.sleep(PERIOD_S + stalled_s)
+    stalls.total_s()
+
+
+@pytest.mark.parametrize("clock", [VirtualClock(), PacedClock()])
+def test_a_clock_that_stands_still_meanwhile_has_no_stalls(clock: Any) -> None:
+    stalls = HostStalls(clock, wall := VirtualClock())
+    with stalls.watching():
+        wall.sleep(100.0)
+        assert (stalls.total_s(), stalls.news()) == (0.0, None)
+
+
+def test_a_stall_is_measured_and_said_once() -> None:
+    stalls = stalls_of(wall := VirtualClock())
+    for _ in range(50):
+        stall(stalls, wall, 0.02)
+    assert (stalls.total_s(), stalls.news()) == (0.0, None)
+    stall(stalls, wall, 1.3)
+    event = stalls.news()
+    assert event is not None
+    assert event.message.startswith("this computer did not run labctl for 1.3 s (39 s of the bench's time); ")
+    assert (event.kind, event.level, event.value) == ("host_stalled", "warning", pytest.approx(1.3))
+    assert stalls.news() is None
+    assert stalls.total_clock_s() == pytest.approx(39.0)
+
+
+def test_many_stalls_are_said_together_and_not_at_once() -> None:
+    stalls = stalls_of(wall := VirtualClock())
+    stall(stalls, wall, 1.3)
+    assert stalls.news() is not None
+    for _ in range(4):
+        stall(stalls, wall, 0.6)
+        assert stalls.news() is None
+    for _ in range(600):
+        stall(stalls, wall, 0.0)
+    event = stalls.news()
+    assert event is not None
+    assert event.message.startswith("this computer did not run labctl for 0.6 s at a time, 2.4 s in all (72 s of")
+
+
+class Busy(Rig):
+    """The fake bench in time of which a second is 1/SPEED of a second of this computer; `stall` keeps both waiting."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.wall = VirtualClock()
+        real = Real()
+        real.sleep(self.clock.now_s())
+        self.clock = real
+        for device in (self.table, self.chamber, *self.gyros.values()):
+            device.clock = real
+        sleep = real.sleep
+
+        def both(duration_s: float) -> None:
+            sleep(duration_s)
+            for _ in range(int(max(duration_s, 0.0) / SPEED / PERIOD_S) + 1):  # as the thread looks
+                self.wall.sleep(min(max(duration_s, 0.0) / SPEED, PERIOD_S))
+                self.stalls.total_s()
+
+        real.sleep = both  # type: ignore[method-assign]
+        self.slept = sleep
+
+    @property
+    def stalls(self) -> HostStalls:
+        return self.engine._context.monitor.stalls
+
+    def make(self, *given: Any, **options: Any) -> Any:
+        engine = super().make(*given, **options)
+        engine._context.monitor.stalls._wall = self.wall
+        engine._context.monitor.stalls._run = lambda ended: None
+        return engine
+
+    def stall(self, real_s: float) -> None:
+        """Let this computer do something else."""
+        self.slept(real_s * SPEED)
+        self.wall.sleep(real_s)
+
+
+def test_a_busy_computer_is_not_a_chamber_that_does_not_answer() -> None:
+    rig = Busy()
+    rig.when_step("soak", lambda: rig.stall(1.3))  # 39 s of the bench, limit 30
+    outcome = rig.run()
+    assert outcome.state is CampaignState.DONE
+    assert "guard.stale" not in rig.journal.kinds()
+    (event,) = [each for each in rig.journal.events if each.kind == "host_stalled"]
+    assert event.message.startswith("this computer did not run labctl for 1.")
+    assert not any("cable" in each.message for each in rig.journal.events)
+    assert rig.engine.progress.stalled_s == pytest.approx(1.3, abs=0.2)
+
+
+def test_a_chamber_that_is_silent_beside_it_is_still_found() -> None:
+    rig = Busy()
+    rig.when_step("soak", lambda: rig.chamber.fail("read", NoReply("chamber", "no answer")))
+    outcome = rig.run()
+    assert outcome.state is CampaignState.FAILED
+    assert "guard.stale" in rig.journal.kinds()
+
+
+def test_a_data_set_that_a_stall_spoilt_is_taken_again_and_no_cable_is_blamed() -> None:
+    rig = Busy()
+    failed = [0]
+
+    def late() -> None:
+        if rig.engine._context.monitor.is_taking_readings and failed[0] < STALLED_ATTEMPTS:
+            failed[0] += 1
+            rig.stall(1.3)
+            raise NoReply("imu", "no intact datagram for 39.0 s: no bytes arrived; check power and cable")
+
+    rig.imu.faults["read"] = late
+    assert rig.run().state is CampaignState.DONE
+    repeated = [each.message for each in rig.journal.events if each.kind == "data_set_repeated"]
+    assert len(repeated) == STALLED_ATTEMPTS
+    assert repeated[0].startswith("data set 1 is taken again: this computer did not run labctl for 1.")
+    assert not any("cable" in each.message for each in rig.journal.events)
+    assert rig.engine.progress.repeated == STALLED_ATTEMPTS
