@@ -11,6 +11,7 @@ import numpy as np
 from labctl.errors import BadInput, BadRecording
 from labctl.fitting.poses.at_rest.accelerometer import Accelerometer, calibrate_accelerometer, different_poses
 from labctl.fitting.poses.at_rest.adequacy import Adequacy, adequacy_of
+from labctl.fitting.poses.at_rest.fewer_poses import ByFewer, Known, by_fewer_poses
 from labctl.fitting.poses.at_rest.gravity import STANDARD_GRAVITY
 from labctl.fitting.poses.at_rest.rests import Rests, find_rests
 from labctl.fitting.poses.readings import AXES, GAP, LEAST_READINGS, PoseReadings, readings_of
@@ -19,7 +20,7 @@ from labctl.recording import RecordingInfo
 from labctl.recording.data_files import read_table
 from labctl.recording.files import read_recording
 from labctl.recording.info import NO_DATE
-from labctl.services.schemas.reports.accelerometer import AccelerometerResponse
+from labctl.services.schemas.reports.accelerometer import AccelerometerResponse, EarlierVersion
 from labctl.services.schemas.reports.magnetometer import Estimate
 from labctl.services.table_readings import numbers_of
 
@@ -43,10 +44,61 @@ class Source:
         return f"columns {', '.join(self.columns)} in {self.unit}{local}"
 
 
-def accelerometer_of_files(paths: Sequence[Path], source: Source, serial: str | None = None) -> AccelerometerResponse:
+@dataclass(frozen=True)
+class Earlier:
+    """An earlier version of the same accelerometer, and by how much it may have changed since."""
+
+    version: int
+    result: AccelerometerResponse
+    scale_change: float = 1e-3  #: standard uncertainty
+    misalignment_change: float = 5e-4  #: standard uncertainty, rad
+
+    def known(self) -> Known:
+        """Return what it tells of the parameters now. Raises BadInput for a change that is not positive."""
+        for option, value in (
+            ("--scale-change", self.scale_change),
+            ("--misalignment-change", self.misalignment_change),
+        ):
+            if not 0 < value <= 1:
+                raise BadInput(f"{option} {value:g}: give a standard uncertainty above 0 and up to 1, such as 0.001")
+        was = self.result
+        values = [was.scale_factor[a].value for a in AXES]
+        values += [was.misalignment[AXES[i] + AXES[j]].value for i, j in UPPER[3:]]
+        changes = np.repeat([self.scale_change, self.misalignment_change], 3)
+        more = max(was.heldout_g**2 - was.expected_g**2, 0.0) if was.verdict == "unexplained" else 0.0
+        return Known(
+            np.array(values), np.array(was.covariance)[3:, 3:] + np.diag(changes**2),
+            np.array([was.bias_g[a].value for a in AXES]), more,
+        )  # fmt: skip
+
+    def answer(self, p_value: float) -> EarlierVersion:
+        """Return what the response says of it."""
+        return EarlierVersion(
+            version=self.version, scale_change=self.scale_change, misalignment_change=self.misalignment_change,
+            p_value=p_value,
+        )  # fmt: skip
+
+    def text(self, fewer: ByFewer) -> str:
+        """Return a sentence on what it contributes, and whether the rests agree with it."""
+        used = (
+            f"Scale factors and misalignments rest on version {self.version} too, with a change since of "
+            f"{self.scale_change:g} and {self.misalignment_change:g} (standard uncertainty)"
+        )
+        if fewer.agrees:
+            return f"{used}; the rests agree with it (p = {fewer.p_value:.2g})."
+        return (
+            f"{used}; the rests do NOT agree with it (p = {fewer.p_value:.1g}): the unit changed by more, or moved in "
+            "its rests; lay it down in at least 12 poses and calibrate it without the earlier version."
+        )
+
+
+def accelerometer_of_files(
+    paths: Sequence[Path], source: Source, serial: str | None = None, earlier: Earlier | None = None
+) -> AccelerometerResponse:
     """Return the calibration by all files of one unit; raises BadInput, BadRecording, NotEnoughData.
 
-    `serial` is its serial number where it is known: a recording of another unit is refused.
+    `serial` is its serial number where it is known: a recording of another unit is refused. With an earlier version of
+    the unit four poses are enough.
     """
     if source.unit not in UNITS_G:
         raise BadInput(f"--unit {source.unit}: give one of {', '.join(UNITS_G)}")
@@ -62,8 +114,16 @@ def accelerometer_of_files(paths: Sequence[Path], source: Source, serial: str | 
             )
     readings = _joined(parts)
     rests = find_rests(readings)
-    found = calibrate_accelerometer(readings, rests)
-    return _response(found, rests, adequacy_of(found, rests))
+    if earlier is None:
+        found = calibrate_accelerometer(readings, rests)
+        return _response(found, rests, adequacy_of(found, rests))
+    known = earlier.known()
+    fewer = by_fewer_poses(readings, rests, known)
+    worth = adequacy_of(fewer.found, rests, known.whitened)
+    return _response(fewer.found, rests, worth).model_copy(update={
+        "verdict": "adequate" if fewer.agrees else "unexplained", "earlier": earlier.answer(fewer.p_value),
+        "text": [*_size_text(fewer.found, worth), earlier.text(fewer)],
+    })  # fmt: skip
 
 
 def _readings(path: Path, source: Source) -> PoseReadings:
@@ -139,13 +199,17 @@ def _response(found: Accelerometer, rests: Rests, worth: Adequacy) -> Accelerome
     )  # fmt: skip
 
 
-def _text(found: Accelerometer, worth: Adequacy) -> Iterator[str]:
+def _size_text(found: Accelerometer, worth: Adequacy) -> Iterator[str]:
     worst = float(np.sqrt(np.diag(found.covariance)[:3]).max())
     yield f"Accelerometer: bias with u up to {worst:.2g} g; local gravity {found.gravity_g:.6g} g."
     yield (
         f"Size of gravity: off by {worth.before_g:.2g} g before, {worth.heldout_g:.2g} g after, in held-out rests; "
         f"the noise of their means lets expect {worth.expected_g:.2g} g."
     )
+
+
+def _text(found: Accelerometer, worth: Adequacy) -> Iterator[str]:
+    yield from _size_text(found, worth)
     if worth.verdict == "unexplained":
         yield (
             f"that is {worth.heldout_g / worth.expected_g:.1f} times as much: the bias drifted, the unit moved in its "

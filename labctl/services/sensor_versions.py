@@ -177,7 +177,7 @@ def _answer(row: SensorVersionRow) -> SensorVersionResponse:
 
 
 def _fields(row: SensorVersionRow, *, whole: bool = False) -> dict[str, object]:
-    result = {"result": row.result} if whole else {}
+    result: dict[str, object] = {"result": row.result} if whole else {}
     adequate = row.sensor == "accelerometer" or row.verdict == "adequate"
     formats = SENSOR_FORMATS[row.sensor] if adequate else {}
     return result | {

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -11,6 +11,30 @@ from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import By, Database, DeviceId, Json, Out, SensorExport, SensorInstance, SensorSerial, who
 from labctl.cli.output import print_json
 from labctl.cli.printing.sensors import print_kept, print_sensor
+
+if TYPE_CHECKING:
+    from labctl.services.accelerometer import Earlier as EarlierVersion
+    from labctl.services.schemas.reports.accelerometer import AccelerometerResponse
+    from labctl.services.schemas.sensors import AccelerometerVersion, MeasuredData
+
+Earlier = Annotated[
+    int | None,
+    typer.Option(
+        "--earlier",
+        metavar="N",
+        help="Use version N of this unit (--serial) too, 0: its newest; four poses are then enough.",
+    ),
+]
+ScaleChange = Annotated[
+    float,
+    typer.Option(
+        "--scale-change", metavar="U", help="With --earlier: standard uncertainty of a scale factor's change since."
+    ),
+]
+MisalignmentChange = Annotated[
+    float,
+    typer.Option("--misalignment-change", metavar="U", help="With --earlier: the same of a misalignment, rad."),
+]
 
 
 def accelerometer(
@@ -27,6 +51,9 @@ def accelerometer(
         typer.Option("--latitude", metavar="DEG", help="Latitude, for the local gravity; default: 9.80665 m/s2."),
     ] = None,
     serial: SensorSerial = None,
+    earlier: Earlier = None,
+    scale_change: ScaleChange = 1e-3,
+    misalignment_change: MisalignmentChange = 5e-4,
     by: By = None,
     export: SensorExport = None,
     out: Out = None,
@@ -37,10 +64,6 @@ def accelerometer(
 ) -> None:
     """Calibrate an accelerometer by gravity in poses at rest: nine parameters, their uncertainty, and a verdict."""
     from labctl.services.accelerometer import Source, accelerometer_of_files
-    from labctl.services.commands.open import execute
-    from labctl.services.commands.requests import ToUnit
-    from labctl.services.commands.sensors import KEEP_ACCELEROMETER
-    from labctl.services.schemas.sensors import AccelerometerRequest
     from labctl.services.sensor_exports import check_export, write_export
     from labctl.services.sensor_versions import measured_data
 
@@ -48,12 +71,41 @@ def accelerometer(
     with one_clear_line():
         check_export(export, out)
         source = Source([name.strip() for name in columns.split(",")], unit, latitude_deg)
-        answer = accelerometer_of_files(paths, source, serial)
+        before = _earlier(database, serial, earlier, (scale_change, misalignment_change))
+        answer = accelerometer_of_files(paths, source, serial, before)
         write_export(answer, export, out, instance, device_id)
         if serial is not None:
-            request = AccelerometerRequest(data=measured_data(paths, source.text), result=answer, by=who(by))
-            kept = execute(database, KEEP_ACCELEROMETER, ToUnit(serial, request))
+            kept = _kept(database, serial, measured_data(paths, source.text), answer, by)
     if as_json:
         print_json(answer if kept is None else kept)
     else:
         print_sensor(answer) if kept is None else print_kept(kept)
+
+
+def _earlier(
+    database: str | None, serial: str | None, number: int | None, changes: tuple[float, float]
+) -> EarlierVersion | None:
+    from labctl.errors import BadInput
+    from labctl.services.accelerometer import Earlier as Found
+    from labctl.services.commands.open import open_readonly
+    from labctl.services.sensor_versions import one_accelerometer
+
+    if number is None:
+        return None
+    if serial is None:
+        raise BadInput("--earlier needs --serial: name the unit of which it is a version")
+    with open_readonly(database) as store:
+        version = one_accelerometer(store, serial, number or None)
+    return Found(version.version, version.result, *changes)
+
+
+def _kept(
+    database: str | None, serial: str, data: MeasuredData, answer: AccelerometerResponse, by: str | None
+) -> AccelerometerVersion:
+    from labctl.services.commands.open import execute
+    from labctl.services.commands.requests import ToUnit
+    from labctl.services.commands.sensors import KEEP_ACCELEROMETER
+    from labctl.services.schemas.sensors import AccelerometerRequest
+
+    request = AccelerometerRequest(data=data, result=answer, by=who(by))
+    return execute(database, KEEP_ACCELEROMETER, ToUnit(serial, request))

@@ -17,7 +17,8 @@ def lower_triangle(errors: NDArray[np.float64]) -> NDArray[np.float64]:
     Kalibr's x axis is the accelerometer's own, labctl's z axis is: the turn between the two changes no size.
     """
     _, upper = np.linalg.qr((np.eye(3) + errors).T)
-    return np.tril((upper * np.sign(np.diag(upper))[:, None]).T) + 0.0  # no minus before a zero
+    lower = np.tril((upper * np.sign(np.diag(upper))[:, None]).T)
+    return np.asarray(lower + 0.0, dtype=np.float64)  # no minus before a zero
 
 
 def kalibr(found: AccelerometerParameters, head: Sequence[str]) -> str:

@@ -2006,7 +2006,7 @@ export interface components {
         AccelerometerRequest: {
             data: components["schemas"]["MeasuredData"];
             /** @description As `labctl accelerometer FILE --json` prints it. */
-            result: components["schemas"]["AccelerometerResponse"];
+            result: components["schemas"]["AccelerometerResponse-Input"];
             /**
              * By
              * @description Who.
@@ -2017,7 +2017,7 @@ export interface components {
          * AccelerometerResponse
          * @description Nine parameters of an accelerometer: reading = bias + (1 + errors) force, by gravity in poses at rest.
          */
-        AccelerometerResponse: {
+        "AccelerometerResponse-Input": {
             /**
              * Verdict
              * @description adequate: held-out rests are predicted to the noise of their means; unexplained: they are not, and the uncertainties include what is left.
@@ -2091,6 +2091,91 @@ export interface components {
             noise_density_m_s2: {
                 [key: string]: number;
             };
+            /** @description Earlier version that was used too; null: the poses alone. */
+            earlier?: components["schemas"]["EarlierVersion"] | null;
+            /** Text */
+            text: string[];
+        };
+        /**
+         * AccelerometerResponse
+         * @description Nine parameters of an accelerometer: reading = bias + (1 + errors) force, by gravity in poses at rest.
+         */
+        "AccelerometerResponse-Output": {
+            /**
+             * Verdict
+             * @description adequate: held-out rests are predicted to the noise of their means; unexplained: they are not, and the uncertainties include what is left.
+             * @enum {string}
+             */
+            verdict: "adequate" | "unexplained";
+            /** Bias G */
+            bias_g: {
+                [key: string]: components["schemas"]["Estimate"];
+            };
+            /**
+             * Scale Factor
+             * @description Relative errors of the scale factors, by axis.
+             */
+            scale_factor: {
+                [key: string]: components["schemas"]["Estimate"];
+            };
+            /**
+             * Misalignment
+             * @description xy, xz, yz: of an axis by the force along another.
+             */
+            misalignment: {
+                [key: string]: components["schemas"]["Estimate"];
+            };
+            /**
+             * Covariance
+             * @description Of bias x, y, z, scale factor x, y, z, misalignment xy, xz, yz.
+             */
+            covariance: number[][];
+            /**
+             * Gravity G
+             * @description Local gravity, in units of 9.80665 m/s2.
+             */
+            gravity_g: number;
+            /** Rests */
+            rests: number;
+            /**
+             * Left Out
+             * @description Rests that do not agree with gravity by five standard deviations.
+             */
+            left_out: number;
+            /**
+             * Poses
+             * @description Different directions among the rests.
+             */
+            poses: number;
+            /**
+             * Before G
+             * @description Root mean square by which the raw sizes differ from gravity, g.
+             */
+            before_g: number;
+            /**
+             * Residual G
+             * @description The same after the calibration, g.
+             */
+            residual_g: number;
+            /**
+             * Heldout G
+             * @description The same of rests predicted from all others, g.
+             */
+            heldout_g: number;
+            /**
+             * Expected G
+             * @description What the noise of the means alone makes of it, g.
+             */
+            expected_g: number;
+            /**
+             * Noise Density M S2
+             * @description White noise by axis, m/s2/sqrt(Hz), from the rests.
+             */
+            noise_density_m_s2: {
+                [key: string]: number;
+            };
+            /** @description Earlier version that was used too; null: the poses alone. */
+            earlier: components["schemas"]["EarlierVersion"] | null;
             /** Text */
             text: string[];
         };
@@ -2145,7 +2230,7 @@ export interface components {
              * @description Formats in which it is available; none for a magnetometer whose field was not constant.
              */
             formats: components["schemas"]["SensorFormatResponse"][];
-            result: components["schemas"]["AccelerometerResponse"];
+            result: components["schemas"]["AccelerometerResponse-Output"];
         };
         /**
          * Advice
@@ -5294,6 +5379,29 @@ export interface components {
             distribution: string;
             /** Version */
             version: string;
+        };
+        /**
+         * EarlierVersion
+         * @description An earlier version that a calibration by few poses rests on; its bias is not used.
+         */
+        EarlierVersion: {
+            /** Version */
+            version: number;
+            /**
+             * Scale Change
+             * @description Allowed change of a scale factor since, standard uncertainty.
+             */
+            scale_change: number;
+            /**
+             * Misalignment Change
+             * @description Allowed change of a misalignment since, standard uncertainty, rad.
+             */
+            misalignment_change: number;
+            /**
+             * P Value
+             * @description Of rests and earlier version together; below 0.01 they disagree, and the verdict is unexplained.
+             */
+            p_value: number;
         };
         /**
          * EffectAgreement

@@ -18,7 +18,7 @@ from labctl.recording.files import write_recording
 from labctl.store import check
 from studies.poses_simulation import Session, simulate_session
 from tests.helpers.magnetic_turns import fields, readings_of
-from tests.helpers.poses_at_rest import poses, readings_in, write_readings
+from tests.helpers.poses_at_rest import BIAS_G, poses, readings_in, write_readings
 
 
 @pytest.fixture
@@ -65,6 +65,26 @@ def test_a_version_is_shown_and_exported_as_its_fit_was(tmp_path: Path, database
     assert check(str(database)).findings == ()
     assert "name accelerometer or magnetometer" in run("sensors", "show", "IMU-7", "gyro", status=2).stderr
     assert "has no version 9" in run("sensors", "show", "IMU-7", "magnetometer", "--version", "9", status=2).stderr
+
+
+def test_four_poses_are_enough_with_an_earlier_version(tmp_path: Path, database: Path) -> None:
+    whole = write_readings(tmp_path / "a.csv", readings_in(poses(26, 1), 1))
+    four = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1.0]]) / np.sqrt(3)
+    few = write_readings(tmp_path / "b.csv", readings_in(four, 2))
+    assert "4 rests in 4 different poses" in run("accelerometer", few, status=2).stderr
+    assert "--earlier needs --serial" in run("accelerometer", few, "--earlier", "0", status=2).stderr
+    options = ("--serial", "IMU-7", "--earlier", "0")
+    assert "has no version" in run("accelerometer", few, *options, status=2).stderr
+    run("accelerometer", whole, "--serial", "IMU-7")
+    kept = answer("accelerometer", few, *options)
+    found = kept["result"]
+    assert (kept["version"], found["earlier"]["version"], found["verdict"]) == (2, 1, "adequate")
+    assert "the rests agree with it" in found["text"][-1]
+    for i, axis in enumerate("xyz"):
+        each = found["bias_g"][axis]
+        assert each["value"] == pytest.approx(BIAS_G[i], abs=4 * each["u"])
+    assert "--scale-change -1" in run("accelerometer", few, *options, "--scale-change", "-1", status=2).stderr
+    assert database.is_file()
 
 
 def test_a_version_that_was_changed_is_found(tmp_path: Path, database: Path) -> None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.poses.at_rest.accelerometer import Accelerometer, size_jacobian
@@ -29,10 +30,11 @@ class Adequacy:
         return "unexplained" if self.heldout_g > UNEXPLAINED * self.expected_g else "adequate"
 
 
-def adequacy_of(found: Accelerometer, rests: Rests) -> Adequacy:
+def adequacy_of(found: Accelerometer, rests: Rests, known: NDArray[np.float64] | None = None) -> Adequacy:
     """Return what is left of each rest by a fit to the others.
 
-    The fit without a rest is that to all with one unknown more, which absorbs its residual: none is made again.
+    The fit without a rest is that to all with one unknown more, which absorbs its residual: none is made again. `known`
+    are the rows (m, 9), of variance 1, of what was known of the parameters before.
     """
     accel_g, sigma = rests.accel_g[found.used], found.u_rest_g[found.used]
     forces = np.linalg.solve(np.eye(3) + found.errors, (accel_g - found.bias_g).T).T
@@ -43,6 +45,8 @@ def adequacy_of(found: Accelerometer, rests: Rests) -> Adequacy:
     kept = np.maximum(1 - np.diag(hat), 1e-6)
     # residual / sigma = (1 - hat) noise / sigma: the noise of every rest is in what the others predict of one
     spread = (np.eye(len(hat)) - hat) * (white / sigma)
+    if known is not None:
+        spread = np.hstack([spread, jacobian @ found.covariance @ known.T])
     expected = sigma * np.linalg.norm(spread, axis=1) / kept
     before = np.linalg.norm(accel_g, axis=1) - found.gravity_g
     return Adequacy(_rms(before), _rms(residual / kept), _rms(expected))

@@ -10,6 +10,17 @@ from labctl.services.schemas.base import ResponseModel
 from labctl.services.schemas.reports.magnetometer import Estimate
 
 
+class EarlierVersion(ResponseModel):
+    """An earlier version that a calibration by few poses rests on; its bias is not used."""
+
+    version: int
+    scale_change: float = Field(description="Allowed change of a scale factor since, standard uncertainty.")
+    misalignment_change: float = Field(description="Allowed change of a misalignment since, standard uncertainty, rad.")
+    p_value: float = Field(
+        description="Of rests and earlier version together; below 0.01 they disagree, and the verdict is unexplained."
+    )
+
+
 class AccelerometerResponse(ResponseModel):
     """Nine parameters of an accelerometer: reading = bias + (1 + errors) force, by gravity in poses at rest."""
 
@@ -30,4 +41,7 @@ class AccelerometerResponse(ResponseModel):
     heldout_g: float = Field(description="The same of rests predicted from all others, g.")
     expected_g: float = Field(description="What the noise of the means alone makes of it, g.")
     noise_density_m_s2: dict[str, float] = Field(description="White noise by axis, m/s2/sqrt(Hz), from the rests.")
+    earlier: EarlierVersion | None = Field(
+        default=None, description="Earlier version that was used too; null: the poses alone."
+    )
     text: list[str]
