@@ -35,6 +35,8 @@ MOST_SPIKES = 0.02
 BLOCK_S, BLOCK_READINGS, LEVEL_BLOCKS = 0.5, 8, 601
 #: A unit moves where a block's median is off by so many usual distances, and by this much, deg/s.
 MOVED_NOISES, MOVED_DPS = 12.0, 0.3
+#: A unit that is turned is at its rate, or back, within so many s and so many blocks; heat takes longer.
+SUDDEN_S, SUDDEN_BLOCKS = 20.0, 4
 
 
 def check_spikes(series: Series) -> Iterator[Marked]:
@@ -114,7 +116,7 @@ def check_moved(series: Series) -> Iterator[Marked]:
         least = max(MOVED_DPS, 2.0 * series.code_steps[name])
         for part in series.parts:
             if series.still[part].all():
-                rows[part], size[part] = _moves(values[part], block, least)
+                rows[part], size[part] = _moves(values[part], block, least, series.step_s)
         n = int(rows.sum())
         if not n:
             continue
@@ -132,7 +134,7 @@ def check_moved(series: Series) -> Iterator[Marked]:
         )  # fmt: skip
 
 
-def _moves(values: Array, block: int, least: float) -> tuple[Rows, Array]:
+def _moves(values: Array, block: int, least: float, step_s: float) -> tuple[Rows, Array]:
     blocks = len(values) // block
     rows, size = np.zeros(len(values), dtype=bool), np.zeros(len(values))
     if blocks < 8:
@@ -145,12 +147,15 @@ def _moves(values: Array, block: int, least: float) -> tuple[Rows, Array]:
     drift = ROBUST * float(np.median(np.abs(off)))
     far = np.abs(off) > max(least, MOVED_NOISES * usual, 3.0 * drift)
     # a creeping output, such as one that warms up, leaves its level too, but not at once
+    near = max(round(SUDDEN_S / (block * step_s)), SUDDEN_BLOCKS)
     for begin, end in runs(far):
+        most = off[begin:end][int(np.argmax(np.abs(off[begin:end])))]
+        side = float(np.sign(most))
         before = off[max(begin - 2, 0)] if begin else 0.0
         after = off[min(end + 1, blocks - 1)] if end < blocks else 0.0
-        most = off[begin:end][int(np.argmax(np.abs(off[begin:end])))]
-        sudden = min(abs(most - before), abs(most - after))
-        if sudden > max(least, 0.5 * abs(most)):
+        risen = float((side * (off[begin : min(begin + near, end)] - before)).max())
+        fallen = float((side * (off[max(end - near, begin) : end] - after)).max())
+        if min(risen, fallen) > max(least, 0.5 * abs(most)):
             rows[begin * block : end * block] = True
             size[begin * block : end * block] = most
     return rows, size
