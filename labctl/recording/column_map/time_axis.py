@@ -14,7 +14,7 @@ from labctl.recording.column_map.guesses import time_unit
 from labctl.recording.column_map.implied import EPOCH_S, FASTEST_HZ
 from labctl.recording.column_map.model import ColumnMap
 from labctl.recording.column_map.problems import Problems, rows_text
-from labctl.recording.column_map.stamps import Spread, spread_between
+from labctl.recording.column_map.stamps import Spread, spread_between, spread_packets
 from labctl.recording.column_map.units import Unit, find_unit, names_of
 from labctl.recording.raw_table import RawColumn
 
@@ -84,8 +84,8 @@ def _unknown(column: RawColumn, rows: int) -> str:
 
 
 def _finer(column: RawColumn, found: TimeAxis, problems: Problems) -> TimeAxis:
-    """Return the times with those between coarse stamps, such as whole seconds, where several readings share one."""
-    between = spread_between(found.t_s)
+    """Return the times of the readings where the stamps are coarser, such as whole seconds, or of their arrival."""
+    between = spread_between(found.t_s) or spread_packets(found.t_s)
     if isinstance(between, str):
         problems.add(f"column {column.name!r} (time): {between}")
     if not isinstance(between, Spread):

@@ -41,8 +41,8 @@ MOVED_ON_TABLE_DPS = 0.3
 WANDER, WANDER_LARGE = 8.0, 3.0
 #: Standard deviation of a median in that of a mean.
 MEDIAN_NOISE = 1.25
-#: Blocks on either side of the begin and the end of a motion within which it begins and ends.
-EDGE_BLOCKS = 3
+#: A unit that is turned is at its rate, or back, within so many s and so many blocks; heat takes longer.
+SUDDEN_S, SUDDEN_BLOCKS = 20.0, 4
 
 
 def check_spikes(series: Series) -> Iterator[Marked]:
@@ -122,7 +122,7 @@ def check_moved(series: Series) -> Iterator[Marked]:
         least = max(MOVED_DPS if series.motion == "rest" else MOVED_ON_TABLE_DPS, 2.5 * series.code_steps[name])
         for part in series.parts:
             if series.still[part].all():
-                rows[part], size[part] = _moves(values[part], block, least, series.noises[name])
+                rows[part], size[part] = _moves(values[part], block, least, series.step_s, series.noises[name])
         n = int(rows.sum())
         if not n:
             continue
@@ -140,7 +140,7 @@ def check_moved(series: Series) -> Iterator[Marked]:
         )  # fmt: skip
 
 
-def _moves(values: Array, block: int, least: float, noise: float) -> tuple[Rows, Array]:
+def _moves(values: Array, block: int, least: float, step_s: float, noise: float) -> tuple[Rows, Array]:
     blocks = len(values) // block
     rows, size = np.zeros(len(values), dtype=bool), np.zeros(len(values))
     if blocks < 8:
@@ -155,16 +155,15 @@ def _moves(values: Array, block: int, least: float, noise: float) -> tuple[Rows,
     quiet = max(least, MOVED_NOISES * usual)
     far = np.abs(off) > min(max(quiet, WANDER * drift), max(quiet, MOVED_ON_TABLE_DPS, WANDER_LARGE * drift))
     # a creeping output, such as one that warms up, leaves its level too, but not at once
+    near = max(round(SUDDEN_S / (block * step_s)), SUDDEN_BLOCKS)
     for begin, end in runs(far):
         most = off[begin:end][int(np.argmax(np.abs(off[begin:end])))]
-        edges = [_change(off, edge) for edge in (begin, end) if 0 < edge < blocks]
-        if edges and min(edges) > max(least, 0.5 * abs(most)):
+        side = float(np.sign(most))
+        before = off[max(begin - 2, 0)] if begin else 0.0
+        after = off[min(end + 1, blocks - 1)] if end < blocks else 0.0
+        risen = float((side * (off[begin : min(begin + near, end)] - before)).max())
+        fallen = float((side * (off[max(end - near, begin) : end] - after)).max())
+        if min(risen, fallen) > max(least, 0.5 * abs(most)):
             rows[begin * block : end * block] = True
             size[begin * block : end * block] = most
     return rows, size
-
-
-def _change(off: Array, edge: int) -> float:
-    """Return by how much (m,) levels change within a few blocks of the edge of a run."""
-    begin, end = max(edge - EDGE_BLOCKS, 0), min(edge + EDGE_BLOCKS, len(off))
-    return float(np.ptp(off[begin:end]))

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from labctl.errors import BadInput
-from labctl.recording import Recording, read_recording, write_recording
+from labctl.recording import Recording, RecordingInfo, read_recording, write_recording
 from labctl.recording.column_map.movement import movement
 from labctl.recording.sanity import inspect_recording
 from labctl.recording.sanity.readings import examination, examine, joined_examinations, without
@@ -19,6 +20,7 @@ from studies.forensics import NAMES, recording_of, said_of
 from studies.forensics_records import FAULTS, Record, clean_record, faulty
 
 SEEDS = (301, 302)
+STARTED = datetime(2026, 1, 5, 8, tzinfo=UTC)
 
 
 @pytest.mark.parametrize("kind", FAULTS)
@@ -112,6 +114,21 @@ def test_coarse_steps_at_rest_are_no_movement(level_dps: float) -> None:
     rng = np.random.default_rng(7)
     rates = np.round((level_dps + 0.03 * rng.normal(size=(6000, 3))) / 0.25) * 0.25
     assert movement(rates, np.arange(6000) / 50.0).is_rest
+
+
+@pytest.mark.parametrize("every_s", [0.02, 0.5])
+def test_a_bias_that_follows_a_temperature_loop_is_no_movement(every_s: float) -> None:
+    """3 deg/s over a loop of 70 min: it leaves its level for many minutes, and takes minutes to do so."""
+    rng = np.random.default_rng(11)
+    t_s = np.arange(0.0, 4200.0, every_s)
+    warm = np.interp(t_s, [0.0, 1400.0, 3100.0, 4200.0], [50.0, -17.0, 74.0, 36.0])
+    bias = 4e-4 * (warm - 20.0) ** 2 + 0.02 * rng.standard_normal((3, len(t_s)))
+    columns: dict[str, np.ndarray] = {"t_s": t_s, "dataset": np.ones(len(t_s), dtype=np.int64), "temperature_c": warm}
+    info = RecordingInfo(serial="U", axes=["x", "y", "z"], kind="samples", motion="rest", started_at=STARTED)
+    columns |= {f"gyro_{axis}": values for axis, values in zip("xyz", bias, strict=True)}
+    assert "moved" not in {found.what for found in inspect_recording(Recording(info, columns))}
+    columns["gyro_x"] = bias[0] + 5.0 * ((t_s > 2000.0) & (t_s < 2050.0))
+    assert "moved" in {found.what for found in inspect_recording(Recording(info, columns))}
 
 
 def test_a_clock_that_was_set_back_says_what_to_add() -> None:
