@@ -100,6 +100,18 @@ def print_campaign(answer: CampaignResponse) -> None:
         )
     _print_instruments(answer)
     _print_question(answer)
+    _print_troubles(answer)
+    _print_advice(answer)
+    for serial, recording in answer.recordings.items():
+        console.print(f"  recording {recording}: {serial}")
+    print_drafts(answer.drafts)
+    for device, said in answer.reported.items():
+        known = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in said.items())
+        console.print(f"  {device} says: {known}", soft_wrap=True)
+
+
+def _print_troubles(answer: CampaignResponse) -> None:
+    """Print what is requested and not done yet, and what went wrong."""
     if answer.wish is not None:
         console.print(f"  requested and still to be carried out: {answer.wish}", style="yellow")
     for unit, why in answer.dropped.items():
@@ -112,13 +124,6 @@ def print_campaign(answer: CampaignResponse) -> None:
         console.print(f"  last fault: {answer.last_error}", style="red")
     if answer.unrecorded:
         console.print(f"  {answer.unrecorded}", style="red")
-    _print_advice(answer)
-    for serial, recording in answer.recordings.items():
-        console.print(f"  recording {recording}: {serial}")
-    print_drafts(answer.drafts)
-    for device, said in answer.reported.items():
-        known = ", ".join(f"{name.replace('_', ' ')} {value}" for name, value in said.items())
-        console.print(f"  {device} says: {known}", soft_wrap=True)
 
 
 def print_drafts(drafts: Sequence[DraftResponse]) -> None:

@@ -49,7 +49,7 @@ class Known:
     def whitened(self) -> NDArray[np.float64]:
         """The matrix (6, 9) that turns a change of the nine parameters into six numbers of variance 1."""
         inverse = np.linalg.inv(np.linalg.cholesky(self.covariance))
-        return np.hstack([np.zeros((len(inverse), FREE)), inverse])
+        return np.asarray(np.hstack([np.zeros((len(inverse), FREE)), inverse]), dtype=np.float64)
 
 
 @dataclass(frozen=True)
