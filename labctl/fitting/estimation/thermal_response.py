@@ -30,6 +30,9 @@ from labctl.fitting.numeric.variable_projection import Local, refined
 GRID_S = np.geomspace(SHORTEST_S, LONGEST_S, 60)
 #: Two flows of one element are at least so many places of the grid apart: nearer ones are one.
 APART = 4
+#: Time constants of warming and cooling differ by more than so many standard uncertainties of their ratio, where the
+#: data tell both.
+TOLD_APART, MOST_CONDITION = 3.0, 1e12
 #: A structure with more coefficients is taken where it lowers the chi2 of what was left out by this share, and by so
 #: much more in units of its scatter.
 BETTER_BY, BETTER_TO = 0.02, 9.0
@@ -118,11 +121,12 @@ def thermal_response(data: FitData, model: ErrorModel, term: Term) -> ThermalRes
     tried = [structure for structure in STRUCTURES if structure.id != "per_axis" or len(axes) > 1]
     held_out = {structure.id: left_out_by(axes, structure, stretches) for structure in (NONE, *tried)}
     every = np.ones(len(data), dtype=bool)
-    chosen = _chosen(tried, held_out)
-    found = best_taus(axes, chosen, every, MOST_STEPS)
-    if not _are_apart(found):
-        chosen = _chosen([structure for structure in tried if structure != chosen], held_out)
+    while True:
+        chosen = _chosen(tried, held_out)
         found = best_taus(axes, chosen, every, MOST_STEPS)
+        if are_told_apart(axes, chosen, found, every):
+            break
+        tried.remove(chosen)
     return ThermalResponse(_term_of(axes, term, chosen, found), chosen, held_out)
 
 
@@ -135,11 +139,30 @@ def _chosen(tried: Sequence[Structure], held_out: Mapping[str, LeftOut]) -> Stru
     return chosen
 
 
-def _are_apart(found: Taus) -> bool:
-    """Return whether two flows of each axis have clearly different time constants: nearer ones are one flow."""
+def are_told_apart(axes: Sequence[Axis], structure: Structure, found: Taus, seen: NDArray[np.bool_]) -> bool:
+    """Return whether the two time constants of a structure are not one and the same.
+
+    Those of two flows on each axis: nearer ones are one flow. Those of warming and cooling on one axis at least, beyond
+    `TOLD_APART` standard uncertainties of their ratio.
+    """
+    if structure.two_ways:
+        return any(_ways_differ(axis, structure, found[axis.name], seen) for axis in axes)
     least = GRID_S[APART] / GRID_S[0]
     both = [(taus_s["tau"], taus_s["second_tau"]) for taus_s in found.values() if "second_tau" in taus_s]
     return all(max(pair) >= least * min(pair) for pair in both)
+
+
+def _ways_differ(axis: Axis, structure: Structure, taus_s: Mapping[str, float], seen: NDArray[np.bool_]) -> bool:
+    """Return whether warming and cooling have different time constants, by the curvature of what is left."""
+    logarithms = np.log([taus_s[name] for name in structure.constants])
+    (part,) = _around([axis], structure, seen, logarithms)
+    freedom = max(len(part.residual) - axis.base.shape[1] - len(structure.columns) - len(logarithms), 1)
+    information = part.slopes.T @ part.slopes / (part.chi2 / freedom)
+    if np.linalg.cond(information) > MOST_CONDITION:
+        return False
+    apart = np.array([1.0 if name == "tau" else -1.0 for name in structure.constants])
+    u = float(np.sqrt(apart @ np.linalg.solve(information, apart)))
+    return abs(float(apart @ logarithms)) > TOLD_APART * u
 
 
 def stretches_of(data: FitData) -> list[tuple[NDArray[np.bool_], NDArray[np.bool_]]]:

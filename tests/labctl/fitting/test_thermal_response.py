@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +12,15 @@ from labctl.fitting import fit
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.effects import Term
 from labctl.fitting.effects.thermal_lag import lag_elements
-from labctl.fitting.estimation.thermal_response import stretches_of, thermal_response
+from labctl.fitting.estimation.thermal_response import (
+    MOST_STEPS,
+    STRUCTURES,
+    Axis,
+    are_told_apart,
+    best_taus,
+    stretches_of,
+    thermal_response,
+)
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.recording import Recording
 from tests.helpers.rest import RATE_HZ, at_rest, flowing, follow
@@ -65,6 +74,16 @@ def test_a_lag_that_is_longer_while_the_unit_cools_is_found_as_that() -> None:
     found = shapes(flowing({"z": two_ways}))
     assert found["tau_s"][0] == pytest.approx(200.0, rel=0.3)
     assert found["cooling_tau_s"][0] == pytest.approx(900.0, rel=0.3)
+
+
+@pytest.mark.parametrize(("law", "differs"), [(partial(follow, tau_s=400.0), False), (two_ways, True)])
+def test_warming_and_cooling_are_one_time_constant_unless_the_data_tell_two(law: Any, differs: bool) -> None:
+    data = fit_data_of(flowing({"z": law}))
+    axes = [Axis(data, ErrorModel("", (Term("bias"), Term("bias_temperature", 2))), "z")]
+    (structure,) = (each for each in STRUCTURES if each.two_ways)
+    every = np.ones(len(data), dtype=bool)
+    found = best_taus(axes, structure, every, MOST_STEPS)
+    assert are_told_apart(axes, structure, found, every) == differs
 
 
 def test_a_fit_with_its_heat_flows_predicts_each_leg_to_the_noise() -> None:
