@@ -10,6 +10,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg.lapack import dtbtrs
 
 from labctl.fitting.numeric.arrays import Array
@@ -66,24 +67,37 @@ class Steps:
         Which steps these are depends on the answer: it is found again until they stay the same. All samples up to the
         first that still changes are final, so that each pass gets further, as a rule to the end in a few.
         """
-        warming, cooling = self._first_order(warming_s), self._first_order(cooling_s)
         cools = self.now_c < self.before_c
+        keep, pull = self._two_ways(warming_s, cooling_s, cools, slice(None))
         found = np.empty_like(self.now_c)
         begin = 0
         while True:
             rest = slice(begin, None)
-            keep, pull = (
-                np.where(cools[rest], _from(one, begin), _from(other, begin))
-                for one, other in zip(cooling, warming, strict=True)
-            )
             start = at_c if begin == 0 else float(found[begin - 1])
-            found[rest] = _followed(keep, pull, start)
-            cooled = self.now_c[rest] < np.concatenate([[start], found[rest][:-1]])
-            changed = np.flatnonzero(cooled != cools[rest])
+            found[rest] = _followed(keep[rest], pull[rest].copy(), start)
+            cooled = np.empty_like(cools[rest])
+            cooled[0] = self.now_c[begin] < start
+            np.less(self.now_c[begin + 1 :], found[begin:-1], out=cooled[1:])
+            changed = begin + np.flatnonzero(cooled != cools[rest])
             if len(changed) == 0:
                 return found
             cools[rest] = cooled
-            begin += int(changed[0])
+            keep[changed], pull[changed] = self._two_ways(warming_s, cooling_s, cools, changed)
+            begin = int(changed[0])
+
+    def _two_ways(
+        self, warming_s: float, cooling_s: float, cools: NDArray[np.bool_], rows: slice | NDArray[np.int64]
+    ) -> tuple[Array, Array]:
+        """Return what is kept in some steps, each of which warms or cools (n,), and where it is pulled to, (.,)."""
+        own = cools[rows]
+        before_c, now_c = self.before_c[rows], self.now_c[rows]
+        if len(self.step_s) > 1:
+            keeps, means = _shares(self.step_s[rows] / np.where(own, cooling_s, warming_s))
+            return keeps, (means - keeps) * before_c + (1.0 - means) * now_c
+        step_s = float(self.step_s[0])
+        both = zip(lag_shares(step_s, cooling_s), lag_shares(step_s, warming_s), strict=True)
+        keep, last, new = (np.where(own, cooling, warming) for cooling, warming in both)
+        return keep, last * before_c + new * now_c
 
     def _first_order(self, tau_s: float) -> tuple[Array | float, Array]:
         """Return what is kept of a first-order follower in each step, (n,) or one, and where it is pulled to."""
@@ -110,10 +124,6 @@ class Steps:
             )
             reach *= 2
         return np.asarray(low)
-
-
-def _from(values: Array | float, begin: int) -> Array | float:
-    return values[begin:] if isinstance(values, np.ndarray) else values
 
 
 def _followed(keep: Array | float, pull: Array, at_c: float) -> Array:
