@@ -9,7 +9,7 @@ course that it has not seen clearly better than a simpler one.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 
 import numpy as np
@@ -59,6 +59,7 @@ class Structure:
     columns: tuple[tuple[str, Part], ...] = ()
     per_axis: bool = True  #: whether each axis has time constants of its own
     two_ways: bool = False  #: whether the first time constant is another one while the element cools
+    fixed: Mapping[str, float] = field(default_factory=dict)  #: name -> time constant that is not looked for, s
 
     @property
     def size(self) -> tuple[int, bool]:
@@ -67,8 +68,13 @@ class Structure:
 
     @property
     def constants(self) -> tuple[str, ...]:
-        """The names of its time constants, without the axis."""
-        return (*dict.fromkeys(name for name, _ in self.columns), *(("cooling_tau",) if self.two_ways else ()))
+        """The names of the time constants that are looked for, without the axis."""
+        named = dict.fromkeys(name for name, _ in self.columns if name not in self.fixed)
+        return (*named, *(("cooling_tau",) if self.two_ways else ()))
+
+    def taus_s(self, logarithms: Array) -> dict[str, float]:
+        """Return its time constants, s, by the logarithms of those that are looked for."""
+        return {**dict(zip(self.constants, np.exp(logarithms).tolist(), strict=True)), **self.fixed}
 
 
 NONE = Structure("none", "no lag")
@@ -76,6 +82,10 @@ NONE = Structure("none", "no lag")
 STRUCTURES: tuple[Structure, ...] = (
     Structure("one", "one time constant for all axes", (("tau", "all"),), per_axis=False),
     Structure("per_axis", "one time constant on each axis", (("tau", "all"),)),
+    Structure(
+        "rate", "one time constant for all axes, and a term in dT/dt",  # a flow that is nearly at once: -tau dT/dt
+        (("tau", "all"), ("second_tau", "all")), per_axis=False, fixed={"second_tau": SHORTEST_S},
+    ),
     Structure("curved", "one time constant on each axis, and a curved law", (("tau", "all"), ("tau", "curved"))),
     Structure(
         "two_ways", "one time constant on each axis while it warms up, another while it cools",
@@ -168,8 +178,9 @@ def _ways_differ(axis: Axis, structure: Structure, taus_s: Mapping[str, float], 
 def stretches_of(data: FitData) -> list[tuple[NDArray[np.bool_], NDArray[np.bool_]]]:
     """Return what is left out in turn, as masks (m,) of the data sets that are fitted and of those that are tested.
 
-    With three legs or more each of them; of two, each half of each. What lies at temperatures that the others did not
-    reach is not tested.
+    With three legs or more each of them; half of it at a time where the others would go one way only, on which a lag
+    looks like another law of temperature. Of two legs, each half of each. What lies at temperatures that the others did
+    not reach is not tested.
     """
     if not data.channels.history.thermometer or "t_s" not in data.channels:
         return []
@@ -178,10 +189,12 @@ def stretches_of(data: FitData) -> list[tuple[NDArray[np.bool_], NDArray[np.bool
     numbers = [int(number) for number in np.unique(legs) if number]
     if len(numbers) < 2 or len(numbers) > MOST_LEGS:
         return []
-    parts = [legs == number for number in numbers]
-    if len(parts) == 2:
-        halves = (np.array_split(np.flatnonzero(part), 2) for part in parts)
-        parts = [np.isin(np.arange(len(data)), half) for pair in halves for half in pair]
+    whole = [legs == number for number in numbers]
+    parts = []
+    for part in whole:
+        others = {_rises(data, other) for other in whole if other is not part}
+        pieces = np.array_split(np.flatnonzero(part), 1 if len(others) == 2 else 2)
+        parts += [np.isin(np.arange(len(data)), piece) for piece in pieces]
     found = []
     for part in parts:
         seen, warm = ~part, data.temperature_c
@@ -190,6 +203,12 @@ def stretches_of(data: FitData) -> list[tuple[NDArray[np.bool_], NDArray[np.bool
         if tested.sum() >= LEAST_SETS:
             found.append((seen, tested))
     return found if len(found) > 1 else []
+
+
+def _rises(data: FitData, leg: NDArray[np.bool_]) -> bool:
+    """Return whether the temperature is higher in the second half of a leg than in the first."""
+    first, second = np.array_split(data.temperature_c[leg], 2)
+    return bool(np.mean(second) > np.mean(first))
 
 
 class Axis:
@@ -287,7 +306,10 @@ def _choices(structure: Structure) -> tuple[NDArray[np.int64], NDArray[np.int64]
     n = len(GRID_S)
     if structure.two_ways:
         return len(PARTS) * n + np.arange(len(PAIRS))[:, None], PAIRS
-    if len(structure.constants) == 1:
+    if structure.fixed:
+        places = np.arange(APART, n)[:, None]
+        at = np.column_stack([places, np.zeros_like(places)])  # the shortest of the grid
+    elif len(structure.constants) == 1:
         places = np.arange(n)[:, None]
         at = np.repeat(places, len(structure.columns), axis=1)
     else:
@@ -311,14 +333,13 @@ def best_taus(axes: Sequence[Axis], structure: Structure, seen: NDArray[np.bool_
     for group, gain in groups:
         begin = np.log(GRID_S[places[int(np.argmax(gain))]])
         logarithms = refined(partial(_around, group, structure, seen), begin, LOG_BOUNDS, steps)
-        taus_s = dict(zip(structure.constants, np.exp(logarithms).tolist(), strict=True))
-        found |= {axis.name: taus_s for axis in group}
+        found |= {axis.name: structure.taus_s(logarithms) for axis in group}
     return found
 
 
 def _around(group: Sequence[Axis], structure: Structure, seen: NDArray[np.bool_], logarithms: Array) -> list[Local]:
     """Return what is left of each axis at logarithms of time constants, and what each of them moves."""
-    taus_s = dict(zip(structure.constants, np.exp(logarithms).tolist(), strict=True))
+    taus_s = structure.taus_s(logarithms)
     found = []
     for axis in group:
         own = axis.columns(structure, taus_s)
