@@ -19,7 +19,7 @@ CLOSE = 0.5
 #: Readings whose usual step says whether one is wide; the steps of a log may change.
 STEPS = 51
 #: Readings are missing where a step of time is so many usual ones, and so many usual deviations from them.
-GAP_STEPS, GAP_DEVIATIONS = 1.8, 12.0
+GAP_STEPS, GAP_DEVIATIONS = 2.5, 12.0
 #: More rows out of order than this share are no accident, and are not left out.
 MOST_OUT = 0.02
 
