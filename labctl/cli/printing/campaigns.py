@@ -116,14 +116,19 @@ def _print_troubles(answer: CampaignResponse) -> None:
         console.print(f"  requested and still to be carried out: {answer.wish}", style="yellow")
     for unit, why in answer.dropped.items():
         console.print(f"  {unit} is excluded from the rest of the campaign: {why}", style="red")
-    if answer.repeated:
-        console.print(f"  {answer.repeated} data sets were taken again", style="yellow")
-    if answer.stalled_s:
-        console.print(f"  this computer did not run labctl for {answer.stalled_s:.1f} s", style="yellow")
+    _print_hindrances(answer)
     if answer.last_error:
         console.print(f"  last fault: {answer.last_error}", style="red")
     if answer.unrecorded:
         console.print(f"  {answer.unrecorded}", style="red")
+
+
+def _print_hindrances(answer: CampaignResponse) -> None:
+    """Print what held the campaign up that is no fault of an instrument."""
+    if answer.repeated:
+        console.print(f"  {answer.repeated} data sets were taken again", style="yellow")
+    if answer.stalled_s:
+        console.print(f"  this computer did not run labctl for {answer.stalled_s:.1f} s", style="yellow")
 
 
 def print_drafts(drafts: Sequence[DraftResponse]) -> None:
