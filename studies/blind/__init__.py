@@ -1,1 +1,1 @@
-"""Records with one fault each and clean ones, made by somebody who had not read the checks."""
+"""Records with one fault each and clean ones, made by an author who had not read the checks."""

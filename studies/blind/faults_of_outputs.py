@@ -63,7 +63,7 @@ def moved(rng: np.random.Generator) -> Record:
 
 
 def nudged(rng: np.random.Generator) -> Record:
-    """Somebody walks against the bench: a rate that swings once or twice in 1 to 5 s.
+    """A person walks against the bench: a rate that swings once or twice in 1 to 5 s.
 
     It is 30 to 300 standard deviations, 5 deg/s at most.
     """

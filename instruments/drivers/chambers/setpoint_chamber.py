@@ -12,6 +12,8 @@ from instruments.interfaces.chamber import ChamberLimits, ChamberState
 
 #: Rounding of counts and floats; far below any set point's resolution.
 TINY_C = 1e-6
+#: Asking whether a set point has an effect takes at most one of so many seconds: units are not read meanwhile.
+SLOW_SHARE = 50.0
 
 
 class Link(Protocol):
@@ -39,6 +41,7 @@ class SetpointChamber(ABC):
         self._limits: ChamberLimits | None = None
         self._has_controlled = False
         self._given_c: float | None = None  #: the set point that the controller took last from this driver
+        self._found_hindrance, self._ask_again_s = "", 0.0
 
     @property
     def limits(self) -> ChamberLimits:
@@ -155,7 +158,10 @@ class SetpointChamber(ABC):
         """Return what others have changed since this driver gave a set point; nothing before it did."""
         if self._given_c is None:
             return ()
-        found = [self._hindrance()]
+        if (asked_s := self._clock.now_s()) >= self._ask_again_s:
+            self._found_hindrance = self._hindrance()
+            self._ask_again_s = asked_s + SLOW_SHARE * (self._clock.now_s() - asked_s)
+        found = [self._found_hindrance]
         if abs(setpoint_c - self._given_c) > self.limits.resolution_c / 2 + TINY_C:
             found.append(f"the set point is {setpoint_c:g} deg C, labctl gave {self._given_c:g} deg C")
         return tuple(filter(None, found))
@@ -165,7 +171,7 @@ class SetpointChamber(ABC):
             raise RequestRejected(self.name, f"{hint}")
 
     def _write_and_verify(self, rounded_c: float) -> float:
-        self._given_c = None
+        self._given_c, self._ask_again_s = None, 0.0
         if abs(self._read_setpoint() - rounded_c) > TINY_C:
             self._write_setpoint(rounded_c)
         found = self._read_setpoint()

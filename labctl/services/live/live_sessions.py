@@ -92,7 +92,7 @@ class LiveSessions:
         else:
             runner = self._runner
             if runner is None:
-                raise Conflict(f"{NO_BENCH}, or name the address of a stream")
+                raise Conflict(f"{NO_BENCH}; name the address of a stream")
             serial = request.serial or runner.bench.gyros[0].serial
             runner.lend(serial, self._end_and_wait, partial(self._open_bench, request, target, runner))
         answer = self.state()

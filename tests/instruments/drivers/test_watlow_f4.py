@@ -152,6 +152,7 @@ def test_what_others_change_at_the_panel_is_in_the_next_reading(f4: Any) -> None
     f4.simulated.setpoint = 470
     assert f4.driver.read().foreign == ("the set point is 47 deg C, labctl gave 40 deg C",)
     f4.simulated.setpoint, f4.simulated.mode = 400, 2
+    f4.clock.sleep(8.5)  # until the next poll of a campaign
     (said,) = f4.driver.read().foreign
     assert said.startswith("a profile is running or held on the controller")
 

@@ -72,7 +72,7 @@ def test_it_finds_what_is_on_each_port_and_writes_a_file_that_passes_the_check(
     assert written["gyros"][0]["sample_rate_hz"] == 125.0
     sent = [json.loads(line) for line in heard.getvalue().splitlines()]
     assert {line["heard"] for line in sent if line["device"] == "table"} == {"\r!1fp\r"}
-    assert {line["heard"] for line in sent if line["device"] == "mems"} == {"C\rI\r"}
+    assert {line["heard"] for line in sent if line["device"] == "mems"} == {"C\rI\rT\r"}
     assert not any(line["table_turns"] for line in sent)
     assert {line["heard"] for line in sent if line["device"] == "fog"} == {"RRR"}  # once it is known who is there
     checked = lab.json("bench", "check", str(path))

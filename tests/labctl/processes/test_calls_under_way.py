@@ -24,6 +24,8 @@ WAIT_S = 20.0
 class SlowStore:
     """A store whose transaction lasts until `go_on` is set, and that notes a use after it was closed."""
 
+    location = ""
+
     def __init__(self) -> None:
         self.begun, self.go_on = threading.Event(), threading.Event()
         self.is_closed, self.used_closed = False, False

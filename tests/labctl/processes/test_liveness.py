@@ -92,29 +92,32 @@ def test_a_request_to_end_is_seen_that_a_process_cannot_hear(
 
 
 THREADS = """
-import signal, sys, threading, time
-def work(ending):
+import signal, sys, threading
+never = threading.Event()
+def work(ending, told):
     if ending:
         signal.pthread_sigmask(signal.SIG_BLOCK, ending)
-    print(threading.get_native_id(), flush=True)
-    time.sleep(600)
+    print(int(bool(ending)), threading.get_native_id(), flush=True)
+    told.set()
+    never.wait()
 signal.signal(signal.SIGTERM, lambda *_: None)
 for ending in ((), (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT)):
-    threading.Thread(target=work, args=(ending,), daemon=True).start()
-    time.sleep(0.1)
-time.sleep(600)
+    told = threading.Event()
+    threading.Thread(target=work, args=(ending, told), daemon=True).start()
+    told.wait()
+sys.stdin.readline()
 """
 
 
 def test_a_request_that_another_thread_was_given_is_seen_and_one_that_blocks_all_is_none() -> None:
-    with subprocess.Popen([sys.executable, "-c", THREADS], stdout=subprocess.PIPE) as threaded:
+    with subprocess.Popen([sys.executable, "-c", THREADS], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as threaded:
         try:
             assert threaded.stdout is not None
-            first, _ = int(threaded.stdout.readline()), threaded.stdout.readline()
+            said = dict(threaded.stdout.readline().split() for _ in range(2))
             os.kill(threaded.pid, signal.SIGSTOP)
             eventually(lambda: is_stopped(threaded.pid))
             assert not unheard_end(threaded.pid)
-            assert ctypes.CDLL(None).tgkill(threaded.pid, first, int(signal.SIGTERM)) == 0
+            assert ctypes.CDLL(None).tgkill(threaded.pid, int(said[b"0"]), int(signal.SIGTERM)) == 0
             assert unheard_end(threaded.pid)
         finally:
             threaded.kill()

@@ -22,6 +22,8 @@ from tests.helpers.certificates import simulated
 from tests.helpers.register import noon
 
 SERIAL = "FOG-0001"
+#: Most of what the unit does, so that its scale factor is nearly as uncertain as the clock.
+EFFECTS = ["bias", "bias_temperature:3", "scale_factor", "scale_factor_temperature:2"]
 
 
 @pytest.fixture
@@ -41,7 +43,7 @@ def measure(store: Store, day: date, standard: Standard, scale: float = 0.0, ser
     update = {"serial": serial, "started_at": noon(day), "standards": (standard,)}
     info = recording.info.model_copy(update=update)
     number = store.recordings.add_import(replace(recording, info=info, columns=columns), noon(day))
-    request = FitRequest(effects=["bias", "scale_factor"], recording=number)
+    request = FitRequest(effects=EFFECTS, recording=number)
     return fit_unit(store, serial, request, noon(day)).version
 
 
@@ -65,7 +67,7 @@ def test_scores_of_two_laboratories_with_standards_of_their_own(store: Store) ->
     assert one.en == one.en_if_independent
     u = [expanded / k for expanded, k in zip(one.expanded, one.k, strict=True)]
     assert one.zeta == pytest.approx(one.difference / math.hypot(*u))
-    assert u[0] == pytest.approx(6e-3, rel=0.05)  # the clock leads in both
+    assert u[0] == pytest.approx(6e-3, rel=0.2)  # the clock leads in both, what the model leaves is less
     assert one.en_performance == "unsatisfactory"
     assert not found.satisfactory
     assert found.text[0].startswith("scale_factor of axis z: En = 1.")
@@ -79,10 +81,10 @@ def test_laboratories_that_agree(store: Store) -> None:
 
 def test_a_shared_standard_is_said_and_its_part_subtracted(store: Store) -> None:
     same = clock(9000.0, "A-1")
-    found = compared(store, same, same, -4e-3)
+    found = compared(store, same, same, -1.4e-2)
     one = scale_factor(found)
     assert found.shared == [same.label]
-    assert one.shared_u == pytest.approx(9e-3 * (1 + one.values[0]), rel=5e-3)
+    assert one.shared_u == pytest.approx(9e-3 * (1 + one.values[0]), rel=1e-2)
     assert abs(one.en_if_independent) < 1 < abs(one.en)  # the clock cannot explain what it adds to both
     assert any("correlated by it" in text for text in found.text)
 

@@ -272,6 +272,8 @@ ELSEWHERE = {
     "/api/check-gyros/{serial}": "tests/labctl/services/test_check_gyros.py",
     "/api/units/{serial}/sensors/accelerometer": "tests/labctl/api/test_sensors.py",
     "/api/units/{serial}/sensors/magnetometer": "tests/labctl/api/test_sensors.py",
+    "/api/live/start": "tests/labctl/services/live/test_live_sessions.py",
+    "/api/live/end": "tests/labctl/services/live/test_live_sessions.py",
     "/api/environment": "tests/labctl/api/test_standards.py",
 }
 

@@ -190,7 +190,7 @@ def test_which_recipe_needs_what_is_said_in_one_line(tmp_path: Path) -> None:
     refused = runner.invoke(app, ["campaign", "start", "short", "--bench", "by-hand-sim", *database])
     assert refused.exit_code == 2
     assert "rates_dps: a rate table is needed, but the bench has none" in refused.stderr
-    checked = runner.invoke(app, ["bench", "check", "by-hand-sim"])
+    checked = runner.invoke(app, ["bench", "check", "by-hand-sim", *database])
     assert (checked.exit_code, "table" in checked.output, "mems" in checked.output) == (0, False, True)
     simulated = runner.invoke(app, ["simulate", "by-hand", "--out", str(tmp_path / "out")])
     assert simulated.exit_code == 2

