@@ -8,6 +8,7 @@ a busy computer that is the handler of any thread: the kernel gives a signal to 
 
 from __future__ import annotations
 
+import os
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -66,7 +67,11 @@ class SupervisorWatch:
 
 def _statuses(pid: int) -> Iterator[dict[str, str]]:
     """Yield the fields of /proc/<pid>/task/<thread>/status of each thread; none for a process that is gone."""
-    for thread in Path(f"/proc/{pid}/task").glob("*/status"):
+    threads: list[str] = []
+    with suppress(OSError):  # a process may end at any moment
+        threads = os.listdir(f"/proc/{pid}/task")  # noqa: PTH208  a Path's own listing fails later
+    for thread in threads:
         with suppress(OSError):
-            lines = thread.read_text(encoding="utf-8", errors="replace").splitlines()
+            status = Path(f"/proc/{pid}/task/{thread}/status")
+            lines = status.read_text(encoding="utf-8", errors="replace").splitlines()
             yield {name: value.strip() for name, _, value in (line.partition(":") for line in lines)}

@@ -43,7 +43,6 @@ class ExecutionContext:
     soaked: Soak | None = None  #: the soak that still holds: its temperature has not been left since
     owed_soak: Soak | None = None  #: the soak to be done again before the next data set
     unchecked: list[int] = field(default_factory=list)  #: data sets since home was last found where it was left
-    given_c: float | None = None  #: the set point that the chamber was given last, deg C
     warned_of_rate: bool = False  #: whether it was said that the table does not turn as commanded
     _prompts: int = field(default=0, repr=False)
     _set: dict[str, dict[str, str]] = field(default_factory=dict, repr=False)  #: unit -> how it was set so far

@@ -122,7 +122,6 @@ def move_chamber(context: ExecutionContext, step: MoveChamber) -> Figures:
     """Write the set point and wait until the air is in the band. Raises SoakFailed when it does not arrive in time."""
     context.soaked = None
     set_c = context.bench.chamber.set_temperature_c(step.temperature_c)
-    context.given_c = step.temperature_c
     half_step_c = context.bench.chamber.limits.resolution_c / 2
     if abs(set_c - step.temperature_c) > half_step_c + 1e-6:
         raise StepFailed(

@@ -77,7 +77,7 @@ def hold(context: ExecutionContext) -> None:
 
 def take_back(context: ExecutionContext) -> None:
     """Give the chamber the set point again that it had before others changed it. Raises StepFailed."""
-    if (given_c := context.given_c) is None:
+    if (given_c := context.monitor.given_c) is None:
         return
     chamber = context.bench.chamber
     try:

@@ -109,11 +109,14 @@ class BenchMonitor:
         return None if self._chamber is None else self._chamber.setpoint_c
 
     @property
+    def given_c(self) -> float | None:
+        """The set point that labctl gave last, by the last poll; None before it did, and without a chamber."""
+        return None if self._chamber is None else self._chamber.given_c
+
+    @property
     def _wanted_c(self) -> float | None:
         """The set point that labctl gave, else that of the chamber; None without a chamber."""
-        if self._chamber is None:
-            return None
-        return self._chamber.setpoint_c if self._chamber.given_c is None else self._chamber.given_c
+        return self.air_setpoint_c if self.given_c is None else self.given_c
 
     @contextmanager
     def listening(self, listener: Listener) -> Iterator[None]:
