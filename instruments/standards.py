@@ -45,6 +45,8 @@ HALF_WIDTHS: dict[Distribution, float] = {
 }
 #: Traceability of the standards of a simulated bench, also where its recording was exported and imported.
 SIMULATED = "none: simulated"
+#: The standard by which rates are known where each campaign measures the step clock of its table by timed runs.
+MEASURED_STEP_CLOCK = "step clock as each campaign measures it"
 
 
 class Standard(BaseModel):

@@ -198,7 +198,10 @@ def one(prepared: Path, faults: tuple[Fault, ...], way: str) -> Round:
 
 def _suffered(service: Service, table: Table, faults: tuple[Fault, ...], way: str) -> Round:
     start = {"recipe": RECIPE, "confirmed_by": "the study", "checks": list(BENCH_CHECKS)}
-    campaign = httpx.post(f"{service.url}/api/campaigns", json=start, timeout=120.0).json()["id"]
+    answer = httpx.post(f"{service.url}/api/campaigns", json=start, timeout=120.0)
+    if answer.is_error:
+        raise RuntimeError(f"the campaign was not started: {answer.status_code} {answer.text}")
+    campaign = answer.json()["id"]
     while not table.turns():
         time.sleep(0.05)
     with _load(service):

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from instruments.checks.findings import Finding
+from instruments.transport import latency
 from instruments.transport.adapters import adapter_of
 from instruments.transport.port_failures import permission_command, stable_name, users_of
 
-SYS_TTY = Path("/sys/class/tty")
 #: FTDI adapters hold bytes back for up to this long when it is set to the least, ms.
 QUICK_MS = 1
 #: Names that depend on the order in which adapters are found.
@@ -65,24 +65,16 @@ def of_open_port(port: str, *, wants_quick: bool) -> list[Finding]:
                 "doubtful",
             )
         )
-    latency_ms = latency_timer_ms(name)
+    latency_ms = latency.latency_timer_ms(name)
     if latency_ms is not None:
         slow = wants_quick and latency_ms > QUICK_MS
         text = f"the adapter delays received bytes by up to {latency_ms} ms"
-        file = SYS_TTY / name / "device" / "latency_timer"
+        file = latency.SYS_TTY / name / "device" / "latency_timer"
         advice = f": run `echo {QUICK_MS} | sudo tee {file}`"
         found.append(
             Finding("latency timer", text + advice if slow else text, "doubtful" if slow else "good", latency_ms, "ms")
         )
     return found
-
-
-def latency_timer_ms(name: str) -> int | None:
-    """Return the latency timer of the FTDI adapter of a port, ms; None for another adapter."""
-    try:
-        return int((SYS_TTY / name / "device" / "latency_timer").read_text(encoding="ascii"))
-    except (OSError, ValueError):
-        return None
 
 
 def shared(ports: Mapping[str, str]) -> dict[str, Finding]:

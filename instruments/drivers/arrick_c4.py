@@ -17,9 +17,9 @@ from instruments.drivers import probes
 from instruments.drivers.arrick_c4_link import LATE_LETTERS, C4Link
 from instruments.drivers.driver import TableDriver
 from instruments.errors import MalformedReply, NoReply, RequestRejected, WrongInstrument
-from instruments.interfaces.table import HomeCheck, Spin, StepClock, TableLimits, Wait
+from instruments.interfaces.table import COVERAGE, HomeCheck, Spin, StepClock, TableLimits, TimedRun, Wait
 from instruments.protocols import arrick_c4_lines as lines
-from instruments.protocols.arrick_c4_moves import SPARE_S, Move, TimedRun, finite_move, plan_move
+from instruments.protocols.arrick_c4_moves import SPARE_S, Move, finite_move, plan_move
 from instruments.protocols.arrick_c4_settings import ArrickC4Settings
 from instruments.transport.factory import Ports
 
@@ -55,8 +55,10 @@ class ArrickC4:
             settings.acceleration_dps2,
             self._step_deg,
             clock_run_s=settings.clock_run_s,
+            clock_limit_ppm=settings.clock_limit_ppm,
             checks_home=settings.check_home,
         )
+        self.step_clock = StepClock(settings.step_clock_hz, settings.clock_u_ppm)
         self._true = settings  #: with the step clock as it was measured
         self._clock = clock
         self._link = C4Link(self.name, settings, ports, clock, self._forget_programming)
@@ -161,21 +163,20 @@ class ArrickC4:
         turned = active.steady_elapsed_s(self._clock.now_s()) * move.step_hz
         self._steps += math.copysign(turned, move.steps)
 
-    def measure_clock(self, rate_dps: float, short_s: float, wait: Wait) -> StepClock:
-        """Measure the true step rate by two runs at `rate_dps`, deg/s, steady for `short_s` and `clock_run_s` longer.
+    def time_run(self, rate_dps: float, steady_s: float, wait: Wait) -> TimedRun:
+        """Measure how long a run at `rate_dps`, deg/s, takes that is steady for `steady_s` by the nominal clock.
 
-        Every later rate is by the measured clock. Raises WrongInstrument, RequestRejected, NoReply, LinkError.
+        Raises WrongInstrument, RequestRejected, NoReply, LinkError.
         """
-        self._true = self.settings
-        short_run, long_run = (
-            self._timed_run(plan_move(self.settings, rate_dps, steady_s), wait)
-            for steady_s in (short_s, short_s + self.settings.clock_run_s)
-        )
-        nominal_hz = plan_move(self.settings, rate_dps, short_s).step_hz
-        found = checks.measured_clock(self.name, self.settings, nominal_hz, (short_run, long_run))
-        clock_hz = self.settings.step_clock_hz * found.ratio
-        self._true = self.settings.model_copy(update={"step_clock_hz": clock_hz})
+        move = plan_move(self.settings, rate_dps, steady_s)
+        found = self._timed_run(move, wait)
+        checks.require_plausible(self.name, found, move)
         return found
+
+    def use_step_clock(self, ratio: float) -> None:
+        """Set the step clock that every later rate is computed by, as a share of the nominal one; nothing is sent."""
+        clock_hz = self.settings.step_clock_hz * ratio
+        self._true = self.settings.model_copy(update={"step_clock_hz": clock_hz})
 
     def check_home(self, wait: Wait) -> HomeCheck | None:
         """Measure whether steps were missed: back by counted steps, then home. None: the position is not known.
@@ -188,15 +189,29 @@ class ArrickC4:
         turn = self.settings.steps_per_turn
         self._turn_by(round(self._steps / turn) * turn - round(self._steps), wait)
         took_s = self._timed_home()
-        if self._homing is None:
-            from_home_s = self._timed_home()
-            away = turn // checks.LEARNING_TURN
-            self._turn_by(away, wait)
-            step_s = (self._timed_home() - from_home_s) / away
-            if step_s <= 0:  # the homing does not begin where the table is
-                return None
-            self._homing = checks.Homing(from_home_s, step_s)
-        return self._homing.missed(took_s, self.settings)
+        if self._homing is not None:
+            found = self._homing.check(took_s, self.settings)
+            if found.missed_steps >= -(found.limit_steps + COVERAGE * found.u_steps):
+                return found
+            self._homing = None  # it was learned while replies were late
+        return self._learn_homing(took_s, wait)
+
+    def _learn_homing(self, took_s: float, wait: Wait) -> HomeCheck | None:
+        """Learn the homing from home and from places away from it; returns the check of a homing that took `took_s`."""
+        at_home_s = [self._timed_home(), self._timed_home()]
+        part = self.settings.steps_per_turn // checks.LEARNING_PARTS
+        away, away_s = [part * n for n in checks.LEARNING_TURNS], []
+        for steps in away:
+            self._turn_by(steps, wait)
+            away_s.append(self._timed_home())
+        homing = checks.learned_homing(at_home_s, away, away_s, checks.reply_u_s(self.settings))
+        if homing.step_s <= 0:  # the homing does not begin where the table is
+            return None
+        learning = homing.check_learning(away_s, self.settings)
+        if learning.is_missing:
+            return learning
+        self._homing = homing
+        return homing.check(took_s, self.settings)
 
     def is_moving(self) -> bool:
         """Get whether the table moves (`!1rs`, `0` when idle); raises NoReply, LinkError."""

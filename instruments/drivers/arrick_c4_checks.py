@@ -1,24 +1,29 @@
-"""What an open-loop table finds out about its own steps: the true step rate, and steps missed since home.
+"""What an open-loop table finds out about its own steps: how long its runs take, and steps missed since home.
 
-The C4 tells no position. The homing starts where the table is, so its duration says how far home is from there.
+The C4 tells no position. The homing starts where the table is, so its duration says how far home is from there. A
+duration is as uncertain as the latency of the replies that end it.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+
+import numpy as np
 
 from instruments.clock import Clock
 from instruments.errors import NoReply, WrongInstrument
-from instruments.interfaces.table import HomeCheck, StepClock, Wait
-from instruments.protocols.arrick_c4_moves import Move, TimedRun, step_rate_hz
+from instruments.interfaces.table import HomeCheck, TimedRun, Wait
+from instruments.protocols.arrick_c4_moves import Move
 from instruments.protocols.arrick_c4_settings import ArrickC4Settings
+from instruments.transport.latency import latency_s
 
-#: A clock that is further off has other settings, or the motor stands.
+#: A run that is further off was made with other settings, or the motor stands.
 LARGEST_DEVIATION = 0.2
-#: Share of a table's turn that the homing is measured over, and its rate, deg/s.
-LEARNING_TURN, SLOW_DPS = 16, 22.5
+#: Turns, in parts of a whole one, from which the homing is learned, and the rate, deg/s.
+LEARNING_PARTS, LEARNING_TURNS = 16, (1, 2, 3)
+SLOW_DPS = 22.5
 POLL_S = 0.5
 NO_SPEED = (
     "no constant rate: the C4's speed command is not public; set speed_template of the table in the bench file from "
@@ -27,29 +32,16 @@ NO_SPEED = (
 )
 
 
-def measured_clock(
-    device: str, settings: ArrickC4Settings, nominal_hz: float, runs: tuple[TimedRun, TimedRun]
-) -> StepClock:
-    """Return the step clock by two runs at a nominal step rate.
-
-    Raises WrongInstrument for a rate that no clock error explains.
-    """
-    short, long = runs
-    ratio = step_rate_hz(short, long) / nominal_hz if long.duration_s > short.duration_s else math.inf
-    if abs(ratio - 1) > LARGEST_DEVIATION:
-        raise WrongInstrument(
-            device,
-            f"the motor steps at {100 * ratio:.4g} % of the rate that the bench file gives, limit "
-            f"+-{100 * LARGEST_DEVIATION:g} % from 100 %; check step_clock_hz, speed_template and that the motor turns",
-        )
-    u_s = 2 * settings.reply_u_s  # of four replies; what all of them have in common cancels
-    return StepClock(
-        ratio, 1e6 * u_s / (long.duration_s - short.duration_s), settings.step_clock_hz, settings.clock_u_ppm
-    )
+def reply_u_s(settings: ArrickC4Settings) -> float:
+    """Return the standard uncertainty of when a reply arrives, s: stated, or that of a latency from 0 to its limit."""
+    return settings.reply_u_s or latency_s(settings.port) / math.sqrt(12.0)
 
 
 def timed(clock: Clock, move: Move, await_end: Callable[[float], None], wait: Wait, start_s: float) -> TimedRun:
-    """Return a move with its true duration; `await_end` waits for its end for some seconds, or raises NoReply."""
+    """Return a move with its true duration; `await_end` waits for its end for some seconds, or raises NoReply.
+
+    Raises NoReply, and WrongInstrument for a duration that no clock explains.
+    """
     earliest_s = start_s + (1 - LARGEST_DEVIATION) * move.duration_s
     latest_s = start_s + (1 + 2 * LARGEST_DEVIATION) * move.duration_s + POLL_S
     wait(max(earliest_s - clock.now_s(), 0.0))
@@ -61,17 +53,56 @@ def timed(clock: Clock, move: Move, await_end: Callable[[float], None], wait: Wa
             if clock.now_s() >= latest_s:
                 raise
             wait(0.0)
-    return TimedRun(move.steps, clock.now_s() - start_s)
+    return TimedRun(start_s, clock.now_s() - start_s, abs(move.steps), move.step_hz)
 
 
-@dataclass
+def require_plausible(device: str, run: TimedRun, move: Move) -> None:
+    """Raise WrongInstrument for a run whose duration no error of a step clock explains."""
+    share = move.duration_s / run.duration_s
+    if abs(share - 1) > LARGEST_DEVIATION:
+        raise WrongInstrument(
+            device,
+            f"{run.steps} steps took {run.duration_s:.3f} s, so the motor steps at about {100 * share:.4g} % of the "
+            f"rate that the bench file gives, limit +-{100 * LARGEST_DEVIATION:g} % from 100 %; check step_clock_hz, "
+            "speed_template and that the motor turns",
+        )
+
+
+@dataclass(frozen=True)
 class Homing:
     """How long the homing takes from the place that is home, and longer for each step away from it."""
 
     from_home_s: float
     step_s: float
+    u_s: float  #: standard uncertainty of one duration
 
-    def missed(self, took_s: float, settings: ArrickC4Settings) -> HomeCheck:
-        """Return how many steps away from home a homing began."""
-        steps = max(took_s - self.from_home_s, 0.0) / self.step_s
-        return HomeCheck(float(round(steps)), settings.home_limit_steps, 360.0 / settings.steps_per_turn)
+    @property
+    def u_steps(self) -> float:
+        """Standard uncertainty of a number of steps: of a duration less that from home."""
+        return math.sqrt(2.0) * self.u_s / self.step_s
+
+    def check(self, took_s: float, settings: ArrickC4Settings) -> HomeCheck:
+        """Return how many steps away from home a homing began; fewer than none where it ended sooner than from home."""
+        return self._check((took_s - self.from_home_s) / self.step_s, settings)
+
+    def check_learning(self, took_s: Sequence[float], settings: ArrickC4Settings) -> HomeCheck:
+        """Return how many steps were missed in the turns, of equal spacing, that the homing was learned from."""
+        beside = np.abs(np.diff(np.asarray(took_s) / self.step_s, 2))
+        found = self._check(float(beside.max()) / 2, settings)  # a place in the middle counts twice
+        return HomeCheck(found.missed_steps, found.u_steps, found.limit_steps, found.step_deg, found.step_s, True)
+
+    def _check(self, steps: float, settings: ArrickC4Settings) -> HomeCheck:
+        return HomeCheck(
+            round(steps, 1), self.u_steps, settings.home_limit_steps, 360.0 / settings.steps_per_turn, self.step_s
+        )
+
+
+def learned_homing(at_home_s: Sequence[float], away: Sequence[int], took_s: Sequence[float], u_s: float) -> Homing:
+    """Return the homing by its durations from home, (m,) s, and from places `away` steps from there, (n,) s each.
+
+    `u_s` is the least standard uncertainty of a duration. A slope that is none means that the homing does not begin
+    where the table is.
+    """
+    slope, _ = np.polyfit(away, took_s, 1)
+    scatter = float(np.std(at_home_s, ddof=1)) if len(at_home_s) > 1 else 0.0
+    return Homing(float(np.mean(at_home_s)), float(slope), max(scatter, u_s))

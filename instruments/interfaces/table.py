@@ -15,6 +15,8 @@ from instruments.errors import LimitError
 Reference = Literal["computed", "demanded", "measured"]
 #: By this share a rate may pass a limit that it was computed from.
 ROUNDING = 1e-9
+#: Standard uncertainties beyond its limit from which a figure is no chance.
+COVERAGE = 3.0
 
 
 @dataclass(frozen=True)
@@ -24,7 +26,8 @@ class TableLimits:
     max_rate_dps: float
     max_acceleration_dps2: float
     step_deg: float  #: table angle of one motor step; 0 for a table without steps
-    clock_run_s: float = 0.0  #: difference in duration of the two runs that measure the step clock; 0: not measured
+    clock_run_s: float = 0.0  #: difference in duration of the runs that measure the step clock; 0: not measured
+    clock_limit_ppm: float = 1000.0  #: expanded uncertainty of the measured step clock from which a plan is not run
     checks_home: bool = False  #: whether missed steps are looked for at the home switch
     reference: Reference = "computed"  #: what the rate of a data set is known from
 
@@ -40,22 +43,25 @@ class TableLimits:
 
 @dataclass(frozen=True)
 class StepClock:
-    """The true step rate of a table, by two runs of equal speed and ramp."""
+    """The clock that a table's steps follow, as its bench file states it."""
 
-    ratio: float  #: true step rate over the nominal one
-    u_ppm: float  #: standard uncertainty of the ratio
-    nominal_hz: float  #: clock frequency of the bench file
-    nominal_u_ppm: float  #: and its standard uncertainty
+    nominal_hz: float
+    u_ppm: float  #: standard uncertainty
+
+
+@dataclass(frozen=True)
+class TimedRun:
+    """A finished run of whole steps at constant rate between two ramps."""
+
+    began_s: float  #: clock time
+    duration_s: float  #: from the reply that accepted it to the reply that ended it, by the computer's clock
+    steps: int  #: of the whole run, not signed
+    step_hz: float  #: step rate of the steady part by the nominal clock
 
     @property
-    def deviation_ppm(self) -> float:
-        """Deviation of the true step rate from the nominal one."""
-        return 1e6 * (self.ratio - 1)
-
-    @property
-    def limit_ppm(self) -> float:
-        """Largest deviation that the two uncertainties explain, at three standard deviations."""
-        return float(3 * np.hypot(self.u_ppm, self.nominal_u_ppm))
+    def nominal_s(self) -> float:
+        """Time that its steps take at the nominal step rate, s; ramps and replies come to it."""
+        return self.steps / self.step_hz
 
 
 @dataclass(frozen=True)
@@ -73,13 +79,21 @@ class HomeCheck:
     """Where the table was when it should have been at home."""
 
     missed_steps: float  #: by the duration of the homing
+    u_steps: float  #: its standard uncertainty, by the scatter of homings and the latency of replies
     limit_steps: float
     step_deg: float
+    step_s: float  #: by how much each step away makes the homing longer
+    learning: bool = False  #: whether they were missed in the turns that the check itself makes to learn from
 
     @property
     def is_missing(self) -> bool:
-        """Whether steps were missed."""
-        return self.missed_steps > self.limit_steps
+        """Whether steps were missed, beyond doubt: more than the limit by `COVERAGE` standard uncertainties."""
+        return self.missed_steps > self.limit_steps + COVERAGE * self.u_steps
+
+    @property
+    def is_doubtful(self) -> bool:
+        """Whether more than the limit may be missing, or a reply was only late."""
+        return self.missed_steps > self.limit_steps and not self.is_missing
 
 
 @dataclass(frozen=True)
@@ -170,8 +184,14 @@ Wait = Callable[[float], None]
 class OpenLoopTable(Protocol):
     """What a table without an encoder can find out about its own steps. Its limits say whether a plan asks for it."""
 
-    def measure_clock(self, rate_dps: float, short_s: float, wait: Wait) -> StepClock:
-        """Measure the true step rate by two runs at `rate_dps`; every later rate is by it. `wait` passes the time."""
+    step_clock: StepClock
+
+    def time_run(self, rate_dps: float, steady_s: float, wait: Wait) -> TimedRun:
+        """Turn at `rate_dps` by the nominal clock, steady for at least `steady_s`, and time it; `wait` passes time."""
+        ...
+
+    def use_step_clock(self, ratio: float) -> None:
+        """Compute every later rate by a step clock that runs at `ratio` of the nominal one."""
         ...
 
     def check_home(self, wait: Wait) -> HomeCheck | None:

@@ -28,24 +28,11 @@ class Move:
         return self.steady_s + 2 * self.ramp_s
 
 
-@dataclass(frozen=True)
-class TimedRun:
-    """A finished move: whole steps, and the time from its acceptance to its end."""
-
-    steps: int
-    duration_s: float
-
-
 def finite_move(settings: StepperSettings, rate_dps: float, steps: int) -> Move:
     """Return a move of exactly `steps` (signed, not 0) at the nearest achievable rate; a short one stays below it."""
     usual = plan_move(settings, rate_dps, 0.0)
     steady = max(abs(steps) - 2 * usual.ramp_steps, 0.0) / usual.step_hz
     return replace(usual, steps=steps, steady_s=steady)
-
-
-def step_rate_hz(short: TimedRun, long: TimedRun) -> float:
-    """Return the step rate of two runs of equal speed and ramp: what both take for ramps and replies cancels."""
-    return (abs(long.steps) - abs(short.steps)) / (long.duration_s - short.duration_s)
 
 
 def plan_move(settings: StepperSettings, rate_dps: float, steady_s: float) -> Move:

@@ -38,10 +38,11 @@ class ArrickC4Settings(StepperSettings):
     terminator: str = "\r"
     #: Motors energised, limits removed and the like: once per opening of the link, before the table moves.
     init_commands: tuple[InitCommand, ...] = ()
-    #: Difference in duration of the two runs that measure the step clock, s; 0: the clock is not measured.
+    #: Difference in duration of the runs that measure the step clock, s; 0: the clock is not measured.
     clock_run_s: float = Field(default=60.0, ge=0, le=3600)
-    reply_u_s: float = Field(
-        default=0.001, gt=0
-    )  #: standard uncertainty of when a reply arrives, without what is common
+    #: Expanded uncertainty of the measured step clock from which on the runs are said to disagree, ppm.
+    clock_limit_ppm: float = Field(default=1000.0, gt=0)
+    #: Standard uncertainty of when a reply arrives, without what is common, s. None: by the latency of the adapter.
+    reply_u_s: float | None = Field(default=None, gt=0)
     check_home: bool = True  #: look for missed steps at the home switch before and after each temperature
     home_limit_steps: float = Field(default=2.0, gt=0)  #: more missed steps end the campaign

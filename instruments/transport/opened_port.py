@@ -8,6 +8,7 @@ import serial
 from serial.rs485 import RS485, RS485Settings
 
 from instruments.protocols.serial_options import Rs485Options
+from instruments.transport.latency import lower_latency
 from instruments.transport.serial import PARITIES, Line, SerialPort
 
 
@@ -33,6 +34,7 @@ def open_port(
     if line.rts is not None:
         port.rts = line.rts
     port.open()
+    lower_latency(port)
     if line.rs485 is not None:
         try:
             port.rs485_mode = _direction(line.rs485)

@@ -7,7 +7,7 @@ the environment, which come every second, stay in the database.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from datetime import datetime
 from typing import Any
@@ -17,6 +17,7 @@ from labctl.log import get_logger
 from labctl.log.rendering import error_fields
 from procedures.contracts.campaign_state import CampaignState
 from procedures.contracts.journal import (
+    ClockRun,
     DataSetHeader,
     DataSetState,
     EnvironmentSample,
@@ -116,6 +117,17 @@ class LoggedJournal:
         """Record what the table's encoder said."""
         with self._refusals("table.angles", dataset=dataset):
             self._journal.table_angles(dataset, angles)
+
+    def timed_run(self, run: ClockRun) -> None:
+        """Record and log a run that times the step clock."""
+        late_s = round(run.duration_s - run.nominal_s, 6)
+        with self._entry("table.timed_run", nominal_s=run.nominal_s, late_s=late_s, t_s=_seconds(run.t_s)):
+            self._journal.timed_run(run)
+
+    def step_clock(self, u_ppm: float, freedom: int, factor: Callable[[float], float]) -> None:
+        """Record that rates are by all timed runs so far; the event that says so is logged."""
+        with self._refusals("step_clock"):
+            self._journal.step_clock(u_ppm, freedom, factor)
 
     def dataset_closed(self, dataset: int, state: DataSetState, reason: str = "") -> None:
         """Record and log that no more readings follow."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
 from enum import StrEnum
@@ -72,6 +72,19 @@ class EnvironmentSample:
     references: Mapping[str, float] = field(default_factory=dict)  #: column -> value of a reference instrument
 
 
+@dataclass(frozen=True)
+class ClockRun:
+    """One run of a table without an encoder that was timed to measure its step clock."""
+
+    session: int  #: of this process and its link: replies are equally late in it
+    block: int  #: runs that were made one after the other
+    t_s: float  #: campaign time of its middle
+    nominal_s: float  #: time that its steps take at the nominal step rate
+    duration_s: float  #: by the computer's clock
+    step_hz: float  #: nominal step rate: ramps are equal at one rate
+    used: bool = False  #: whether the rates of the data sets so far are by it, too
+
+
 #: Beginning of the text of a `safe_state` event that names what could not be confirmed.
 NOT_SAFE = "NOT confirmed safe: "
 
@@ -122,6 +135,17 @@ class Journal(Protocol):
 
     def table_angles(self, dataset: int, angles: TableAngles) -> None:
         """Record what the table's encoder said during a data set that is open, and the rate that follows."""
+        ...
+
+    def timed_run(self, run: ClockRun) -> None:
+        """Record a run that times the step clock."""
+        ...
+
+    def step_clock(self, u_ppm: float, freedom: int, factor: Callable[[float], float]) -> None:
+        """Record that rates are by all timed runs so far: their standard uncertainty and its degrees of freedom.
+
+        `factor` gives by what the rate of a data set so far is multiplied, from the campaign time of its gate.
+        """
         ...
 
     def dataset_closed(self, dataset: int, state: DataSetState, reason: str = "") -> None:

@@ -41,11 +41,12 @@ class Home(StepBase):
 
 
 class MeasureClock(StepBase):
-    """The true step rate of a table without an encoder is measured: two runs of equal speed and ramp."""
+    """The true step rate of a table without an encoder is measured: runs of equal speed and ramp, short and long."""
 
     kind: Literal["measure_clock"] = "measure_clock"
     rate_dps: float
-    short_s: float  #: steady part of the shorter run
+    short_s: float  #: steady part of the shortest run
+    runs_s: tuple[float, ...] = ()  #: steady part of each run; none in plans of earlier versions
 
 
 class CheckHome(StepBase):

@@ -12,6 +12,7 @@ from procedures.contracts.journal import DataSetHeader, DataSetState
 from procedures.contracts.steps import Acquire
 from procedures.execution import late_readings
 from procedures.execution.context import UNIT_FAULTS, ExecutionContext, raise_violation
+from procedures.execution.table_checks import follow_clock
 from procedures.execution.waiting import checkpoint, pass_time
 from procedures.monitoring.bench_snapshot import ReadingCounts
 from procedures.monitoring.campaign_time import CampaignTime
@@ -84,6 +85,7 @@ def _take(context: ExecutionContext, step: Acquire) -> dict[str, float]:
     ramp_s = abs(step.rate_dps) / context.bench.table.limits.max_acceleration_dps2
     if context.monitor.is_due(within_s=ramp_s):
         context.poll()
+    follow_clock(context)
     spin = context.bench.table.spin(step.rate_dps, _steady_s(context, step))
     watch = TableWatch(context.bench.table, context.clock, spin)
     encoder = EncoderLog(context.bench.table, context.clock)

@@ -11,7 +11,7 @@ from instruments.configuration import changed, configuration_of
 from instruments.errors import InstrumentError, WrongInstrument
 from procedures.contracts.bench import Bench
 from procedures.contracts.control import Control
-from procedures.contracts.journal import Event
+from procedures.contracts.journal import ClockRun, Event
 from procedures.contracts.operator import Operator
 from procedures.contracts.steps import Soak
 from procedures.execution.active_bench import ActiveBench
@@ -43,6 +43,8 @@ class ExecutionContext:
     soaked: Soak | None = None  #: the soak that still holds: its temperature has not been left since
     owed_soak: Soak | None = None  #: the soak to be done again before the next data set
     unchecked: list[int] = field(default_factory=list)  #: data sets since home was last found where it was left
+    clock_session: int = 1  #: of timed runs: a resumed campaign begins another
+    clock_runs: list[ClockRun] = field(default_factory=list)  #: every run so far that timed the step clock
     warned_of_rate: bool = False  #: whether it was said that the table does not turn as commanded
     _prompts: int = field(default=0, repr=False)
     _set: dict[str, dict[str, str]] = field(default_factory=dict, repr=False)  #: unit -> how it was set so far

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from procedures.contracts.errors import StepFailed
-from procedures.contracts.journal import Event
+from procedures.contracts.journal import ClockRun, Event
 from procedures.contracts.operator import Prompt
 from procedures.contracts.steps import Acquire, Soak, Step, Turn
 from procedures.execution.context import ExecutionContext
@@ -31,6 +31,7 @@ class Restart:
     added_runs: int = 0  #: powered sessions more than the plan has, this one among them
     dropped: Mapping[str, str] = field(default_factory=dict)  #: units that were excluded, and why
     skipped: frozenset[int] = frozenset()  #: steps that were left out before
+    clock_runs: tuple[ClockRun, ...] = ()  #: that timed the step clock before
 
 
 def soak_matters_after_s(rules: ResumeRules, band_c: float, ramp_c_per_min: float) -> float:

@@ -6,15 +6,12 @@ from collections.abc import Callable, Mapping
 
 from instruments.errors import LinkError
 from instruments.interfaces.gyro import Gyro
-from instruments.interfaces.table import OpenLoopTable
 from instruments.positions import Position
-from procedures.contracts.errors import GuardTripped, SoakFailed, StepFailed, TableStopped
-from procedures.contracts.journal import DataSetState, Event
+from procedures.contracts.errors import GuardTripped, SoakFailed, StepFailed
+from procedures.contracts.journal import Event
 from procedures.contracts.operator import Prompt
 from procedures.contracts.steps import (
-    CheckHome,
     Home,
-    MeasureClock,
     Mount,
     MoveChamber,
     PowerOff,
@@ -29,6 +26,7 @@ from procedures.execution.context import ExecutionContext
 from procedures.execution.prompting import ask
 from procedures.execution.safe_state import make_safe
 from procedures.execution.soak_criterion import SoakCriterion
+from procedures.execution.table_checks import check_home, measure_clock
 from procedures.execution.waiting import pass_time, polls, record_for
 
 Figures = dict[str, float]
@@ -185,73 +183,6 @@ def safe_state(context: ExecutionContext, _step: SafeState) -> Figures:
     if complaints := make_safe(context.full_bench, context.clock):
         raise StepFailed("NOT confirmed safe: " + "; ".join(complaints))
     return {}
-
-
-def measure_clock(context: ExecutionContext, step: MeasureClock) -> dict[str, float]:
-    """Measure the true step rate; every later rate is by it. A clock beyond its uncertainty is a warning."""
-    table = context.bench.table
-    if not isinstance(table, OpenLoopTable):
-        return {}
-    found = table.measure_clock(step.rate_dps, step.short_s, lambda wait_s: _watched_wait(context, wait_s))
-    beyond = abs(found.deviation_ppm) > found.limit_ppm
-    text = (
-        f"{table.name}: the step rate is {found.deviation_ppm:+.0f} ppm off step_clock_hz = "
-        f"{found.nominal_hz:g} Hz, u = {found.u_ppm:.0f} ppm, limit {found.limit_ppm:.0f} ppm; rates are "
-        "computed from the measured clock"
-    )
-    if beyond:
-        text += f": set step_clock_hz = {found.nominal_hz * found.ratio:.0f} in the bench file"
-    context.recorder.event(
-        Event(
-            "table_clock",
-            text,
-            level="warning" if beyond else "info",
-            device=table.name,
-            value=found.deviation_ppm,
-            limit=found.limit_ppm,
-            unit="ppm",
-        )
-    )
-    return {
-        "step_clock_ratio": found.ratio,
-        "step_clock_hz": found.nominal_hz * found.ratio,
-        "deviation_ppm": found.deviation_ppm,
-        "u_ppm": found.u_ppm,
-        "limit_ppm": found.limit_ppm,
-    }
-
-
-def check_home(context: ExecutionContext, step: CheckHome) -> dict[str, float]:
-    """Look for missed steps. Those that were found end the campaign, and the data sets since the last check with it.
-
-    Raises TableStopped, InstrumentError.
-    """
-    table = context.bench.table
-    if not isinstance(table, OpenLoopTable):
-        return {}
-    found = table.check_home(lambda wait_s: _watched_wait(context, wait_s))
-    since, context.unchecked = context.unchecked, []
-    if found is None:
-        return {}
-    if found.is_missing:
-        reason = (
-            f"{table.name}: home is {found.missed_steps:g} steps ({found.missed_steps * found.step_deg:.3g} deg) from "
-            f"where it was left, limit {found.limit_steps:g} steps, at {step.temperature_c:g} deg C; steps were "
-            "missed: check load, acceleration_dps2 and supply of the motor"
-        )
-        for number in since:
-            context.recorder.journal.dataset_closed(number, DataSetState.PARTIAL, reason)
-        raise TableStopped(reason, {"missed_steps": found.missed_steps})
-    return {"missed_steps": found.missed_steps, "limit_steps": found.limit_steps}
-
-
-def _watched_wait(context: ExecutionContext, wait_s: float) -> None:
-    """Let time pass under control of requests, with the bench watched."""
-    until_s = context.clock.now_s() + wait_s
-    while (left_s := until_s - context.clock.now_s()) > 0:
-        if context.monitor.is_due():
-            context.poll()
-        pass_time(context, min(left_s, 1.0), pausing=False)
 
 
 HANDLERS: Mapping[str, Callable[..., Figures]] = {

@@ -85,7 +85,7 @@ class Plan(BaseModel):
         if index >= len(self.steps) or isinstance(self.steps[index], SafeState) or not self._drives:
             return ()
         before = self.steps[:index]
-        home: tuple[Step, ...] = (Home(), *(step for step in before if isinstance(step, MeasureClock)))
+        home: tuple[Step, ...] = (Home(), *[step for step in before if isinstance(step, MeasureClock)][:1])
         if isinstance(self.steps[index], Home | MeasureClock):
             return (Home(),)
         if isinstance(self.steps[index], MoveChamber):
@@ -137,6 +137,8 @@ class Plan(BaseModel):
 
 def _unset(step: Step) -> set[str]:
     """Return the names that plans of before a later version do not have, where the step does not use them."""
+    if isinstance(step, MeasureClock) and not step.runs_s:
+        return {"runs_s"}
     return {"verification"} if isinstance(step, Acquire) and not step.verification else set()
 
 

@@ -18,6 +18,7 @@ from procedures.contracts.steps import (
     Soak,
     Step,
 )
+from procedures.planning.clock_runs import BLOCK_EVERY_S, FIRST_RUNS, LATER_RUNS, run_lengths_s
 from procedures.planning.limits import BenchLimits
 from procedures.planning.point_order import Level, MountingBlock, order_points, verification_blocks
 from procedures.planning.turn_steps import turn_steps
@@ -53,16 +54,20 @@ class _StepWriter:
         self.mounting = 0
         self.run = 0
         self.datasets = 0
+        self.timed_runs = 0
+        self.timed_at = 0
 
     def write(self) -> None:
         self.steps.append(Home(expected_s=HOMING_S))
-        self.measure_clock()
+        self.measure_clock(FIRST_RUNS)
         for block in order_points(self.recipe):
             self.measure(block)
         self.power_cycles()
         for block in verification_blocks(self.recipe):
             levels = tuple(Level(each.temperature_c, self.runnable(each.rates_dps)) for each in block.levels)
             self.measure(replace(block, levels=levels))
+        if any(isinstance(step, Acquire) and step.rate_dps for step in self.steps[self.timed_at :]):
+            self.measure_clock(LATER_RUNS)
         self.steps.append(SafeState())
 
     def runnable(self, drawn_dps: tuple[float, ...]) -> tuple[float, ...]:
@@ -79,15 +84,25 @@ class _StepWriter:
             self.check_home(level)
             self.acquire(level, verification=block.verification)
             self.check_home(level)
+            self.measure_clock_again()
 
-    def measure_clock(self) -> None:
-        """Measure the step clock at the largest rate of the recipe, where the table does that."""
+    def measure_clock(self, runs: int) -> None:
+        """Time the step clock at the largest rate of the recipe, where the table does that."""
         rate_dps = max((abs(rate) for rate in self.recipe.rates_dps), default=0.0)
         table = self.limits.table
-        if table is not None and table.clock_run_s and rate_dps:
-            ramps_s = 4 * rate_dps / table.max_acceleration_dps2
-            expected_s = 2 * CLOCK_SHORT_S + table.clock_run_s + ramps_s
-            self.steps.append(MeasureClock(rate_dps=rate_dps, short_s=CLOCK_SHORT_S, expected_s=expected_s))
+        if table is None or not table.clock_run_s or not rate_dps:
+            return
+        runs_s = run_lengths_s(runs, self.timed_runs, CLOCK_SHORT_S, table.clock_run_s)
+        expected_s = sum(runs_s) + 2 * runs * rate_dps / table.max_acceleration_dps2
+        step = MeasureClock(rate_dps=rate_dps, short_s=CLOCK_SHORT_S, runs_s=runs_s, expected_s=expected_s)
+        self.steps.append(step)
+        self.timed_runs += runs
+        self.timed_at = len(self.steps)
+
+    def measure_clock_again(self) -> None:
+        """Time it again where the last time was long ago."""
+        if math.fsum(step.expected_s for step in self.steps[self.timed_at :]) >= BLOCK_EVERY_S:
+            self.measure_clock(LATER_RUNS)
 
     def check_home(self, level: Level) -> None:
         """Look for missed steps, where the table does that and turns at this level."""

@@ -18,6 +18,8 @@ class RecordingJournal:
         self.headers: list[Any] = []
         self.closed: list[tuple[int, str, str]] = []
         self.angles: list[tuple[int, Any]] = []
+        self.timed_runs: list[Any] = []
+        self.clock_u: list[tuple[float, int]] = []
         self.blocks: list[tuple[int, str, Readings, float]] = []
         self.samples: list[Any] = []
         self.events: list[Any] = []
@@ -63,6 +65,14 @@ class RecordingJournal:
     def table_angles(self, dataset: int, angles: Any) -> None:
         self.angles.append((dataset, angles))
         self._reported("table_angles", dataset)
+
+    def timed_run(self, run: Any) -> None:
+        self.timed_runs.append(run)
+        self._reported("timed_run", run)
+
+    def step_clock(self, u_ppm: float, freedom: int, factor: Callable[[float], float]) -> None:
+        self.clock_u.append((u_ppm, freedom))
+        self._reported("step_clock", u_ppm)
 
     def dataset_closed(self, dataset: int, state: Any, reason: str = "") -> None:
         self.closed.append((dataset, str(state), reason))

@@ -42,6 +42,9 @@ class SimulatedC4:
         self._divisor: int | None = None
         #: True step rate over that of the divisor: `[simulation] table = { step_clock_ratio = ... }`.
         self.clock_ratio = number(setup.world.settings.table, "step_clock_ratio", 1.0)
+        #: By how much that changes, ppm/h; period of the timer at which the USB adapter passes received bytes on, s.
+        self.clock_drift_ppm_per_h = number(setup.world.settings.table, "step_clock_drift_ppm_per_h", 0.0)
+        self.latency_s = number(setup.world.settings.table, "reply_latency_s", 0.0)
         self.missed_steps = 0  #: the next move is so much shorter than what was asked for
         self._line = bytearray()
         self._replies: list[_Reply] = []
@@ -72,8 +75,12 @@ class SimulatedC4:
     def _reply(self, text: str, t_s: float) -> float:
         """Queue a reply; returns when its last byte is sent."""
         due_s = t_s + len(text) * self._byte_s
-        self._replies.append(_Reply(due_s, text.encode("ascii")))
+        self._replies.append(_Reply(self._passed_on_s(due_s), text.encode("ascii")))
         return due_s
+
+    def _passed_on_s(self, due_s: float) -> float:
+        """Return when bytes that the controller has sent reach the computer."""
+        return math.ceil(due_s / self.latency_s) * self.latency_s if self.latency_s else due_s
 
     def _execute(self, command: str, t_s: float) -> None:
         if not command.startswith(lines.PREFIX):
@@ -113,7 +120,8 @@ class SimulatedC4:
     def _move(self, way: str, steps: int, divisor: int, t_s: float) -> None:
         start_s = self._reply(lines.ACCEPTED, t_s)
         signed = (steps if way == "f" else -steps) * self._direction
-        step_hz = self.clock_ratio * self._clock_hz / divisor
+        ratio = self.clock_ratio + 1e-6 * self.clock_drift_ppm_per_h * start_s / 3600.0
+        step_hz = ratio * self._clock_hz / divisor
         signed -= int(math.copysign(min(self.missed_steps, steps), signed))
         self.missed_steps = 0
         end_s = self._world.table.start(start_s, signed, step_hz, self._acceleration_dps2)
@@ -123,4 +131,4 @@ class SimulatedC4:
 
     def _finish(self, end_s: float, t_s: float) -> None:
         if self._faults.trigger(["lost_reply"], t_s) is None:
-            self._replies.append(_Reply(end_s + self._byte_s, lines.FINISHED.encode("ascii")))
+            self._replies.append(_Reply(self._passed_on_s(end_s + self._byte_s), lines.FINISHED.encode("ascii")))

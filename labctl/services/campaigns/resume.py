@@ -113,6 +113,7 @@ def prepare_resume(
         added_runs=added,
         dropped=standing.dropped,
         skipped=standing.skipped,
+        clock_runs=standing.clock_runs,
     )
     return Prepared(
         campaign, plan, bench, clock, operator_of(bench), standing.start_at, restart, CampaignTime(clock, t_s)

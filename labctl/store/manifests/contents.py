@@ -150,6 +150,10 @@ CAMPAIGN = Kind(
             "events", _T.events, "campaign_id", "at t_s kind level message device value limit_value unit", "id",
         ),
         Part("recordings", _T.recordings, "campaign_id", "id serial gyro", "id"),
+        Part(
+            "timed runs", _T.timed_runs, "campaign_id", "session block t_s nominal_s duration_s step_hz used", "id",
+            since="0023", was_empty=True,
+        ),
     ),
     lambda row: f"campaign {row[0]}",
     "id",

@@ -6,8 +6,9 @@ that is open, which is redone anyway; closing a data set, and every change of st
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import asdict
 from datetime import datetime
 from typing import Any, cast
 
@@ -30,10 +31,19 @@ from labctl.store.repositories.sample_blocks import (
     write_block,
     write_final_block,
 )
+from labctl.store.repositories.timed_runs import write_step_clock
 from labctl.store.schema import tables
 from labctl.store.sealing.seals import changing, of_campaign, prepared_recordings, sealed_at
 from procedures.contracts.campaign_state import ENDED, CampaignState
-from procedures.contracts.journal import NOT_SAFE, DataSetHeader, DataSetState, EnvironmentSample, Event, TableAngles
+from procedures.contracts.journal import (
+    NOT_SAFE,
+    ClockRun,
+    DataSetHeader,
+    DataSetState,
+    EnvironmentSample,
+    Event,
+    TableAngles,
+)
 from procedures.contracts.steps import Acquire, StepResult
 from procedures.execution.signals import defer_signals
 
@@ -210,6 +220,22 @@ class StoreJournal:
         mine = (d.c.recording_id.in_(self._recordings.values()), d.c.number == dataset)
         with self._writing(synced=False) as connection:
             connection.execute(sa.update(d).where(*mine).values(**values))
+
+    @outlasting
+    def timed_run(self, run: ClockRun) -> None:
+        """Record a run that times the step clock."""
+        with self._writing() as connection:
+            connection.execute(sa.insert(tables.timed_runs).values(campaign_id=self._campaign, **asdict(run)))
+
+    @outlasting
+    def step_clock(self, u_ppm: float, freedom: int, factor: Callable[[float], float]) -> None:
+        """Correct the rates of the data sets so far, and record their uncertainty among the standards of recordings.
+
+        It takes the place of what was expected when the campaign was planned.
+        """
+        measured = {"u": u_ppm, "expanded": None, "half_width": None, "freedom": float(freedom)}
+        with self._writing() as connection:
+            write_step_clock(connection, self._campaign, measured, factor)
 
     @outlasting
     def dataset_closed(self, dataset: int, state: DataSetState, reason: str = "") -> None:

@@ -14,10 +14,11 @@ from labctl.store.connection.transactions import transaction
 from labctl.store.repositories.audit import append
 from labctl.store.repositories.campaign_journal import StoreJournal
 from labctl.store.repositories.sample_blocks import blocks_of
+from labctl.store.repositories.timed_runs import timed_runs
 from labctl.store.schema import tables
 from labctl.store.sealing.seals import changing, of_campaign, prepared_recordings
 from procedures.contracts.campaign_state import CampaignState
-from procedures.contracts.journal import DataSetState
+from procedures.contracts.journal import ClockRun, DataSetState
 from procedures.contracts.steps import StepResult
 
 #: Events after which a temperature has to be soaked again, and events after which it has been.
@@ -38,6 +39,7 @@ class ResumePoint:
     added_runs: int
     boot_id: str | None
     dropped: dict[str, str]  #: gyro -> why it is excluded from the rest of the campaign
+    clock_runs: tuple[ClockRun, ...]  #: that timed the step clock
     tries: int  #: how often it was resumed since a step ended
 
 
@@ -79,6 +81,7 @@ class ResumePoints:
             last_t_s = self._last_t_s(connection, campaign, recordings)
             ended_s = max((step[3] for step in steps if step[3] is not None), default=-1.0)
             owed, tries = self._events(connection, campaign, ended_s)
+            runs = timed_runs(connection, campaign)
         complete = frozenset(
             step[0] for step in steps if step[1] not in FINISHED and step[2].get("dataset") in planned - {None}
         )
@@ -93,6 +96,7 @@ class ResumePoints:
             added_runs=row.added_runs,
             boot_id=row.boot_id,
             dropped={unit[1]: unit[2] for unit in units if unit[2] is not None},
+            clock_runs=runs,
             tries=tries,
         )
 

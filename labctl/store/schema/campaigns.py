@@ -58,3 +58,18 @@ events = sa.Table(
     sa.Column("unit", sa.String(20)),
     sa.Index(None, "campaign_id", "id"),
 )
+
+timed_runs = sa.Table(
+    "timed_runs",
+    metadata,
+    id_column(),
+    campaign_column(),
+    sa.Column("session", sa.Integer, nullable=False),  #: of the process and its link to the table
+    sa.Column("block", sa.Integer, nullable=False),  #: runs that were made one after the other
+    sa.Column("t_s", sa.Float, nullable=False),  #: campaign time of its middle
+    sa.Column("nominal_s", sa.Float, nullable=False),  #: time that its steps take at the nominal step rate
+    sa.Column("duration_s", sa.Float, nullable=False),
+    sa.Column("step_hz", sa.Float, nullable=False),  #: nominal step rate
+    sa.Column("used", sa.Boolean, nullable=False),  #: whether the rates of the data sets are by it, too
+    sa.Index(None, "campaign_id", "id"),
+)

@@ -12,7 +12,7 @@ from labctl.store.schema.calibrations import (
     certifications,
     release_requests,
 )
-from labctl.store.schema.campaigns import campaigns, events, steps
+from labctl.store.schema.campaigns import campaigns, events, steps, timed_runs
 from labctl.store.schema.certificates import certificate_withdrawals, certificates
 from labctl.store.schema.drafts import drafts
 from labctl.store.schema.manifests import block_digests, manifest_head, manifests
@@ -66,5 +66,6 @@ __all__ = [
     "standards",
     "start_events",
     "steps",
+    "timed_runs",
     "units",
 ]

@@ -168,7 +168,7 @@ def test_an_open_port_is_judged_by_name_adapter_users_and_latency(
     port.write_text("")
     (folder / "usb-FTDI_A9-if00-port0").symlink_to(port)
     monkeypatch.setattr("instruments.transport.port_failures.BY_ID", folder)
-    monkeypatch.setattr(port_checks, "SYS_TTY", tmp_path / "sys")
+    monkeypatch.setattr("instruments.transport.latency.SYS_TTY", tmp_path / "sys")
     monkeypatch.setattr(port_checks, "adapter_of", lambda _: "A9")
     monkeypatch.setattr(port_checks, "users_of", lambda _: ["process 812 (ModemManager)"])
     found = port_checks.of_open_port(str(port), wants_quick=True)

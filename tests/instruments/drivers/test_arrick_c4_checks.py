@@ -10,7 +10,9 @@ import pytest
 
 from instruments.bench import open_bench
 from instruments.errors import NoReply, RequestRejected, WrongInstrument
-from instruments.protocols.arrick_c4_moves import TimedRun, step_rate_hz
+from procedures.contracts.journal import ClockRun
+from procedures.monitoring.step_clock import measured
+from procedures.planning.clock_runs import run_lengths_s
 
 Make = Callable[..., Any]
 URL = "sim://arrick"
@@ -33,10 +35,9 @@ def waiting(stand: Any) -> Callable[[float], None]:
     return sleep
 
 
-def test_two_runs_of_equal_speed_and_ramp_give_the_step_rate() -> None:
-    """Ramps of 1.7 s and a reply that is always 16 ms late cancel."""
-    runs = [TimedRun(steps, 2 * 1.7 + (steps - 340) / 400 + 0.016) for steps in (4340, 28340)]
-    assert step_rate_hz(*runs) == pytest.approx(400, rel=1e-12)
+def runs_of(table: Any, s: Any, *lengths_s: float) -> list[ClockRun]:
+    timed = [table.time_run(90.0, steady_s, waiting(s)) for steady_s in lengths_s]
+    return [ClockRun(1, 1, run.began_s, run.nominal_s, run.duration_s, run.step_hz) for run in timed]
 
 
 @pytest.mark.parametrize("ratio", [1.0, 10 / 11, 1.00005, 0.9993])
@@ -44,10 +45,10 @@ def test_the_true_step_rate_is_measured_and_used(stand: Make, ratio: float) -> N
     s = stand(table=CHECKED, simulation={"table": {"step_clock_ratio": ratio}})
     table = s.bench.table
     table.home()
-    found = table.measure_clock(90.0, 10.0, waiting(s))
+    found = measured(runs_of(table, s, *run_lengths_s(4, 0, 10.0, 60.0)), table.step_clock)
     assert found.ratio == pytest.approx(ratio, abs=2e-6)
-    assert found.u_ppm == pytest.approx(1e6 * 2 * 0.001 / (60.0 / ratio), rel=0.02)  # tens of ppm over 60 s
     assert (abs(found.deviation_ppm) > found.limit_ppm) is (abs(ratio - 1) > 2e-4)
+    table.use_step_clock(found.ratio)
     for asked in (90.0, -33.3, 5.0):
         spin = table.spin(asked, 5.0)
         assert spin.rate_dps == pytest.approx(true_rate_dps(s, spin), rel=3e-6)
@@ -58,26 +59,15 @@ def test_the_true_step_rate_is_measured_and_used(stand: Make, ratio: float) -> N
     )
 
 
-def test_late_replies_cost_only_their_scatter(stand: Make) -> None:
-    s = stand(table=CHECKED)
-    device, rng = s.bench.simulation.device(URL), np.random.default_rng(3)
-    reply = simulated(s)._replies
-    transmit = device._device.transmit
-    assert reply == []
-
-    def late(t_s: float) -> bytes:
-        """16 ms of a USB adapter's latency timer, and 1 ms of scatter."""
-        for each in simulated(s)._replies:
-            if not hasattr(each, "was_late"):
-                each.due_s += 0.016 + 0.001 * float(rng.standard_normal())
-                each.was_late = True
-        return bytes(transmit(t_s))
-
-    device._device.transmit = late
-    s.bench.table.home()
-    found = [s.bench.table.measure_clock(90.0, 10.0, waiting(s)) for _ in range(12)]
-    z = [each.deviation_ppm / each.u_ppm for each in found]
-    assert 0.4 < np.sqrt(np.mean(np.square(z))) < 1.7  # the stated uncertainty is that of the scatter
+@pytest.mark.parametrize("latency_s", [0.001, 0.004, 0.016])
+def test_the_timer_of_an_adapter_is_in_the_uncertainty(stand: Make, latency_s: float) -> None:
+    """Replies come at the ticks of a timer, so that runs of one length would all be late by the same."""
+    s = stand(table=CHECKED, simulation={"table": {"step_clock_ratio": 0.99965, "reply_latency_s": latency_s}})
+    table = s.bench.table
+    table.home()
+    found = measured(runs_of(table, s, *run_lengths_s(6, 0, 10.0, 60.0)), table.step_clock)
+    assert abs(found.deviation_ppm + 350.0) < found.expanded_ppm
+    assert 1e-4 * latency_s < found.fit.scatter_s < latency_s
 
 
 @pytest.mark.parametrize("ratio", [0.5, 1.6])
@@ -85,7 +75,7 @@ def test_a_clock_that_cannot_be_is_refused(stand: Make, ratio: float) -> None:
     s = stand(table=CHECKED, simulation={"table": {"step_clock_ratio": ratio}})
     s.bench.table.home()
     with pytest.raises((WrongInstrument, NoReply), match=r"check (step_clock_hz|power)"):
-        s.bench.table.measure_clock(40.0, 10.0, waiting(s))
+        s.bench.table.time_run(40.0, 10.0, waiting(s))
 
 
 INIT = [{"send": "!1we11", "expect": "a"}, {"send": "!1wl0", "expect": "a"}, {"send": "!1wr0"}]
@@ -177,7 +167,7 @@ def test_home_is_where_it_was_left(stand: Make) -> None:
 @pytest.mark.parametrize("missed", [1, 2, 3, 8, 200])
 @pytest.mark.parametrize("rate", [50.0, -50.0])
 def test_missed_steps_are_counted(stand: Make, missed: int, rate: float) -> None:
-    s = stand(table=CHECKED)
+    s = stand(table=CHECKED | {"reply_u_s": 0.001})
     table = s.bench.table
     table.home()
     assert table.check_home(waiting(s)).missed_steps == 0
@@ -187,6 +177,47 @@ def test_missed_steps_are_counted(stand: Make, missed: int, rate: float) -> None
     assert found.missed_steps == missed
     assert found.is_missing is (missed > 2)
     assert table.check_home(waiting(s)).missed_steps == 0  # home again
+
+
+@pytest.mark.parametrize(("late_s", "missing"), [(0.018, False), (0.2, True)])
+def test_a_late_reply_is_no_missed_step(stand: Make, late_s: float, missing: bool) -> None:
+    """18 ms are three steps of the homing, and one period of an adapter's timer with its usual scatter."""
+    s = stand(table=CHECKED)
+    table = s.bench.table
+    table.home()
+    table.check_home(waiting(s))
+    turned(table, 50.0)
+    delay_replies(s, late_s)
+    found = table.check_home(waiting(s))
+    assert found.missed_steps == pytest.approx(late_s / found.step_s, rel=0.05)
+    assert found.is_missing is missing
+    assert found.is_doubtful is not missing
+
+
+def delay_replies(stand: Any, late_s: float) -> None:
+    """Let the reply that ends a homing come later than the controller sends it."""
+    device = simulated(stand)
+    finish = device._finish
+    device._finish = lambda end_s, t_s: finish(end_s + late_s, t_s)
+
+
+@pytest.mark.parametrize("which", [0, 1, 2])
+def test_steps_that_are_missed_while_the_homing_is_learned_are_found(stand: Make, which: int) -> None:
+    s = stand(table=CHECKED)
+    table, device = s.bench.table, simulated(s)
+    table.home()
+    move, moves = device._move, []
+
+    def missing(way: str, steps: int, divisor: int, t_s: float) -> None:
+        device.missed_steps = 40 if len(moves) == which else 0
+        moves.append(steps)
+        move(way, steps, divisor, t_s)
+
+    device._move = missing
+    found = table.check_home(waiting(s))
+    assert (found.learning, found.is_missing) == (True, True)
+    again = table.check_home(waiting(s))
+    assert (again.learning, again.missed_steps) == (False, 0)
 
 
 def test_after_an_abort_the_place_is_not_known(stand: Make) -> None:

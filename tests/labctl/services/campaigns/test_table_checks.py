@@ -13,7 +13,10 @@ import pytest
 from instruments.bench_config import BenchFile, read_bench
 from instruments.clock import VirtualClock
 from instruments.drivers.resolution import resolve
+from instruments.standards import MEASURED_STEP_CLOCK
 from labctl.fitting import fit
+from labctl.recording import RecordingInfo
+from labctl.services.benches.standards import standards_of
 from labctl.services.campaigns.execution import run
 from labctl.services.campaigns.preparation import prepare
 from labctl.store import open_store
@@ -69,14 +72,63 @@ def test_with_a_slow_step_clock_the_reference_and_the_fit_are_right(tmp_path: Pa
     exact, slow = str(tmp_path / "exact.sqlite"), str(tmp_path / "slow.sqlite")
     assert scale_of(slow, 1 / 1.1) == pytest.approx(scale_of(exact, 1.0), abs=1e-5)
     for location, ratio in ((exact, 1.0), (slow, 1 / 1.1)):
-        ((figures,),) = rows(location, "select result from steps where kind = 'measure_clock'")
-        assert json.loads(figures)["figures"]["step_clock_ratio"] == pytest.approx(ratio, abs=3e-6)
-        ((level, message, value),) = rows(
+        measured = rows(location, "select result from steps where kind = 'measure_clock' order by number")
+        figures = [json.loads(each)["figures"] for (each,) in measured]
+        assert [each["runs"] for each in figures] == [4, 6]  # before the first data set, and after the last
+        assert [each["step_clock_ratio"] for each in figures] == pytest.approx([ratio, ratio], abs=3e-6)
+        for level, message, value in rows(
             location, "select level, message, value from events where kind = 'table_clock'"
-        )
-        assert level == ("info" if ratio == 1 else "warning")
-        assert value == pytest.approx(1e6 * (ratio - 1), abs=3)
-        assert ("set step_clock_hz = 18181" in message) is (ratio != 1)
+        ):
+            assert level == ("info" if ratio == 1 else "warning")
+            assert value == pytest.approx(1e6 * (ratio - 1), abs=3)
+            assert ("set step_clock_hz = 18181" in message) is (ratio != 1)
+
+
+def test_rates_are_by_all_timed_runs_and_their_scatter_is_in_the_record(tmp_path: Path) -> None:
+    """A clock that drifts by 200 ppm/h, behind an adapter that passes bytes on every 4 ms."""
+    location = str(tmp_path / "lab.sqlite")
+    simulated = {"step_clock_ratio": 0.99965, "step_clock_drift_ppm_per_h": 200.0, "reply_latency_s": 0.004}
+    with open_store(location, write=True) as store:
+        recipe = RECIPE.replace("hold_s = 120", "hold_s = 3600")
+        bench = checked_bench(**simulated)
+        (expected,) = [each for each in standards_of(bench) if each.name == MEASURED_STEP_CLOCK]
+        prepared = prepare(store, recipe, bench, VirtualClock(), clip=False)
+        assert run(store, prepared).state == "done"
+        recording = next(iter(store.campaigns.get(prepared.id).recordings.values()))
+        (stated,) = [
+            each
+            for each in RecordingInfo.model_validate(store.recordings.get(recording).info).standards
+            if each.name == MEASURED_STEP_CLOCK
+        ]
+        runs = store.resume_points.of_campaign(prepared.id).clock_runs
+    (last,) = rows(location, "select result from steps where kind = 'measure_clock' order by number desc limit 1")
+    figures = json.loads(last[0])["figures"]
+    assert (stated.u, stated.freedom) == (figures["u_ppm"], figures["freedom"])
+    assert expected.standard_u == pytest.approx(1e6 * np.sqrt(2) * 0.016 / np.sqrt(12) / 60)
+    assert all(each.used for each in runs)
+    assert len(runs) == 6
+    device = prepared.bench.simulation.device("sim://arrick")._device  # type: ignore[union-attr]
+    for rate_dps, gate_s in rows(location, "select table_rate_dps, gate_from_s from data_sets where asked_dps != 0"):
+        true = 0.99965 + 1e-6 * 200.0 * gate_s / 3600.0
+        divisor = round(true * device._clock_hz * device._step_deg / abs(rate_dps))
+        true_dps = true * device._clock_hz / divisor * device._step_deg
+        assert abs(abs(rate_dps) / true_dps - 1) * 1e6 < figures["expanded_ppm"]
+
+
+def test_runs_that_disagree_are_refused_before_the_first_data_set(tmp_path: Path) -> None:
+    location = str(tmp_path / "lab.sqlite")
+    rng = np.random.default_rng(5)
+    with open_store(location, write=True) as store:
+        prepared = prepare(store, RECIPE, checked_bench(), VirtualClock(), clip=False)
+        device = prepared.bench.simulation.device("sim://arrick")._device  # type: ignore[union-attr]
+        finish = device._finish
+        device._finish = lambda end_s, t_s: finish(end_s + 0.5 * float(rng.random()), t_s)
+        answer = run(store, prepared)
+    assert answer.state == "failed"
+    assert "table: the runs that time the step clock disagree: U = " in answer.reason
+    assert "limit 1000 ppm; end other work on this computer" in answer.reason
+    assert rows(location, "select count(*) from data_sets") == [(0,)]
+    assert rows(location, "select count(*) from timed_runs") == [(12,)]
 
 
 def test_missed_steps_end_the_campaign_and_the_data_sets_since_the_last_check(tmp_path: Path) -> None:
@@ -88,13 +140,14 @@ def test_missed_steps_end_the_campaign_and_the_data_sets_since_the_last_check(tm
 
         def missing(way: str, steps: int, divisor: int, t_s: float) -> None:
             moves.append(steps)
-            device.missed_steps = 16 if len(moves) == 12 else 0  # at the second temperature
+            device.missed_steps = 16 if len(moves) == 15 else 0  # at the second temperature
             move(way, steps, divisor, t_s)
 
         device._move = missing
         answer = run(store, prepared)
     assert answer.state == "failed"
-    assert "table: home is 16 steps (3.6 deg) from where it was left, limit 2 steps, at 26 deg C" in answer.reason
+    assert "table: home is 16 steps (3.6 deg) from where it was left, u = 1.0 steps, " in answer.reason
+    assert "limit 2 steps, at 26 deg C" in answer.reason
     states = [state for (state,) in rows(location, "select state from data_sets order by number")]
     assert states == ["complete"] * 5 + ["partial"] * 5
     (reasons,) = rows(location, "select distinct reason from data_sets where state = 'partial'")

@@ -1,0 +1,194 @@
+"""What a table without an encoder finds out about its own steps: the step clock by timed runs, and missed steps."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from instruments.interfaces.table import HomeCheck, OpenLoopTable
+from procedures.contracts.errors import StepFailed, TableStopped
+from procedures.contracts.journal import ClockRun, DataSetState, Event
+from procedures.contracts.steps import CheckHome, MeasureClock
+from procedures.execution.context import ExecutionContext
+from procedures.execution.waiting import pass_time
+from procedures.monitoring import step_clock
+from procedures.monitoring.event_recorder import warning
+from procedures.monitoring.host_stalls import not_run
+from procedures.monitoring.step_clock import LARGEST_CHANGE_PPM, MeasuredClock
+from procedures.planning.clock_runs import FIRST_RUNS, run_lengths_s
+
+#: So many runs are added where those that were planned disagree, and a run is repeated where this computer stalled.
+MOST_ADDED, STALLED_ATTEMPTS = 8, 5
+QUIETEN = "end other work on this computer, and set the latency of the table's USB adapter to 1 ms"
+
+
+def measure_clock(context: ExecutionContext, step: MeasureClock) -> dict[str, float]:
+    """Time runs of the table; every later rate is by the step clock that all runs of the campaign give.
+
+    Raises StepFailed for runs that disagree before the first data set, InstrumentError.
+    """
+    table = context.bench.table
+    if not isinstance(table, OpenLoopTable):
+        return {}
+    first = not any(run.session == context.clock_session for run in context.clock_runs)
+    block = 1 + max((run.block for run in context.clock_runs), default=0)
+    lengths_s = step.runs_s or run_lengths_s(FIRST_RUNS, 0, step.short_s, table.limits.clock_run_s)
+    for steady_s in lengths_s:
+        _add_run(context, table, step.rate_dps, steady_s, block)
+    found = step_clock.measured(context.clock_runs, table.step_clock)
+    for n in range(MOST_ADDED):
+        if found is not None and found.expanded_ppm <= table.limits.clock_limit_ppm:
+            break
+        _add_run(context, table, step.rate_dps, lengths_s[n % len(lengths_s)], block)
+        found = step_clock.measured(context.clock_runs, table.step_clock)
+    if found is None:
+        raise StepFailed(f"the step clock is not known: {len(context.clock_runs)} runs are too few; plan more of them")
+    _require_agreement(context, found, first=first)
+    _use(context, found)
+    _say_clock(context, found)
+    return _figures(found)
+
+
+def _use(context: ExecutionContext, found: MeasuredClock) -> None:
+    """Let every rate be by the step clock as it is known now, those of the data sets so far, too."""
+    before = step_clock.fitted([run for run in context.clock_runs if run.used])
+
+    def factor(t_s: float) -> float:
+        return 1.0 if before is None else found.fit.ratio(t_s) / before.ratio(t_s)
+
+    context.recorder.journal.step_clock(found.u_ppm, found.fit.freedom, factor)
+    context.clock_runs = [replace(run, used=True) for run in context.clock_runs]
+    follow_clock(context)
+
+
+def follow_clock(context: ExecutionContext) -> None:
+    """Have the table compute its rates by its step clock as it is known now; before, they are by the nominal one."""
+    table = context.bench.table
+    fit = step_clock.fitted([run for run in context.clock_runs if run.used])
+    if fit is not None and isinstance(table, OpenLoopTable):
+        table.use_step_clock(fit.ratio(context.recorder.t_s()))
+
+
+def _add_run(context: ExecutionContext, table: OpenLoopTable, rate_dps: float, steady_s: float, block: int) -> None:
+    """Time one run, again where this computer did not run labctl meanwhile, and record it."""
+    for attempt in range(STALLED_ATTEMPTS):
+        stalled_s = context.monitor.stalls.total_s()
+        run = table.time_run(rate_dps, steady_s, lambda wait_s: _watched_wait(context, wait_s))
+        if not (stalled_s := context.monitor.stalls.total_s() - stalled_s) or attempt == STALLED_ATTEMPTS - 1:
+            break
+        text = f"a run that times the step clock is repeated: {not_run(stalled_s)} while it was made"
+        context.recorder.event(warning("run_repeated", text))
+    middle_s = float(context.recorder.time.of(run.began_s + 0.5 * run.duration_s))
+    timed = ClockRun(context.clock_session, block, middle_s, run.nominal_s, run.duration_s, run.step_hz)
+    context.clock_runs.append(timed)
+    context.recorder.journal.timed_run(timed)
+
+
+def _require_agreement(context: ExecutionContext, found: MeasuredClock, *, first: bool) -> None:
+    """Raise StepFailed where runs disagree before data sets rely on them; say it where data sets exist already."""
+    name, limit_ppm = context.bench.table.name, context.bench.table.limits.clock_limit_ppm
+    change = step_clock.change_ppm(context.clock_runs, context.clock_session) if first else None
+    if change is not None and abs(change[0]) > change[1] + LARGEST_CHANGE_PPM:
+        raise StepFailed(
+            f"{name}: the step clock has changed by {change[0]:+.0f} ppm since the campaign was interrupted, limit "
+            f"{change[1] + LARGEST_CHANGE_PPM:.0f} ppm: {QUIETEN} and resume the campaign, or start a new one where "
+            "the controller or its settings were changed"
+        )
+    if found.expanded_ppm <= limit_ppm:
+        return
+    text = (
+        f"{name}: the runs that time the step clock disagree: U = {found.expanded_ppm:.0f} ppm (95 %) by the scatter "
+        f"of {found.runs} runs, {1e3 * found.fit.scatter_s:.1f} ms, limit {limit_ppm:g} ppm; {QUIETEN}, or make the "
+        "runs longer by clock_run_s in the bench file"
+    )
+    if first:
+        raise StepFailed(text)
+    context.recorder.event(
+        Event("table_clock", text, level="warning", device=name, value=found.expanded_ppm, limit=limit_ppm, unit="ppm")
+    )
+
+
+def _say_clock(context: ExecutionContext, found: MeasuredClock) -> None:
+    name, beyond = context.bench.table.name, abs(found.deviation_ppm) > found.limit_ppm
+    text = (
+        f"{name}: the step rate is {found.deviation_ppm:+.0f} ppm off step_clock_hz = {found.nominal.nominal_hz:g} Hz, "
+        f"u = {found.u_ppm:.1f} ppm with {found.fit.freedom} degrees of freedom by the scatter of {found.runs} runs "
+        f"({1e3 * found.fit.scatter_s:.1f} ms), limit {found.limit_ppm:.0f} ppm; rates are by the measured clock"
+    )
+    if found.fit.has_drift:
+        text += f"; it drifts by {found.fit.drift_ppm_per_h:+.1f} ppm/h, u = {found.fit.drift_u_ppm_per_h:.1f} ppm/h"
+    if beyond:
+        text += f": set step_clock_hz = {found.nominal.nominal_hz * found.ratio:.0f} in the bench file"
+    level = "warning" if beyond else "info"
+    context.recorder.event(
+        Event("table_clock", text, level, name, value=found.deviation_ppm, limit=found.limit_ppm, unit="ppm")
+    )
+
+
+def _figures(found: MeasuredClock) -> dict[str, float]:
+    return {
+        "step_clock_ratio": found.ratio,
+        "step_clock_hz": found.nominal.nominal_hz * found.ratio,
+        "deviation_ppm": found.deviation_ppm,
+        "u_ppm": found.u_ppm,
+        "freedom": float(found.fit.freedom),
+        "expanded_ppm": found.expanded_ppm,
+        "limit_ppm": found.limit_ppm,
+        "drift_ppm_per_h": found.fit.drift_ppm_per_h,
+        "drift_u_ppm_per_h": found.fit.drift_u_ppm_per_h,
+        "scatter_s": found.fit.scatter_s,
+        "runs": float(found.runs),
+    }
+
+
+def check_home(context: ExecutionContext, step: CheckHome) -> dict[str, float]:
+    """Look for missed steps. Those that were found end the campaign, and the data sets since the last check with it.
+
+    Raises TableStopped, InstrumentError.
+    """
+    table = context.bench.table
+    if not isinstance(table, OpenLoopTable):
+        return {}
+    stalled_s = context.monitor.stalls.total_clock_s()
+    found = table.check_home(lambda wait_s: _watched_wait(context, wait_s))
+    stalled_s = context.monitor.stalls.total_clock_s() - stalled_s
+    if found is not None and found.learning and stalled_s:
+        context.recorder.event(warning("home_unchecked", f"home is checked again: {not_run(stalled_s)} meanwhile"))
+        found = table.check_home(lambda wait_s: _watched_wait(context, wait_s))
+    since, context.unchecked = context.unchecked, []
+    if found is None:
+        return {}
+    if found.is_missing and stalled_s / found.step_s < found.missed_steps - found.limit_steps:
+        reason = _missing_text(table.name, found, step.temperature_c)
+        for number in since:
+            context.recorder.journal.dataset_closed(number, DataSetState.PARTIAL, reason)
+        raise TableStopped(reason, {"missed_steps": found.missed_steps, "u_steps": found.u_steps})
+    if found.is_doubtful or found.is_missing:
+        text = (
+            f"{table.name}: home seems {found.missed_steps:g} steps from where it was left, limit "
+            f"{found.limit_steps:g} steps, but a late reply explains it (u = {found.u_steps:.1f} steps"
+        )
+        text += f", {not_run(stalled_s)} meanwhile)" if stalled_s else ")"
+        context.recorder.event(warning("home_doubtful", f"{text}; {QUIETEN}", table.name))
+    return {"missed_steps": found.missed_steps, "u_steps": found.u_steps, "limit_steps": found.limit_steps}
+
+
+def _missing_text(name: str, found: HomeCheck, temperature_c: float) -> str:
+    size = f"{found.missed_steps:g} steps ({found.missed_steps * found.step_deg:.3g} deg)"
+    where = (
+        f"about {size} were missed in the short turns from which the homing is learned"
+        if found.learning
+        else f"home is {size} from where it was left"
+    )
+    return (
+        f"{name}: {where}, u = {found.u_steps:.1f} steps, limit {found.limit_steps:g} steps, "
+        f"at {temperature_c:g} deg C; steps were missed: check load, acceleration_dps2 and supply of the motor"
+    )
+
+
+def _watched_wait(context: ExecutionContext, wait_s: float) -> None:
+    """Let time pass under control of requests, with the bench watched."""
+    until_s = context.clock.now_s() + wait_s
+    while (left_s := until_s - context.clock.now_s()) > 0:
+        if context.monitor.is_due():
+            context.poll()
+        pass_time(context, min(left_s, 1.0), pausing=False)
