@@ -14,6 +14,7 @@ STUDIES = (
     "single_outputs",
     "conformity",
     "drift_coverage",
+    "table_clock",
     "figures_agree",
     "hand_turns",
     "poses",

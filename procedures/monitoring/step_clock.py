@@ -3,7 +3,7 @@
 A run of N steps at the nominal step rate f takes T = a + (N/f)(1 + x), where 1 + x is the reciprocal of the ratio and
 a what ramps and replies take, equal in all runs of one session at one step rate. Least squares over all runs of a
 campaign give x and its drift; the standard uncertainty is that of their scatter with its degrees of freedom (GUM 4.2,
-G.3), so that nobody has to know how late replies are.
+G.3): how late replies are need not be known.
 """
 
 from __future__ import annotations

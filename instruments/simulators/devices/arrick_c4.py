@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from instruments.bench_config import part_of
@@ -45,6 +46,7 @@ class SimulatedC4:
         #: By how much that changes, ppm/h; period of the timer at which the USB adapter passes received bytes on, s.
         self.clock_drift_ppm_per_h = number(setup.world.settings.table, "step_clock_drift_ppm_per_h", 0.0)
         self.latency_s = number(setup.world.settings.table, "reply_latency_s", 0.0)
+        self.passed_on_s: Callable[[float], float] = self._at_tick_s  #: when bytes that were sent reach the computer
         self.missed_steps = 0  #: the next move is so much shorter than what was asked for
         self._line = bytearray()
         self._replies: list[_Reply] = []
@@ -75,11 +77,10 @@ class SimulatedC4:
     def _reply(self, text: str, t_s: float) -> float:
         """Queue a reply; returns when its last byte is sent."""
         due_s = t_s + len(text) * self._byte_s
-        self._replies.append(_Reply(self._passed_on_s(due_s), text.encode("ascii")))
+        self._replies.append(_Reply(self.passed_on_s(due_s), text.encode("ascii")))
         return due_s
 
-    def _passed_on_s(self, due_s: float) -> float:
-        """Return when bytes that the controller has sent reach the computer."""
+    def _at_tick_s(self, due_s: float) -> float:
         return math.ceil(due_s / self.latency_s) * self.latency_s if self.latency_s else due_s
 
     def _execute(self, command: str, t_s: float) -> None:
@@ -131,4 +132,4 @@ class SimulatedC4:
 
     def _finish(self, end_s: float, t_s: float) -> None:
         if self._faults.trigger(["lost_reply"], t_s) is None:
-            self._replies.append(_Reply(self._passed_on_s(end_s + self._byte_s), lines.FINISHED.encode("ascii")))
+            self._replies.append(_Reply(self.passed_on_s(end_s + self._byte_s), lines.FINISHED.encode("ascii")))

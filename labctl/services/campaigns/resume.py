@@ -108,13 +108,9 @@ def prepare_resume(
         bench.close()
         raise
     restart = Restart(
-        gap_s=float("inf") if standing.soak_owed else gap_s,
-        power_lost=lost,
-        added_runs=added,
-        dropped=standing.dropped,
-        skipped=standing.skipped,
-        clock_runs=standing.clock_runs,
-    )
+        gap_s=float("inf") if standing.soak_owed else gap_s, power_lost=lost, added_runs=added,
+        dropped=standing.dropped, skipped=standing.skipped, clock_runs=standing.clock_runs,
+    )  # fmt: skip
     return Prepared(
         campaign, plan, bench, clock, operator_of(bench), standing.start_at, restart, CampaignTime(clock, t_s)
     )

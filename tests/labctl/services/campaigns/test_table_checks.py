@@ -19,7 +19,10 @@ from labctl.recording import RecordingInfo
 from labctl.services.benches.standards import standards_of
 from labctl.services.campaigns.execution import run
 from labctl.services.campaigns.preparation import prepare
+from labctl.services.campaigns.resume import prepare_resume
+from labctl.services.schemas.campaigns import ResumeRequest
 from labctl.store import open_store
+from procedures.contracts.control import Control
 
 RECIPE = """format = "labctl-recipe/1"
 name = "checked"
@@ -113,6 +116,36 @@ def test_rates_are_by_all_timed_runs_and_their_scatter_is_in_the_record(tmp_path
         divisor = round(true * device._clock_hz * device._step_deg / abs(rate_dps))
         true_dps = true * device._clock_hz / divisor * device._step_deg
         assert abs(abs(rate_dps) / true_dps - 1) * 1e6 < figures["expanded_ppm"]
+
+
+@pytest.mark.parametrize(("changed", "state"), [(0.0, "done"), (1e-3, "failed")])
+def test_a_resumed_campaign_compares_its_clock_with_that_before(tmp_path: Path, changed: float, state: str) -> None:
+    location = str(tmp_path / "lab.sqlite")
+    bench = checked_bench(step_clock_ratio=0.999588, reply_latency_s=0.001)
+    with open_store(location, write=True) as store:
+        prepared = prepare(store, RECIPE, bench, VirtualClock(), clip=False)
+        control = Control()
+        device = prepared.bench.simulation.device("sim://arrick")._device  # type: ignore[union-attr]
+        move, moves = device._move, []
+
+        def leaving(way: str, steps: int, divisor: int, t_s: float) -> None:
+            moves.append(steps)
+            if len(moves) == 15:
+                control.interrupt("the service is stopped")
+            move(way, steps, divisor, t_s)
+
+        device._move = leaving
+        assert run(store, prepared, control=control).state == "interrupted"
+        other = checked_bench(step_clock_ratio=0.999588 + changed, reply_latency_s=0.001)
+        request = ResumeRequest(by="A. Person", power="lost")
+        resumed = prepare_resume(store, prepared.id, other, lambda standing: VirtualClock(standing.last_at), request)
+        assert len(resumed.restart.clock_runs) == 4  # type: ignore[union-attr]
+        answer = run(store, resumed)
+    assert answer.state == state, answer.reason
+    sessions = rows(location, "select session, count(*) from timed_runs group by session order by session")
+    assert sessions[:2] == [(1, 4), (2, 4 if state == "failed" else 6)]
+    if state == "failed":
+        assert "the step clock has changed by +10" in answer.reason
 
 
 def test_runs_that_disagree_are_refused_before_the_first_data_set(tmp_path: Path) -> None:
