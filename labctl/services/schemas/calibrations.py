@@ -253,6 +253,10 @@ class Follower(ResponseModel):
         description="For each axis: error per K of temperature lag, (deg/s)/K, or error at an edge of the "
         "hysteresis, deg/s."
     )
+    scale: dict[str, float] | None = Field(
+        default=None, description="Of a lag of the scale factor, for each axis: error of the scale factor per K of "
+        "temperature lag, 1/K (1/K2 where is_curved); null: the scale factor does not lag.",
+    )  # fmt: skip
 
 
 class VersionFacts(ResponseModel):
