@@ -242,8 +242,9 @@ AFTER_CORRECTION = """    known = [output if error == error else error for outpu
     return [rate - error for rate, error in zip(rates, errors)], is_outside
 """
 
-#: The same where a scale factor lags: solved with the rest by fixed-point steps, which end where rounding alone is left.
-SCALED_BEFORE_CORRECTION = """    left, scales = [output - error for output, error in zip(outputs, errors)], state.scales or errors
+#: The same where a scale factor lags: solved with the rest by fixed-point steps, until rounding alone is left.
+SCALED_BEFORE_CORRECTION = """    left = [output - error for output, error in zip(outputs, errors)]
+    scales = state.scales or errors
     rates, is_outside = correct(left, temperature_c)
     rates, before = [rate / (1 + scale) for rate, scale in zip(rates, scales)], math.inf
     for _ in range({steps}):
@@ -261,6 +262,6 @@ SCALED_BEFORE_CORRECTION = """    left, scales = [output - error for output, err
 SCALED_AFTER_CORRECTION = """    known = [output if error == error else error for output, error in zip(outputs, errors)]
     rates, is_outside = correct(known, temperature_c)
     held = [_held(output, *CALIBRATION["output_dps"]) for output in outputs]
-    scales = state.scales or errors
-    return [rate - error - scale * output for rate, error, scale, output in zip(rates, errors, scales, held)], is_outside
+    more = [error + scale * output for error, scale, output in zip(errors, state.scales or errors, held)]
+    return [rate - error for rate, error in zip(rates, more)], is_outside
 """

@@ -26,7 +26,13 @@ static const double {name}_reference_c[{name}_FOLLOWERS] = {references};
 static const double {name}_bow_c[{name}_FOLLOWERS][2] = {bows};
 static const double {name}_size[{name}_FOLLOWERS][{name}_AXES] = {sizes};
 {scales}
-static inline void {name}_begin({name}_state *state) {{ state->begun = 0; }}
+static inline void {name}_begin({name}_state *state)
+{{
+    int f;
+    state->begun = 0;
+    state->t_s = state->temperature_c = 0;
+    for (f = 0; f < {name}_FOLLOWERS; f++) state->at_c[f] = 0;
+}}
 
 static inline int {name}_step(
     {name}_state *state, const LABCTL_REAL *w, LABCTL_REAL temperature_c, double t_s, LABCTL_REAL *rate)
@@ -68,7 +74,7 @@ static inline int {name}_step(
 
 
 #: Where the scale factor lags: the constants, and what its solution by fixed-point steps needs.
-ABOUT_SCALE = """/* An element that has a {name}_scale also adds that times the difference to the scale factor: {law}. */
+ABOUT_SCALE = """/* {name}_scale times the difference is added to the scale factor: {law}. */
 static const double {name}_scale[{name}_FOLLOWERS][{name}_AXES] = {scales};
 """
 LAWS = {False: "of the true rate", True: "of the output"}

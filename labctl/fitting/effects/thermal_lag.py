@@ -78,9 +78,8 @@ class Lag(Effect):
     )
     draws = ("legs", "time")
 
-    @staticmethod
     @abstractmethod
-    def factor(channels: Channels, axis: str) -> Array:
+    def factor(self, channels: Channels, axis: str) -> Array:
         """Return what the temperature difference is multiplied by: (n,) ones of a bias, the rate of a scale factor."""
 
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
@@ -112,8 +111,7 @@ class ThermalLag(Lag):
     ranges: ClassVar = {"fog": (0.0, 0.02), "mems": (0.0, 0.1), "piezo": (0.0, 0.6)}
     experiment = "two ramp speeds: an error due to lag grows with the speed, an error due to hysteresis does not"
 
-    @staticmethod
-    def factor(channels: Channels, axis: str) -> Array:
+    def factor(self, channels: Channels, axis: str) -> Array:
         return np.ones(len(channels))
 
 
@@ -129,8 +127,7 @@ class ScaleFactorLag(Lag):
     ranges: ClassVar = {"fog": (0.0, 1e-3), "mems": (0.0, 5e-4), "piezo": (0.0, 2e-4)}
     experiment = "the same rates during a ramp of the temperature and after it, on the way up and on the way down"
 
-    @staticmethod
-    def factor(channels: Channels, axis: str) -> Array:
+    def factor(self, channels: Channels, axis: str) -> Array:
         return channels.rate_dps(axis)
 
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.data.temperature.legs import legs_of
 from labctl.fitting.effects import Term, kind_of
-from labctl.fitting.effects.thermal_lag import LONGEST_S, SHORTEST_S, LagElement, Part, ThermalLag
+from labctl.fitting.effects.thermal_lag import LONGEST_S, SHORTEST_S, Lag, LagElement, Part, ThermalLag
 from labctl.fitting.estimation.axis_design import axis_design
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.numeric.arrays import Array
@@ -119,15 +119,16 @@ class ThermalResponse:
 
 @single_threaded
 def thermal_response(data: FitData, model: ErrorModel, term: Term) -> ThermalResponse | None:
-    """Return the lag of a recording beside the other effects of a model; `term` is what it replaces.
+    """Return the lag of bias or scale factor beside the other effects of a model; `term` is what it replaces.
 
     None where the temperature goes one way only, so that no part of its course says what another does.
     """
     stretches = stretches_of(data)
-    if not stretches or data.channels.missing(ThermalLag().channels):
+    kind = kind_of(term)
+    if not stretches or not isinstance(kind, Lag) or data.channels.missing(kind.channels):
         return None
-    rest = model.with_terms(tuple(t for t in model.terms if t.effect != ThermalLag.id))
-    axes = [Axis(data, rest, axis) for axis in data.outputs]
+    rest = model.with_terms(tuple(t for t in model.terms if t.effect != term.effect))
+    axes = [Axis(data, rest, axis, kind) for axis in data.outputs]
     tried = [structure for structure in STRUCTURES if structure.id != "per_axis" or len(axes) > 1]
     held_out = {structure.id: left_out_by(axes, structure, stretches) for structure in (NONE, *tried)}
     every = np.ones(len(data), dtype=bool)
@@ -214,8 +215,9 @@ def _rises(data: FitData, leg: NDArray[np.bool_]) -> bool:
 class Axis:
     """One axis: the columns of the other effects, those of every time constant, and what is to be explained."""
 
-    def __init__(self, data: FitData, rest: ErrorModel, name: str) -> None:
+    def __init__(self, data: FitData, rest: ErrorModel, name: str, kind: Lag | None = None) -> None:
         self.data, self.name = data, name
+        self.factor = (kind or ThermalLag()).factor(data.channels, name)
         design = axis_design(data, rest, name)
         self.base = design.columns
         self.y = data.outputs[name] - data.true_rate_dps(name) - design.offset_dps
@@ -228,7 +230,8 @@ class Axis:
         behind = [self._behind_k(float(tau_s)) for tau_s in GRID_S]
         made = [LagElement("", "", part, 0.0).values(lag, self.above_k) for part in PARTS for lag in behind]
         channels, (warming, cooling) = self.data.channels, GRID_S[PAIRS.T]
-        return np.column_stack([*made, channels.history.lags_two_ways_k(channels.columns, warming, cooling)])
+        both = channels.history.lags_two_ways_k(channels.columns, warming, cooling)
+        return np.column_stack([*made, both]) * self.factor[:, None]
 
     def _behind_k(self, tau_s: float, cooling_tau_s: float | None = None) -> Array:
         return self.data.channels.history.lag_k(self.data.channels.columns, tau_s, cooling_tau_s)
@@ -239,7 +242,7 @@ class Axis:
             LagElement("", "", part, 0.0).values(self._behind_k(taus_s[name], taus_s.get("cooling_tau")), self.above_k)
             for name, part in structure.columns
         )
-        return np.column_stack([np.zeros((len(self.y), 0)), *made])
+        return np.column_stack([np.zeros((len(self.y), 0)), *made]) * self.factor[:, None]
 
     def projected(self, seen: NDArray[np.bool_]) -> Projected:
         """Return the time constants' columns beside the base, over the noise, of the data sets of a mask."""
@@ -388,6 +391,6 @@ def _term_of(axes: Sequence[Axis], term: Term, structure: Structure, found: Taus
     return replace(term, parameters=kept)
 
 
-def has_lag(model: ErrorModel) -> Term | None:
-    """Return the lag of a model; None where it has none."""
-    return next((term for term in model.terms if isinstance(kind_of(term), ThermalLag)), None)
+def lags_of(model: ErrorModel) -> list[Term]:
+    """Return the lags of a model, of the bias and of the scale factor."""
+    return [term for term in model.terms if isinstance(kind_of(term), Lag)]

@@ -5892,6 +5892,13 @@ export interface components {
             size: {
                 [key: string]: number;
             };
+            /**
+             * Scale
+             * @description Of a lag of the scale factor, for each axis: error of the scale factor per K of temperature lag, 1/K (1/K2 where is_curved); null: the scale factor does not lag.
+             */
+            scale: {
+                [key: string]: number;
+            } | null;
         };
         /**
          * FrequencySpectrum
