@@ -70,6 +70,7 @@ class Criticism:
     explained: float | None = None
     views: Views = field(default_factory=Views)
     family: ThermalFamily | None = None  #: the thermal response that the verdict names
+    hint: ThermalFamily | None = None  #: one that predicts, but not enough to be named
 
     @property
     def floor(self) -> NoiseFloor:
@@ -156,7 +157,9 @@ def criticise(
     verdict = _without_large_residual(_beyond_noise(verdict, initial), base)
     family = thermal_family(fit_data, forward, verdict)
     verdict = with_family(verdict, family)
-    named = Criticism(verdict, data, fit_data, base, None, comparison, final, family=family)
+    hint = None if family is None or family.is_certain else family
+    family = None if hint is not None else family
+    named = Criticism(verdict, data, fit_data, base, None, comparison, final, family=family, hint=hint)
     found = _checked(named, forward, full=full)
     if not full or found.beside_missing is None:
         return found
@@ -166,6 +169,7 @@ def criticise(
     return replace(
         found,
         family=_with_time_constants(found.family, fit_data, forward),
+        hint=_with_time_constants(found.hint, fit_data, forward),
         direct_rms_dps=_direct_rms_dps(fit_data, model),
         suspects=suspects,
         not_testable=tuple(line for line in not_testable(comparison, catalogue) if line["effect"] not in suspected),

@@ -19,6 +19,7 @@ from labctl.json_types.models import (
     ReferenceJson,
     TemperatureBasisJson,
     TermJson,
+    ThermalHintJson,
     UsualRange,
 )
 from labctl.json_types.poses import PosesJson
@@ -202,6 +203,10 @@ class ChangedModel(FittedResponse):
         description="For each effect: the usual range of its size, and whether the fitted size is inside."
     )
     left_out: list[LeftOut] = Field(description="Effects in the fitted model that the exported calibration leaves out.")
+    thermal_hint: ThermalHintJson | None = Field(
+        default=None, description="Of a thermal lag that was added at rest and is not certain: what it leaves of "
+        "stretches left out, and why it is not certain; else null.",
+    )  # fmt: skip
 
 
 class ImproveResponse(ChangedModel):
