@@ -157,9 +157,7 @@ def criticise(
     verdict = _without_large_residual(_beyond_noise(verdict, initial), base)
     family = thermal_family(fit_data, forward, verdict)
     verdict = with_family(verdict, family)
-    hint = None if family is None or family.is_certain else family
-    family = None if hint is not None else family
-    named = Criticism(verdict, data, fit_data, base, None, comparison, final, family=family, hint=hint)
+    named = Criticism(verdict, data, fit_data, base, None, comparison, final, **_family_or_hint(family))
     found = _checked(named, forward, full=full)
     if not full or found.beside_missing is None:
         return found
@@ -193,6 +191,11 @@ def best_shapes(
     seen = _leaning(data, fit_data, forward).through(response_of_terms(forward.terms))
     comparison = compare_models(beside_held(seen, forward), forward, catalogue)
     return {c.id: refined_term(comparison, c) for c in comparison.candidates if not c.smooth and c.term is not None}
+
+
+def _family_or_hint(family: ThermalFamily | None) -> dict[str, ThermalFamily | None]:
+    """Return a thermal response under the name of what it is in a criticism."""
+    return {"hint": family} if family is not None and not family.is_certain else {"family": family}
 
 
 def _checked(found: Criticism, forward: ErrorModel, *, full: bool) -> Criticism:
