@@ -21,7 +21,7 @@ from labctl.fitting.criticism.search.refinement import refined_term
 from labctl.fitting.criticism.search.stepwise import search_stepwise
 from labctl.fitting.criticism.slow_process import slow_process, with_hypothesis, without_harm
 from labctl.fitting.criticism.suspects import Suspect, suspects_of
-from labctl.fitting.criticism.thermal_family import LAG, ThermalFamily, thermal_family, with_family
+from labctl.fitting.criticism.thermal_family import LAG, ThermalFamily, family_or_hint, with_family
 from labctl.fitting.criticism.verdict import FAR, Verdict
 from labctl.fitting.criticism.visibility import not_testable
 from labctl.fitting.data.fit_data import FitData, fit_data_of
@@ -155,9 +155,9 @@ def criticise(
     comparison = compare_models(beside_held(seen, forward), forward, catalogue)
     verdict, initial, final = search_stepwise(comparison, catalogue)
     verdict = _without_large_residual(_beyond_noise(verdict, initial), base)
-    family = thermal_family(fit_data, forward, verdict)
+    family, hint = family_or_hint(fit_data, forward, verdict)
     verdict = with_family(verdict, family)
-    named = Criticism(verdict, data, fit_data, base, None, comparison, final, **_family_or_hint(family))
+    named = Criticism(verdict, data, fit_data, base, None, comparison, final, family=family, hint=hint)
     found = _checked(named, forward, full=full)
     if not full or found.beside_missing is None:
         return found
@@ -191,11 +191,6 @@ def best_shapes(
     seen = _leaning(data, fit_data, forward).through(response_of_terms(forward.terms))
     comparison = compare_models(beside_held(seen, forward), forward, catalogue)
     return {c.id: refined_term(comparison, c) for c in comparison.candidates if not c.smooth and c.term is not None}
-
-
-def _family_or_hint(family: ThermalFamily | None) -> dict[str, ThermalFamily | None]:
-    """Return a thermal response under the name of what it is in a criticism."""
-    return {"hint": family} if family is not None and not family.is_certain else {"family": family}
 
 
 def _checked(found: Criticism, forward: ErrorModel, *, full: bool) -> Criticism:

@@ -171,8 +171,15 @@ def hint_of_added(data: FitData, model: ErrorModel, effects: Collection[str]) ->
     """Return the thermal response beside a forward model to which a lag is added, where it is no more than a hint."""
     if LAG not in effects:
         return None
-    family = thermal_family(data, model, Verdict("unexplained"))
-    return None if family is None or family.is_certain else family
+    return family_or_hint(data, model, Verdict("unexplained"))[1]
+
+
+def family_or_hint(
+    data: FitData, model: ErrorModel, verdict: Verdict
+) -> tuple[ThermalFamily | None, ThermalFamily | None]:
+    """Return the thermal response beside a model as one that is named, or as a hint; None for the other, or both."""
+    family = thermal_family(data, model, verdict)
+    return (family, None) if family is None or family.is_certain else (None, family)
 
 
 def with_family(verdict: Verdict, family: ThermalFamily | None) -> Verdict:
