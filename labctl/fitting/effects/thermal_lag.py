@@ -58,7 +58,7 @@ def lag_elements(term: Term, axis: str) -> list[LagElement]:
     found = [LagElement(name, unit, "all", tau_s, tau_of(term, "cooling_tau", axis))]
     if (second := tau_of(term, "second_tau", axis)) is not None:
         found.append(LagElement(f"{name}_second", unit, "all", second))
-    if term.parameters.get("curved", 0.0):
+    if term.parameters.get(f"curved_{axis}", term.parameters.get("curved", 0.0)):
         found.append(LagElement(f"{name}_curved", f"{unit}2", "curved", tau_s, found[0].cooling_tau_s))
     return found
 

@@ -16,7 +16,8 @@ import numpy as np
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.effects import Effect, Parameter, Span, Term, kind_of
 from labctl.fitting.estimation.axis_design import axis_design
-from labctl.fitting.estimation.thermal_response import STRUCTURES, lags_of, thermal_response
+from labctl.fitting.estimation.thermal_flows import STRUCTURES
+from labctl.fitting.estimation.thermal_response import lags_of, thermal_response
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.presets import Preset, Rows
 from labctl.fitting.numeric.arrays import Array
