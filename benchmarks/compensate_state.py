@@ -46,7 +46,7 @@ def _million_per_s(fitted: FittedModel, axes: str, t_s: Array, warm: Array) -> f
     correct = correction(rest, tuple(axes))
 
     def corrected() -> Array:
-        less = raw if memory is None else raw - course(RunningMemory(memory), t_s, warm)
+        less = raw if memory is None else raw - course(RunningMemory(memory), t_s, warm).bias_dps
         return correct(less, warm, {})
 
     used = []

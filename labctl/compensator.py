@@ -18,8 +18,8 @@ from labctl.errors import BadInput
 from labctl.fitting.data.channels import BODY_AXES
 from labctl.fitting.data.temperature.channel import STAND_IN_C
 from labctl.fitting.data.temperature.history import TemperatureHistory
-from labctl.fitting.models.correction import Correct, correct_across, correction
-from labctl.fitting.models.memory import MemoryState, RunningMemory, course, split_memory
+from labctl.fitting.models.correction import Correct, correct_across, correction, with_scale
+from labctl.fitting.models.memory import MemoryState, Remembered, RunningMemory, course, split_memory
 
 __all__ = [
     "MARGIN_C",
@@ -203,28 +203,38 @@ class Compensator:
                 remembered = course(running, np.asarray(known["t_s"], dtype=np.float64), warm)
             else:
                 remembered = self._memory.of_history(history, known)
-            beside = remembered if beside is None else remembered + beside
+            beside = remembered if beside is None else remembered.with_bias(beside.bias_dps)
         correct = self._correct if cross_rates_dps is None else self._correct_across(cross_rates_dps, len(raw))
         return self._beside(beside, raw, warm, known, given.shape, correct, has_force=specific_force_g is not None)
 
     def _beside(
-        self, beside: Array | None, raw: Array, warm: Array, known: Mapping[str, Array], shape: tuple[int, ...],
+        self, beside: Remembered | None, raw: Array, warm: Array, known: Mapping[str, Array], shape: tuple[int, ...],
         correct: Correct, *, has_force: bool,
     ) -> Compensated:  # fmt: skip
-        """Correct outputs (n, axes) of which an error that no rate changes, (n, axes) deg/s, is known; None: none."""
+        """Correct outputs (n, axes) of which errors of bias and scale factor, (n, axes), are known; None: none."""
         left_out = None if has_force else self._left_out_dps
         if beside is None:
             found = self._held(raw, warm, known, correct)
             return Compensated(found.rate_dps.reshape(shape), found.outside, left_out)
-        less = np.where(np.isnan(beside), np.nan, raw) if self._is_direct else raw - beside
+        if self._is_direct:
+            found = self._held(np.where(np.isnan(beside.bias_dps), np.nan, raw), warm, known, correct)
+            rate = found.rate_dps - beside.bias_dps
+            if beside.scale is not None:
+                rate = rate - beside.scale * np.clip(raw, self._slow, self._fast)
+            return Compensated(rate.reshape(shape), found.outside, left_out)
+        less = raw - beside.bias_dps
         found = self._held(less, warm, known, correct)
-        rate = found.rate_dps - beside if self._is_direct else found.rate_dps
+        rate = found.rate_dps
+        if beside.scale is not None:
+            held = partial(self._at_edge, warm=warm, known=known, correct=correct)
+            rate = with_scale(held, less, beside.scale, self._slow, self._fast)
         return Compensated(rate.reshape(shape), found.outside, left_out)
 
-    def _by_force(self, specific_force_g: ArrayLike | None, n: int) -> Array | None:
+    def _by_force(self, specific_force_g: ArrayLike | None, n: int) -> Remembered | None:
+        """Return what specific force adds to the bias; it remembers nothing."""
         if specific_force_g is None or self.force_sensitivity is None:
             return None
-        return self.force_sensitivity.error_dps(self.force_sensitivity.forces(specific_force_g, n))
+        return Remembered(self.force_sensitivity.error_dps(self.force_sensitivity.forces(specific_force_g, n)))
 
     def _correct_across(self, cross_rates_dps: Mapping[str, ArrayLike], n: int) -> Correct:
         """Return the correction at known rates about axes without an output; raises BadInput for any other axis."""
@@ -252,10 +262,13 @@ class Compensator:
             flags = np.zeros(len(raw), dtype=bool)
         else:
             flags = self._judge(raw, warm)
-            warm = np.clip(warm, self._low_c, self._high_c)
-            held = np.clip(raw, self._slow, self._fast)
-            return Compensated(correct(held, warm, known) + (raw - held), flags)
+            return Compensated(self._at_edge(raw, warm, known, correct), flags)
         return Compensated(correct(raw, warm, known), flags)
+
+    def _at_edge(self, raw: Array, warm: Array, known: Mapping[str, Array], correct: Correct) -> Array:
+        """Return corrected rates, (n, axes); of what is outside the range the error at its edge is taken off."""
+        held = np.clip(raw, self._slow, self._fast)
+        return correct(held, np.clip(warm, self._low_c, self._high_c), known) + (raw - held)
 
     @property
     def needs_temperature(self) -> bool:
@@ -322,9 +335,9 @@ class Compensator:
                 "time, or call reset()"
             )
         by_force = self._by_force(specific_force_g, 1)
-        beside = self._running.error_dps(t_s, temperature_c)[None, :]
+        beside = self._running.errors(np.array([t_s]), np.array([temperature_c]))
         found = self._beside(
-            beside if by_force is None else beside + by_force, raw, np.array([temperature_c]),
+            beside if by_force is None else beside.with_bias(by_force.bias_dps), raw, np.array([temperature_c]),
             {"t_s": np.array([t_s])}, raw.shape, self._correct, has_force=specific_force_g is not None,
         )  # fmt: skip
         return found.rate_dps[0], bool(found.outside[0])

@@ -21,6 +21,7 @@ STUDIES = (
     "joint_recordings",
     "criticism",
     "rest_loops",
+    "scale_loops",
     "rest_verdicts",
     "rest_peers",
     "real",

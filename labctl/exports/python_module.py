@@ -20,9 +20,12 @@ from labctl.exports.python_source import (
     FORCE_CORRECTION,
     LINEAR_CORRECTION,
     OPENING,
+    SCALED_AFTER_CORRECTION,
+    SCALED_BEFORE_CORRECTION,
     STATE_CORRECTION,
     SURFACE_CORRECTION,
 )
+from labctl.fitting.models.correction import SCALE_STEPS
 from labctl.fitting.models.force_sensitivity import ForceSensitivity
 from labctl.fitting.models.matrix_form import linear_of
 from labctl.fitting.models.memory import split_memory
@@ -63,11 +66,13 @@ def write(calibration: Calibration) -> Written:
         },
         **tables,
     }
-    around = AFTER_CORRECTION if fitted.model.argument == "output" else BEFORE_CORRECTION
+    is_direct = fitted.model.argument == "output"
+    around = AFTER_CORRECTION if is_direct else BEFORE_CORRECTION
     force, notes = calibration.force_sensitivity, []
     if memory is not None:
         content["state"] = [each.to_json() for each in memory.followers]
-        body += STATE_CORRECTION + around
+        scaled = SCALED_AFTER_CORRECTION if is_direct else SCALED_BEFORE_CORRECTION.format(steps=SCALE_STEPS)
+        body += STATE_CORRECTION + (scaled if memory.has_scale else around)
         notes.append("correct_with_state corrects the thermal lag or hysteresis; correct alone leaves it.")
     if force is not None:
         content["specific_force"] = _force_table(force)

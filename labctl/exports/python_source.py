@@ -180,9 +180,13 @@ class State:
 
     def __init__(self):
         self.t_s = self.temperature_c = self.at_c = None
+        self.scales = None
 
     def errors(self, temperature_c, t_s):
-        """Move on to a sample, in order of time (s), and return what the elements add to each output, deg/s."""
+        """Move on to a sample, in order of time (s), and return what the elements add to each output, deg/s.
+
+        What they add to each scale factor is then in `scales`.
+        """
         elements, now = CALIBRATION["state"], float(temperature_c)
         if not (math.isfinite(now) and math.isfinite(t_s)):
             return [math.nan for _ in CALIBRATION["axes"]]
@@ -194,8 +198,12 @@ class State:
             self.at_c = [self._moved(each, at, now, t_s) for each, at in zip(elements, self.at_c)]
         self.t_s, self.temperature_c = t_s, now
         sides = [_side(each, at, now) for each, at in zip(elements, self.at_c)]
-        sizes = zip(*(each["size"] for each in elements))
-        return [sum(size * side for size, side in zip(row, sides)) for row in sizes]
+        self.scales, errors = (
+            [sum(size * side for size, side in zip(row, sides)) for row in zip(*rows)]
+            for rows in ([each.get("scale", [0.0] * len(each["size"])) for each in elements],
+                         [each["size"] for each in elements])
+        )
+        return errors
 
     def _moved(self, element, at, now, t_s):
         if element["kind"] == "play":
@@ -232,4 +240,28 @@ BEFORE_CORRECTION = """    return correct([output - error for output, error in z
 AFTER_CORRECTION = """    known = [output if error == error else error for output, error in zip(outputs, errors)]
     rates, is_outside = correct(known, temperature_c)
     return [rate - error for rate, error in zip(rates, errors)], is_outside
+"""
+
+#: The same where a scale factor lags: solved with the rest by fixed-point steps, until rounding alone is left.
+SCALED_BEFORE_CORRECTION = """    left = [output - error for output, error in zip(outputs, errors)]
+    scales = state.scales or errors
+    rates, is_outside = correct(left, temperature_c)
+    rates, before = [rate / (1 + scale) for rate, scale in zip(rates, scales)], math.inf
+    for _ in range({steps}):
+        held = [_held(rate, *CALIBRATION["output_dps"]) for rate in rates]
+        again, _ = correct([output - scale * rate for output, scale, rate in zip(left, scales, held)], temperature_c)
+        steps = [(new - rate) / (1 + scale) for new, rate, scale in zip(again, rates, scales)]
+        rates = [rate + step for rate, step in zip(rates, steps)]
+        change = max((abs(step) for step in steps if step == step), default=0.0)
+        if not change < before:
+            break
+        before = change
+    return rates, is_outside
+"""
+
+SCALED_AFTER_CORRECTION = """    known = [output if error == error else error for output, error in zip(outputs, errors)]
+    rates, is_outside = correct(known, temperature_c)
+    held = [_held(output, *CALIBRATION["output_dps"]) for output in outputs]
+    more = [error + scale * output for error, scale, output in zip(errors, state.scales or errors, held)]
+    return [rate - error for rate, error in zip(rates, more)], is_outside
 """

@@ -74,26 +74,31 @@ class StaticPart:
 
     def memory_losses(self) -> tuple[Loss, ...]:
         """Return what is lost where a format carries neither lag nor hysteresis."""
-        return follower_losses(self.memory)
+        return follower_losses(self.memory, float(np.abs(self.outputs()).max()))
 
     def losses(self) -> tuple[Loss, ...]:
         """Return what is lost where a format knows output and temperature alone."""
         return (*self.memory_losses(), *force_losses(self.calibration))
 
 
-def follower_losses(memory: Memory | None) -> tuple[Loss, ...]:
-    """Return what is lost where a format does not carry the memory; nothing without one."""
+def follower_losses(memory: Memory | None, fastest_dps: float) -> tuple[Loss, ...]:
+    """Return what is lost where a format does not carry the memory; nothing without one.
+
+    That of a lag of the scale factor is stated at the fastest calibrated rate.
+    """
     found: dict[str, float] = {}
     for each in memory.followers if memory is not None else ():
-        size = float(np.abs(each.size).max())
+        of, size = "bias", float(np.abs(each.size).max())
+        if each.scale is not None:
+            of, size = f"scale factor at {fastest_dps:g} deg/s", float(np.abs(each.scale).max()) * fastest_dps
         if each.kind == "play":
             what = "hysteresis of the bias"
         elif each.part == "curved":
             about = f"for each K from {each.reference_c:g} deg C"
-            what = f"curved thermal lag of the bias, at {WARMING_K_MIN:g} K/min, {about}"
+            what = f"curved thermal lag of the {of}, at {WARMING_K_MIN:g} K/min, {about}"
             size *= 2 * max(each.parameter, each.cooling_s or 0.0) / 60 * WARMING_K_MIN
         else:
-            what = f"thermal lag of the bias, at {WARMING_K_MIN:g} K/min"
+            what = f"thermal lag of the {of}, at {WARMING_K_MIN:g} K/min"
             size *= max(each.parameter, each.cooling_s or 0.0) / 60 * WARMING_K_MIN
         found[what] = found.get(what, 0.0) + size
     return tuple(Loss(what, size) for what, size in found.items())

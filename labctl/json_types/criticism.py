@@ -126,20 +126,6 @@ class Remainder(TypedDict):
     depends_on: list[str]
 
 
-class ThermalFamilyJson(TypedDict):
-    """A thermal response that predicts stretches of the temperature course that it has not seen.
-
-    `time_constants` by name (`tau_x_s` of axis x, `tau_s` of all), `alike`: other effects that predict as well alone;
-    errors of the stretches left out without and with it, deg/s.
-    """
-
-    structure: str
-    time_constants: dict[str, Coefficient]
-    alike: list[str]
-    before_rms_dps: float
-    after_rms_dps: float
-
-
 class WorstDataSet(TypedDict):
     """A data set far from the model."""
 

@@ -227,6 +227,31 @@ class LeftOut(TypedDict):
 UsualRange = TypedDict("UsualRange", {"from": float, "to": float, "inside": bool})
 
 
+class ThermalFamilyJson(TypedDict):
+    """A thermal response that predicts stretches of the temperature course that it has not seen.
+
+    `time_constants` by name (`tau_x_s` of axis x, `tau_s` of all), `alike`: other effects that predict as well alone;
+    errors of the stretches left out without and with it, deg/s.
+    """
+
+    structure: str
+    time_constants: dict[str, Coefficient]
+    alike: list[str]
+    before_rms_dps: float
+    after_rms_dps: float
+
+
+class ThermalHintJson(ThermalFamilyJson):
+    """A thermal response that predicts too little to be named, and `why`; what other effects leave alone, deg/s.
+
+    `text` says it in a sentence.
+    """
+
+    rivals_rms_dps: dict[str, float]
+    why: str
+    text: str
+
+
 class ChangeFigures(FitResultJson):
     """What is said of a change of effects, whether it is kept or not."""
 
@@ -236,6 +261,7 @@ class ChangeFigures(FitResultJson):
     before: ErrorFiguresJson
     plausible: dict[str, UsualRange]
     warnings: list[FindingJson]
+    thermal_hint: ThermalHintJson | None
 
 
 class KeptFit(FitResultJson):

@@ -47,6 +47,7 @@ KINDS: tuple[type[HiddenEffect], ...] = (
     scale_factor.ScaleFactorTemperature,
     thermal.TemperatureRate,
     thermal.ThermalLag,
+    scale_factor.ScaleFactorLag,
     thermal.ThermalHysteresis,
     history.BiasDrift,
     thermal.WarmUp,

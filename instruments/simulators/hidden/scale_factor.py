@@ -25,6 +25,15 @@ class ScaleFactorTemperature(HiddenEffect):
         return state.own_dps * np.expm1(self.size * (state.sensor_c - 25.0))[:, None]
 
 
+class ScaleFactorLag(HiddenEffect):
+    """A gain that follows a part which the thermometer does not touch; size per K of the difference."""
+
+    id, unit, default = "scale_factor_lag", "1/K", 2e-4
+
+    def error_dps(self, state: State, rate_dps: Array) -> Array:
+        return state.own_dps * np.expm1(self.size * (state.deep_c - state.sensor_c))[:, None]
+
+
 class ScaleFactorAsymmetry(HiddenEffect):
     """Gains that differ by direction, joined smoothly through rest."""
 

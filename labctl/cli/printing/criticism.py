@@ -155,6 +155,8 @@ def print_improvement(answer: ImproveResponse) -> None:
     rows.add_row("held-out", format_number(before.heldout_rms_dps), format_number(answer.error.heldout_rms_dps))
     rows.add_row("noise floor", format_number(before.noise_floor_dps), format_number(answer.error.noise_floor_dps))
     console.print(rows)
+    if answer.thermal_hint is not None:
+        console.print(f"  {answer.thermal_hint['text']}", soft_wrap=True)
     for effect_id, span in answer.plausible.items():
         if not span["inside"]:
             console.print(

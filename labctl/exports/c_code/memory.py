@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from labctl.exports.c_code.tables import c_table
+from labctl.fitting.models.correction import SCALE_STEPS
 from labctl.fitting.models.memory import Memory
-from labctl.fitting.numeric.arrays import Array
 
 BODY = """
 /* State: {count} filters of the temperature, of a thermal lag (time constant, s) or a hysteresis (width of a
@@ -25,16 +25,22 @@ static const int {name}_is_curved[{name}_FOLLOWERS] = {is_curved};
 static const double {name}_reference_c[{name}_FOLLOWERS] = {references};
 static const double {name}_bow_c[{name}_FOLLOWERS][2] = {bows};
 static const double {name}_size[{name}_FOLLOWERS][{name}_AXES] = {sizes};
-
-static inline void {name}_begin({name}_state *state) {{ state->begun = 0; }}
+{scales}
+static inline void {name}_begin({name}_state *state)
+{{
+    int f;
+    state->begun = 0;
+    state->t_s = state->temperature_c = 0;
+    for (f = 0; f < {name}_FOLLOWERS; f++) state->at_c[f] = 0;
+}}
 
 static inline int {name}_step(
     {name}_state *state, const LABCTL_REAL *w, LABCTL_REAL temperature_c, double t_s, LABCTL_REAL *rate)
 {{
-    double now = (double)temperature_c, error[{name}_AXES];
+    double now = (double)temperature_c, error[{name}_AXES]{declared};
     LABCTL_REAL left[{name}_AXES];
     int a, f, outside, known = isfinite(now) && isfinite(t_s);
-    for (a = 0; a < {name}_AXES; a++) error[a] = known ? 0 : NAN;
+    for (a = 0; a < {name}_AXES; a++) {begun}error[a] = known ? 0 : NAN;
     for (f = 0; known && f < {name}_FOLLOWERS; f++) {{
         double parameter = {name}_follower[f], at = now, side;
         if (state->begun && {name}_is_lag[f]) {{
@@ -54,7 +60,7 @@ static inline int {name}_step(
             side *= 4 * share * (1 - share);
         }}
         for (a = 0; a < {name}_AXES; a++) error[a] += {name}_size[f][a] * side;
-    }}
+{added}    }}
     if (known) {{
         state->begun = 1;
         state->t_s = t_s;
@@ -67,11 +73,40 @@ static inline int {name}_step(
 """
 
 
+#: Where the scale factor lags: the constants, and what its solution by fixed-point steps needs.
+ABOUT_SCALE = """/* {name}_scale times the difference is added to the scale factor: {law}. */
+static const double {name}_scale[{name}_FOLLOWERS][{name}_AXES] = {scales};
+"""
+LAWS = {False: "of the true rate", True: "of the output"}
+ADDED = "        for (a = 0; a < {name}_AXES; a++) scale[a] += {name}_scale[f][a] * side;\n"
+#: output - error - scale * rate is corrected by the rest; the steps end where rounding alone changes the rate.
+SOLVED = """for (a = 0; a < {name}_AXES; a++) solved[a] = (double)rate[a] / (1 + scale[a]);
+    for (f = 0; f < {steps}; f++) {{
+        double change = 0;
+        for (a = 0; a < {name}_AXES; a++) {{
+            double held = fmin(fmax(solved[a], {name}_output_dps[0]), {name}_output_dps[1]);
+            left[a] = (LABCTL_REAL)((double)w[a] - error[a] - scale[a] * held);
+        }}
+        {name}_correct(left, temperature_c, rate);
+        for (a = 0; a < {name}_AXES; a++) {{
+            double step = ((double)rate[a] - solved[a]) / (1 + scale[a]);
+            solved[a] += step;
+            change = fmax(change, fabs(step));
+        }}
+        if (!(change < before)) break;
+        before = change;
+    }}
+    for (a = 0; a < {name}_AXES; a++) rate[a] = (LABCTL_REAL)solved[a];
+    """
+#: A direct law of the output takes the errors off afterwards.
+TAKEN = "for (a = 0; a < {name}_AXES; a++) rate[a] = (LABCTL_REAL)((double)rate[a] - error[a]{by_scale});\n    "
+BY_SCALE = " - scale[a] * fmin(fmax((double)w[a], {name}_output_dps[0]), {name}_output_dps[1])"
+
+
 def memory_body(name: str, memory: Memory, *, is_direct: bool) -> str:
     """Return the constants, the state and the step; a direct law of the output takes the error off afterwards."""
     followers = memory.followers
     bows = np.array([follower.bow or (0.0, 0.0) for follower in followers])
-    taken = f"for (a = 0; a < {name}_AXES; a++) rate[a] = (LABCTL_REAL)((double)rate[a] - error[a]);\n    "
     return BODY.format(
         name=name,
         count=len(followers),
@@ -81,11 +116,25 @@ def memory_body(name: str, memory: Memory, *, is_direct: bool) -> str:
         is_curved="{" + ", ".join(str(int(follower.part == "curved")) for follower in followers) + "}",
         references=c_table(np.array([follower.reference_c for follower in followers])),
         bows=c_table(bows),
-        sizes=c_table(_sizes(memory)),
+        sizes=c_table(np.stack([follower.size for follower in followers])),
         left="w[a]" if is_direct else "(LABCTL_REAL)((double)w[a] - error[a])",
-        after=taken if is_direct else "",
+        **_parts_of_scale(name, memory, is_direct=is_direct),
     )
 
 
-def _sizes(memory: Memory) -> Array:
-    return np.stack([follower.size for follower in memory.followers])
+def _parts_of_scale(name: str, memory: Memory, *, is_direct: bool) -> dict[str, str]:
+    """Return what stands in the step for a scale factor that lags; without one the errors of the bias alone."""
+    if not memory.has_scale:
+        after = TAKEN.format(name=name, by_scale="") if is_direct else ""
+        return {"scales": "", "declared": "", "begun": "", "added": "", "after": after}
+    none = np.zeros(len(memory.axes))
+    scales = np.stack([none if follower.scale is None else follower.scale for follower in memory.followers])
+    by_scale = BY_SCALE.format(name=name)
+    return {
+        "scales": ABOUT_SCALE.format(name=name, law=LAWS[is_direct], scales=c_table(scales)),
+        "declared": f", scale[{name}_AXES]" + ("" if is_direct else f", solved[{name}_AXES], before = INFINITY"),
+        "begun": "scale[a] = ",
+        "added": ADDED.format(name=name),
+        "after": TAKEN.format(name=name, by_scale=by_scale) if is_direct
+        else SOLVED.format(name=name, steps=SCALE_STEPS),
+    }  # fmt: skip

@@ -156,6 +156,8 @@ def _of_memory(memory: Memory | None, over: Range, roundoff: float) -> float:
     found = 0.0
     for each in memory.followers if memory is not None else ():
         size = float(np.abs(each.size).max())
+        if each.scale is not None:
+            size += float(np.abs(each.scale).max()) * over.output_dps
         per_k = size if each.kind == "lag" else size / (each.parameter / 2)
         if each.bow is not None:
             per_k += 4 * size / max(each.bow[1] - each.bow[0], 1e-9)

@@ -21,7 +21,7 @@ from labctl.fitting.criticism.search.refinement import refined_term
 from labctl.fitting.criticism.search.stepwise import search_stepwise
 from labctl.fitting.criticism.slow_process import slow_process, with_hypothesis, without_harm
 from labctl.fitting.criticism.suspects import Suspect, suspects_of
-from labctl.fitting.criticism.thermal_family import LAG, ThermalFamily, thermal_family, with_family
+from labctl.fitting.criticism.thermal_family import LAG, ThermalFamily, family_or_hint, with_family
 from labctl.fitting.criticism.verdict import FAR, Verdict
 from labctl.fitting.criticism.visibility import not_testable
 from labctl.fitting.data.fit_data import FitData, fit_data_of
@@ -70,6 +70,7 @@ class Criticism:
     explained: float | None = None
     views: Views = field(default_factory=Views)
     family: ThermalFamily | None = None  #: the thermal response that the verdict names
+    hint: ThermalFamily | None = None  #: one that predicts, but not enough to be named
 
     @property
     def floor(self) -> NoiseFloor:
@@ -154,9 +155,9 @@ def criticise(
     comparison = compare_models(beside_held(seen, forward), forward, catalogue)
     verdict, initial, final = search_stepwise(comparison, catalogue)
     verdict = _without_large_residual(_beyond_noise(verdict, initial), base)
-    family = thermal_family(fit_data, forward, verdict)
+    family, hint = family_or_hint(fit_data, forward, verdict)
     verdict = with_family(verdict, family)
-    named = Criticism(verdict, data, fit_data, base, None, comparison, final, family=family)
+    named = Criticism(verdict, data, fit_data, base, None, comparison, final, family=family, hint=hint)
     found = _checked(named, forward, full=full)
     if not full or found.beside_missing is None:
         return found
@@ -166,6 +167,7 @@ def criticise(
     return replace(
         found,
         family=_with_time_constants(found.family, fit_data, forward),
+        hint=_with_time_constants(found.hint, fit_data, forward),
         direct_rms_dps=_direct_rms_dps(fit_data, model),
         suspects=suspects,
         not_testable=tuple(line for line in not_testable(comparison, catalogue) if line["effect"] not in suspected),

@@ -7,6 +7,7 @@ predicts stretches that it has not seen, and its time constants; which member it
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -15,26 +16,19 @@ from numpy.typing import NDArray
 from labctl.fitting.criticism.verdict import Form, Verdict
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.effects import CATALOGUE, Span, Term
-from labctl.fitting.estimation.thermal_response import (
-    NONE,
-    Axis,
-    LeftOut,
-    ThermalResponse,
-    left_out_by,
-    pooled,
-    stretches_of,
-    thermal_response,
-)
+from labctl.fitting.estimation.thermal_flows import NONE, Axis, LeftOut, left_out_by, pooled
+from labctl.fitting.estimation.thermal_response import ThermalResponse, stretches_of, thermal_response
 from labctl.fitting.models.error_model import ErrorModel
-from labctl.json_types.criticism import Advice, ThermalFamilyJson
-from labctl.json_types.models import Coefficient
+from labctl.json_types.criticism import Advice
+from labctl.json_types.models import Coefficient, ThermalFamilyJson, ThermalHintJson
 
 LAG = "thermal_lag"
 #: The members beside the lag, and all of them.
 RIVALS = ("temperature_rate", "thermal_hysteresis")
 FAMILY = frozenset({LAG, *RIVALS})
-#: A response is there where it leaves less than this share of the chi2 of stretches left out.
-MOST_LEFT = 0.25
+#: A response is there where it leaves less than this share of the chi2 of stretches left out, and may be there where it
+#: leaves less than the second.
+MOST_LEFT, MOST_LEFT_OF_HINT = 0.25, 0.75
 
 
 @dataclass(frozen=True)
@@ -42,8 +36,18 @@ class ThermalFamily:
     """A thermal response that predicts what it has not seen."""
 
     response: ThermalResponse
-    alike: tuple[str, ...] = ()  #: members that predict as well, alone
+    rivals: Mapping[str, LeftOut] = field(default_factory=dict)  #: what each other member leaves alone
     shapes: dict[str, Coefficient] = field(default_factory=dict)  #: time constants with u, where they were asked for
+
+    @property
+    def alike(self) -> tuple[str, ...]:
+        """The members that predict as well, alone."""
+        return tuple(name for name, rival in self.rivals.items() if not self.after.is_below(rival))
+
+    @property
+    def is_certain(self) -> bool:
+        """Whether it predicts so much that it is named; else it is a hint."""
+        return self.after.chi2 <= MOST_LEFT * self.before.chi2
 
     @property
     def before(self) -> LeftOut:
@@ -69,20 +73,61 @@ class ThermalFamily:
             "before_rms_dps": self.before.rms_dps, "after_rms_dps": self.after.rms_dps,
         }  # fmt: skip
 
+    def hint_json(self) -> ThermalHintJson:
+        """Return this as JSON, with why it is not certain."""
+        return {
+            **self.to_json(), "rivals_rms_dps": {name: rival.rms_dps for name, rival in self.rivals.items()},
+            "why": self.why, "text": self.hint,
+        }  # fmt: skip
+
+    @property
+    def why(self) -> str:
+        """Why it is not certain; "" where it is."""
+        if self.is_certain:
+            return ""
+        return (
+            f"it takes {100 * (1 - self.after.chi2 / self.before.chi2):.0f} % of the chi2 of these stretches, and less "
+            f"than {100 * (1 - MOST_LEFT):.0f} % may be the wrong shape of something else"
+        )
+
+    @property
+    def _found(self) -> list[Coefficient]:
+        """The time constants that were looked for: one that stands for a term in dT/dt was not."""
+        fixed = self.response.structure.fixed
+        return [entry for name, entry in self.shapes.items() if name.removesuffix("_s") not in fixed]
+
+    @property
+    def _lag(self) -> str:
+        """The lag in words, with its time constants and structure."""
+        known = [2 * entry["u"] for entry in self._found if entry["u"] is not None]
+        values = [entry["value"] for entry in self._found]
+        low, high = (f"{end(values, default=0.0):.0f}" for end in (min, max))
+        span = f" of {low} s" if values and low == high else f" of {low} to {high} s" if values else ""
+        sure = f" (U at most {max(known):.0f} s, k = 2)" if known else ""
+        return f"a lag{span}{sure}, {self.response.structure.sentence}"
+
+    @property
+    def hint(self) -> str:
+        """What the response would give, and why it is not certain."""
+        rivals = [f"{name} alone would lower it to {rival.rms_dps:.3g} deg/s" for name, rival in self.rivals.items()
+                  if rival.is_below(self.before)]  # fmt: skip
+        return (
+            f"A hint, and not certain: a thermal response of the bias, {self._lag}, would lower the error of "
+            f"stretches left out from {self.before.rms_dps:.3g} to {self.after.rms_dps:.3g} deg/s. Not certain because "
+            f"{self.why}{'; ' if rivals else ''}{', '.join(rivals)}. A loop at another speed of the temperature would "
+            "tell; `labctl improve SERIAL --add thermal_lag` makes a version with it, to be tested on the next record."
+        )
+
     @property
     def sentence(self) -> str:
         """What is certain, and what is not."""
-        values = [entry["value"] for entry in self.shapes.values()]
-        known = [2 * entry["u"] for entry in self.shapes.values() if entry["u"] is not None]
-        span = f" of {min(values):.0f} to {max(values):.0f} s" if values else ""
-        sure = f" (U at most {max(known):.0f} s, k = 2)" if known else ""
         certain = (
-            f"Thermal response of the bias, as one family: a lag{span}{sure}, {self.response.structure.sentence}; it "
-            f"lowers the error of stretches left out from {self.before.rms_dps:.3g} to {self.after.rms_dps:.3g} deg/s."
+            f"Thermal response of the bias, as one family: {self._lag}; it lowers the error of stretches left out from "
+            f"{self.before.rms_dps:.3g} to {self.after.rms_dps:.3g} deg/s."
         )
         if not self.alike:
             return certain
-        longest = max(values, default=0.0)
+        longest = max((entry["value"] for entry in self._found), default=0.0)
         tell = f"; a step of the temperature, held for {3 * longest / 60:.0f} min, would tell" if longest else ""
         return f"{certain} Whether it is a lag or {' or '.join(self.alike)}, this recording cannot tell{tell}."
 
@@ -90,7 +135,8 @@ class ThermalFamily:
 def thermal_family(data: FitData, model: ErrorModel, verdict: Verdict) -> ThermalFamily | None:
     """Return the thermal response beside a model, where the verdict asks for one: at rest, over several legs.
 
-    None where it does not predict, and where another member or what is named predicts clearly better.
+    It is named where it `is_certain`, and else a hint. None where it does not predict, and where another member or what
+    is named predicts clearly better.
     """
     asked = verdict.form == "unexplained" or bool(set(verdict.named) & FAMILY)
     if data.info.motion != "rest" or not asked or LAG in model.effect_ids:
@@ -103,19 +149,34 @@ def thermal_family(data: FitData, model: ErrorModel, verdict: Verdict) -> Therma
     if response is None:
         return None
     after = response.held_out[response.structure.id]
-    if after.chi2 > MOST_LEFT * response.held_out[NONE.id].chi2:
+    if after.chi2 > MOST_LEFT_OF_HINT * response.held_out[NONE.id].chi2:
         return None
     rivals = {name: _rival(data, model, name) for name in RIVALS}
     if any(rival.is_below(after) for rival in rivals.values()):
         return None
     if leaders and _of(data, named).is_below(after):
         return None
-    return ThermalFamily(response, tuple(name for name, rival in rivals.items() if not after.is_below(rival)))
+    return ThermalFamily(response, rivals)
+
+
+def hint_of_added(data: FitData, model: ErrorModel, effects: Collection[str]) -> ThermalFamily | None:
+    """Return the thermal response beside a forward model to which a lag is added, where it is no more than a hint."""
+    if LAG not in effects:
+        return None
+    return family_or_hint(data, model, Verdict("unexplained"))[1]
+
+
+def family_or_hint(
+    data: FitData, model: ErrorModel, verdict: Verdict
+) -> tuple[ThermalFamily | None, ThermalFamily | None]:
+    """Return the thermal response beside a model as one that is named, or as a hint; None for the other, or both."""
+    family = thermal_family(data, model, verdict)
+    return (family, None) if family is None or family.is_certain else (None, family)
 
 
 def with_family(verdict: Verdict, family: ThermalFamily | None) -> Verdict:
     """Return the verdict that names the family once in place of its members; other effects stay as they are named."""
-    if family is None:
+    if family is None or not family.is_certain:
         return verdict
     others = tuple(group for group in verdict.groups if not set(group) & FAMILY)
     groups = ((LAG, *family.alike), *others)

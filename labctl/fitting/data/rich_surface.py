@@ -27,8 +27,10 @@ MOST_SHARE, MOST_SHARE_WITH_LEVELS, LEAST_FREE = 0.5, 0.7, 8
 DEGREES = (6, 4, 2, 2)
 #: Time constants of a warm-up after power-on, s.
 WARM_UP_S = (600.0, 3600.0)
-#: Time constants of lags, s, and widths of hystereses, K, that a loop of temperatures at rest shows.
+#: Time constants of lags, s, and widths of hystereses, K, that a loop of temperatures shows.
 LAGS_S, WIDTHS_K = (150.0, 400.0, 1000.0, 2500.0), (2.0, 6.0, 15.0)
+#: A table measures on ramps where half of the data sets have at least this rate of change, K/min, over so long, s.
+RAMP_K_MIN, RAMP_S = 0.1, 300.0
 #: A column of which those before it leave less than this share says nothing new.
 LEAST_NEW = 1e-2
 #: Delays and time constants, s, whose mixtures follow any response of a gyro: the surface of a rate that changes.
@@ -183,14 +185,20 @@ def _history(channels: Channels, warm: NDArray[np.float64], rate: Array) -> Iter
     direction[order] = leg
     if np.ptp(direction) > 0:
         yield np.column_stack([direction, direction * warm[:, 1], direction * warm[:, 2], direction * rate])
-    if not np.any(rate) and channels.history.courses:
-        lags = [channels.history.lag_k(channels.columns, tau) for tau in LAGS_S]
+    if channels.history.courses and (not np.any(rate) or _is_on_ramps(channels)):
+        lags = np.column_stack([channels.history.lag_k(channels.columns, tau) for tau in LAGS_S])
         states = [channels.history.hysteresis_state(channels.columns, width) for width in WIDTHS_K]
-        yield np.column_stack([*lags, *states])
+        yield np.column_stack([lags, *states])
+        yield lags * rate[:, None]
     since = np.asarray(channels["power_s"], dtype=np.float64) if "power_s" in channels else since_first(channels)
     since = np.maximum(since, 0.0)
     decays = np.column_stack([np.exp(-since / tau) for tau in WARM_UP_S])
     yield np.column_stack([decays, decays * rate[:, None]])
+
+
+def _is_on_ramps(channels: Channels) -> bool:
+    """Return whether the temperature is not held while the table turns: then a lag is seen, and not its rest alone."""
+    return bool(np.median(np.abs(channels.history.rate_k_min(channels.columns, RAMP_S))) >= RAMP_K_MIN)
 
 
 def since_first(channels: Channels) -> Array:

@@ -10,7 +10,7 @@ import numpy as np
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.data.temperature.history import TemperatureHistory
 from labctl.fitting.effects.base import Column, Effect, Parameter, Reference, Rows, Span, Term, by_parameter
-from labctl.fitting.effects.thermal_lag import ThermalLag
+from labctl.fitting.effects.thermal_lag import LAGS
 from labctl.json_types.models import Origin
 
 
@@ -175,7 +175,7 @@ class ThermometerError(Effect):
 
 EFFECTS: tuple[type[Effect], ...] = (
     TemperatureRate,
-    ThermalLag,
+    *LAGS,
     ThermalHysteresis,
     WarmUp,
     SelfHeating,

@@ -1,12 +1,14 @@
-"""Thermal lag: the bias as the answer of one or two heat flows between the thermometer and the sensing element.
+"""Thermal lag: bias and scale factor as the answer of one or two heat flows from thermometer to sensing element.
 
-An element behind the thermometer follows it as dT_g/dt = (T_m - T_g) / tau, and the error of the bias is what the law
-of temperature gives at T_g less what it gives at T_m. Elements of one package have time constants of their own, so each
-axis may have one; two flows, a flow that is faster one way, and a curved law of temperature are further columns.
+An element behind the thermometer follows it as dT_g/dt = (T_m - T_g) / tau, and the error of the bias, or of the scale
+factor, is what its law of temperature gives at T_g less what it gives at T_m. Elements of one package have time
+constants of their own, so each axis may have one; two flows, a flow that is faster one way, and a curved law of
+temperature are further columns.
 """
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
@@ -51,28 +53,22 @@ def tau_of(term: Term, name: str, axis: str) -> float | None:
 
 def lag_elements(term: Term, axis: str) -> list[LagElement]:
     """Return the columns of a term on an axis, in order."""
+    name, unit = term.effect, "1/K" if term.effect == ScaleFactorLag.id else "deg/s/K"
     tau_s = tau_of(term, "tau", axis) or USUAL_S
-    found = [LagElement("thermal_lag", "deg/s/K", "all", tau_s, tau_of(term, "cooling_tau", axis))]
+    found = [LagElement(name, unit, "all", tau_s, tau_of(term, "cooling_tau", axis))]
     if (second := tau_of(term, "second_tau", axis)) is not None:
-        found.append(LagElement("thermal_lag_second", "deg/s/K", "all", second))
-    if term.parameters.get("curved", 0.0):
-        found.append(LagElement("thermal_lag_curved", "deg/s/K2", "curved", tau_s, found[0].cooling_tau_s))
+        found.append(LagElement(f"{name}_second", unit, "all", second))
+    if term.parameters.get(f"curved_{axis}", term.parameters.get("curved", 0.0)):
+        found.append(LagElement(f"{name}_curved", f"{unit}2", "curved", tau_s, found[0].cooling_tau_s))
     return found
 
 
-class ThermalLag(Effect):
-    """Thermal lag between the sensing part and the thermometer."""
+class Lag(Effect):
+    """What the lag of the bias and that of the scale factor have in common."""
 
-    id = "thermal_lag"
     remembers = True
-    term = "Thermal lag (sensing element behind the thermometer)"
-    sentence = (
-        "The sensing element follows the thermometer with a delay, so the correction is made for another temperature."
-    )
     by_temperature = True
     origin: ClassVar[Origin] = "sensor"
-    rows: ClassVar[Rows] = "all"
-    shows_at_rest = True
     needs = ("t_s",)
     parameters = (
         Parameter("tau_s", "s", SHORTEST_S, LONGEST_S, logarithmic=True),
@@ -80,17 +76,18 @@ class ThermalLag(Effect):
         Parameter("cooling_tau_s", "s", SHORTEST_S, LONGEST_S, logarithmic=True),
         Parameter("curved", "1", 0, 1),
     )
-    ranges: ClassVar = {"fog": (0.0, 0.02), "mems": (0.0, 0.1), "piezo": (0.0, 0.6)}
-    experiment = "two ramp speeds: an error due to lag grows with the speed, an error due to hysteresis does not"
     draws = ("legs", "time")
 
+    @abstractmethod
+    def factor(self, channels: Channels, axis: str) -> Array:
+        """Return what the temperature difference is multiplied by: (n,) ones of a bias, the rate of a scale factor."""
+
     def columns(self, channels: Channels, axis: str, term: Term, reference: Reference) -> list[Column]:
-        above_k = channels.temperature_c(axis) - reference.temperature_c
+        above_k, factor = channels.temperature_c(axis) - reference.temperature_c, self.factor(channels, axis)
+        behind = [channels.history.lag_k(channels.columns, e.tau_s, e.cooling_tau_s) for e in lag_elements(term, axis)]
         return [
-            Column(
-                e.column, e.unit, e.values(channels.history.lag_k(channels.columns, e.tau_s, e.cooling_tau_s), above_k)
-            )
-            for e in lag_elements(term, axis)
+            Column(e.column, e.unit, factor * e.values(behind_k, above_k))
+            for e, behind_k in zip(lag_elements(term, axis), behind, strict=True)
         ]
 
     def states_shape(self, term: Term) -> bool:
@@ -99,3 +96,39 @@ class ThermalLag(Effect):
 
     def options(self, span: Span) -> list[Term]:
         return by_parameter(self.id, tau_s=np.geomspace(150.0, 3600.0, 7))
+
+
+class ThermalLag(Lag):
+    """Thermal lag between the sensing part and the thermometer."""
+
+    id = "thermal_lag"
+    term = "Thermal lag (sensing element behind the thermometer)"
+    sentence = (
+        "The sensing element follows the thermometer with a delay, so the correction is made for another temperature."
+    )
+    rows: ClassVar[Rows] = "all"
+    shows_at_rest = True
+    ranges: ClassVar = {"fog": (0.0, 0.02), "mems": (0.0, 0.1), "piezo": (0.0, 0.6)}
+    experiment = "two ramp speeds: an error due to lag grows with the speed, an error due to hysteresis does not"
+
+    def factor(self, channels: Channels, axis: str) -> Array:
+        return np.ones(len(channels))
+
+
+class ScaleFactorLag(Lag):
+    """Thermal lag of the scale factor: the element that scales the rate is behind the thermometer."""
+
+    id = "scale_factor_lag"
+    term = "Thermal lag of the scale factor"
+    sentence = (
+        "The scale factor follows the thermometer with a delay: while the temperature changes, it is that of another "
+        "temperature."
+    )
+    ranges: ClassVar = {"fog": (0.0, 1e-3), "mems": (0.0, 5e-4), "piezo": (0.0, 2e-4)}
+    experiment = "the same rates during a ramp of the temperature and after it, on the way up and on the way down"
+
+    def factor(self, channels: Channels, axis: str) -> Array:
+        return channels.rate_dps(axis)
+
+
+LAGS: tuple[type[Lag], ...] = (ThermalLag, ScaleFactorLag)

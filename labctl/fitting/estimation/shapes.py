@@ -16,7 +16,8 @@ import numpy as np
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.effects import Effect, Parameter, Span, Term, kind_of
 from labctl.fitting.estimation.axis_design import axis_design
-from labctl.fitting.estimation.thermal_response import STRUCTURES, has_lag, thermal_response
+from labctl.fitting.estimation.thermal_flows import STRUCTURES
+from labctl.fitting.estimation.thermal_response import lags_of, thermal_response
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.presets import Preset, Rows
 from labctl.fitting.numeric.arrays import Array
@@ -28,8 +29,8 @@ TOLERANCE, EVALUATIONS = 0.005, 60
 
 
 def quantities(kind: Effect) -> list[Parameter]:
-    """Return the parameters of an effect of the bias that are found from the data; none for other effects."""
-    return [each for each in kind.parameters if each.logarithmic] if kind.shows_at_rest else []
+    """Return the parameters that are found from the data: of an effect of the bias, and of one that remembers."""
+    return [each for each in kind.parameters if each.logarithmic] if kind.shows_at_rest or kind.remembers else []
 
 
 def with_shapes(data: FitData, preset: Preset, *, all_of_them: bool = False) -> Preset:
@@ -41,7 +42,7 @@ def with_shapes(data: FitData, preset: Preset, *, all_of_them: bool = False) -> 
     model, _ = preset.build(data)
     remembering = [term for term in model.terms if quantities(kind_of(term))]
     open_ = [term for term in remembering if not kind_of(term).states_shape(term)]
-    again = all_of_them and (len(remembering) > 1 or has_lag(model) is not None)
+    again = all_of_them and (len(remembering) > 1 or bool(lags_of(model)))
     if not (open_ or again):
         return preset
     if any(data.channels.missing(kind_of(term).channels) for term in remembering):
@@ -60,18 +61,18 @@ def with_shapes(data: FitData, preset: Preset, *, all_of_them: bool = False) -> 
 
 
 def _with_structure(data: FitData, model: ErrorModel, found: Sequence[Term]) -> Sequence[Term]:
-    """Return terms in their best shapes with the heat flows of the lag among them that the recording shows."""
+    """Return terms in their best shapes with the heat flows of the lags among them that the recording shows."""
     shaped = {term.effect: term for term in found}
-    model = model.with_terms(tuple(shaped.get(term.effect, term) for term in model.terms))
-    lag = has_lag(model)
-    if lag is None or lag.effect not in shaped or lag.effect in model.held.effects:
-        return found
-    response = thermal_response(data, model, lag)
-    if response is None or response.structure is STRUCTURES[0]:
-        return found
-    shaped[lag.effect] = response.term
-    others = [effect for effect in shaped if effect != lag.effect]
-    if others:  # beside another lag they have other shapes
+    lags = [lag.effect for lag in lags_of(model) if lag.effect in shaped and lag.effect not in model.held.effects]
+    flows: list[str] = []
+    for effect in lags:
+        model = model.with_terms(tuple(shaped.get(term.effect, term) for term in model.terms))
+        response = thermal_response(data, model, shaped[effect])
+        if response is not None and response.structure is not STRUCTURES[0]:
+            shaped[effect] = response.term
+            flows.append(effect)
+    others = [effect for effect in shaped if effect not in flows]
+    if flows and others:  # beside another lag they have other shapes
         model = model.with_terms(tuple(shaped.get(term.effect, term) for term in model.terms))
         shaped |= {term.effect: term for term in _found(data, model, others)}
     return list(shaped.values())

@@ -1,16 +1,14 @@
-"""How many heat flows a recording shows: the time constants of a thermal lag, and its structure by legs left out.
+"""How many heat flows a recording shows: the time constants of a lag, and its structure by legs left out.
 
-For given time constants the bias is linear in all other coefficients (variable projection: Golub and Pereyra 1973,
-doi:10.1137/0710036), so a grid of them is tried at once by its normal equations. A structure with more time constants
-always leaves less of the data that it is fitted to; it is only taken where it predicts stretches of the temperature
-course that it has not seen clearly better than a simpler one.
+A structure with more time constants always leaves less of the data that it is fitted to; it is only taken where it
+predicts stretches of the temperature course that it has not seen clearly better than a simpler one. Axes whose
+structures differ have one each where that predicts clearly better than one structure for all.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,94 +16,34 @@ from numpy.typing import NDArray
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.data.temperature.legs import legs_of
 from labctl.fitting.effects import Term, kind_of
-from labctl.fitting.effects.thermal_lag import LONGEST_S, SHORTEST_S, LagElement, Part, ThermalLag
-from labctl.fitting.estimation.axis_design import axis_design
+from labctl.fitting.effects.thermal_lag import Lag
+from labctl.fitting.estimation.thermal_flows import (
+    APART,
+    GRID_S,
+    MOST_STEPS,
+    NONE,
+    STRUCTURES,
+    Axis,
+    Errors,
+    LeftOut,
+    Stretch,
+    Structure,
+    Taus,
+    best_taus,
+    errors_of,
+    moved_around,
+    pooled,
+)
 from labctl.fitting.models.error_model import ErrorModel
-from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.blas_threads import single_threaded
-from labctl.fitting.numeric.drift_noise import whitened
-from labctl.fitting.numeric.variable_projection import Local, refined
 
-#: Time constants that are tried, s; neighbours are a tenth apart.
-GRID_S = np.geomspace(SHORTEST_S, LONGEST_S, 60)
-#: Two flows of one element are at least so many places of the grid apart: nearer ones are one.
-APART = 4
 #: Time constants of warming and cooling differ by more than so many standard uncertainties of their ratio, where the
 #: data tell both.
 TOLD_APART, MOST_CONDITION = 3.0, 1e12
-#: A structure with more coefficients is taken where it lowers the chi2 of what was left out by this share, and by so
-#: much more in units of its scatter.
-BETTER_BY, BETTER_TO = 0.02, 9.0
 #: Data sets that a stretch needs, legs up to which each is left out, and how far beyond the others it is tested, K.
 LEAST_SETS, MOST_LEGS, BEYOND_K = 4, 12, 1.0
-#: Columns that the base explains but for this share of their square are not tried; two that differ by less are one.
-LEAST_LEFT = 1e-6
-#: Steps by Gauss and Newton from the grid's best, for a stretch left out and for all data; difference of a logarithm.
-FEW_STEPS, MOST_STEPS, STEP = 2, 12, 0.01
-LOG_BOUNDS = (float(np.log(SHORTEST_S)), float(np.log(LONGEST_S)))
-#: Axis -> name -> time constant, s.
-Taus = Mapping[str, Mapping[str, float]]
-PARTS: tuple[Part, ...] = ("all", "curved")
-#: Places on the grid of the time constants of warming and cooling that are tried together, (q, 2).
-PAIRS = np.stack(np.meshgrid(*2 * [np.arange(0, len(GRID_S), 4)], indexing="ij"), axis=-1).reshape(-1, 2)
-
-
-@dataclass(frozen=True)
-class Structure:
-    """A set of heat flows: for each column the name of its time constant, and what of the lag it takes."""
-
-    id: str
-    sentence: str
-    columns: tuple[tuple[str, Part], ...] = ()
-    per_axis: bool = True  #: whether each axis has time constants of its own
-    two_ways: bool = False  #: whether the first time constant is another one while the element cools
-    fixed: Mapping[str, float] = field(default_factory=dict)  #: name -> time constant that is not looked for, s
-
-    @property
-    def size(self) -> tuple[int, bool]:
-        """How much it takes: structures of one size are compared before the next ones."""
-        return len(self.columns) + self.two_ways, self.per_axis
-
-    @property
-    def constants(self) -> tuple[str, ...]:
-        """The names of the time constants that are looked for, without the axis."""
-        named = dict.fromkeys(name for name, _ in self.columns if name not in self.fixed)
-        return (*named, *(("cooling_tau",) if self.two_ways else ()))
-
-    def taus_s(self, logarithms: Array) -> dict[str, float]:
-        """Return its time constants, s, by the logarithms of those that are looked for."""
-        return {**dict(zip(self.constants, np.exp(logarithms).tolist(), strict=True)), **self.fixed}
-
-
-NONE = Structure("none", "no lag")
-#: Simplest first.
-STRUCTURES: tuple[Structure, ...] = (
-    Structure("one", "one time constant for all axes", (("tau", "all"),), per_axis=False),
-    Structure("per_axis", "one time constant on each axis", (("tau", "all"),)),
-    Structure(
-        "rate", "one time constant for all axes, and a term in dT/dt",  # a flow that is nearly at once: -tau dT/dt
-        (("tau", "all"), ("second_tau", "all")), per_axis=False, fixed={"second_tau": SHORTEST_S},
-    ),
-    Structure("curved", "one time constant on each axis, and a curved law", (("tau", "all"), ("tau", "curved"))),
-    Structure(
-        "two_ways", "one time constant on each axis while it warms up, another while it cools",
-        (("tau", "all"),), two_ways=True,
-    ),
-    Structure("two_flows", "two time constants on each axis", (("tau", "all"), ("second_tau", "all"))),
-)  # fmt: skip
-
-
-@dataclass(frozen=True)
-class LeftOut:
-    """What a structure leaves of stretches that it has not seen: root mean square, deg/s, and chi2 over the noise."""
-
-    rms_dps: float
-    chi2: float
-    n: int  #: values that were predicted
-
-    def is_below(self, other: LeftOut) -> bool:
-        """Return whether it is clearly less than what another structure leaves."""
-        return self.chi2 < (1 - BETTER_BY) * other.chi2 - BETTER_TO * other.chi2 / other.n
+#: What stands for structures that differ from axis to axis.
+BY_AXIS = "by_axis"
 
 
 @dataclass(frozen=True)
@@ -119,25 +57,79 @@ class ThermalResponse:
 
 @single_threaded
 def thermal_response(data: FitData, model: ErrorModel, term: Term) -> ThermalResponse | None:
-    """Return the lag of a recording beside the other effects of a model; `term` is what it replaces.
+    """Return the lag of bias or scale factor beside the other effects of a model; `term` is what it replaces.
 
     None where the temperature goes one way only, so that no part of its course says what another does.
     """
     stretches = stretches_of(data)
-    if not stretches or data.channels.missing(ThermalLag().channels):
+    kind = kind_of(term)
+    if not stretches or not isinstance(kind, Lag) or data.channels.missing(kind.channels):
         return None
-    rest = model.with_terms(tuple(t for t in model.terms if t.effect != ThermalLag.id))
-    axes = [Axis(data, rest, axis) for axis in data.outputs]
+    rest = model.with_terms(tuple(t for t in model.terms if t.effect != term.effect))
+    axes = [Axis(data, rest, axis, kind) for axis in data.outputs]
     tried = [structure for structure in STRUCTURES if structure.id != "per_axis" or len(axes) > 1]
-    held_out = {structure.id: left_out_by(axes, structure, stretches) for structure in (NONE, *tried)}
+    errors = {structure.id: errors_of(axes, structure, stretches) for structure in (NONE, *tried)}
+    held_out = {name: pooled(found) for name, found in errors.items()}
     every = np.ones(len(data), dtype=bool)
+    chosen, found = _told_apart(axes, tried, held_out, every)
+    structures = dict.fromkeys((axis.name for axis in axes), chosen)
+    if len(axes) > 1:
+        own = [_of_axis(axis, errors, stretches, every) for axis in axes]
+        held_out[BY_AXIS] = pooled([each for part in own for each in part.errors])
+        fewer = sum(part.structure.coefficients(1) for part in own) < chosen.coefficients(len(axes))
+        mixed, common = held_out[BY_AXIS], held_out[chosen.id]
+        is_better = not common.is_below(mixed) if fewer else mixed.is_below(common)
+        if is_better and len({part.structure.id for part in own}) > 1:
+            structures = {part.name: part.structure for part in own}
+            found = {part.name: part.taus_s for part in own}
+            chosen = _by_axis(structures)
+    return ThermalResponse(_term_of(axes, term, structures, found), chosen, held_out)
+
+
+@dataclass(frozen=True)
+class _OfAxis:
+    """What one axis shows by itself."""
+
+    name: str
+    structure: Structure
+    taus_s: Mapping[str, float]
+    errors: Errors
+
+
+def _of_axis(
+    axis: Axis, errors: Mapping[str, Errors], stretches: Sequence[Stretch], every: NDArray[np.bool_]
+) -> _OfAxis:
+    """Return the structure of one axis by what was left out of it; of what each axis has by itself that is known."""
+    tried, own = [], {}
+    for structure in STRUCTURES:
+        if structure is STRUCTURES[0]:  # on one axis the same as a time constant on each
+            continue
+        of_axis = structure.of_axis()
+        known = [each for each in errors.get(structure.id, ()) if each[0] is axis]
+        tried.append(of_axis)
+        own[of_axis.id] = known if structure.per_axis else errors_of([axis], of_axis, stretches)
+    structure, found = _told_apart([axis], tried, {name: pooled(left) for name, left in own.items()}, every)
+    return _OfAxis(axis.name, structure, found[axis.name], own[structure.id])
+
+
+def _by_axis(structures: Mapping[str, Structure]) -> Structure:
+    """Return what stands for structures that differ from axis to axis, in words and in what was not looked for."""
+    said = "; ".join(f"on {axis} {structure.sentence}" for axis, structure in structures.items())
+    fixed = {f"{name}_{axis}": tau_s for axis, each in structures.items() for name, tau_s in each.fixed.items()}
+    return Structure(BY_AXIS, said, fixed=fixed)
+
+
+def _told_apart(
+    axes: Sequence[Axis], structures: Sequence[Structure], held_out: Mapping[str, LeftOut], every: NDArray[np.bool_]
+) -> tuple[Structure, Taus]:
+    """Return the structure chosen, and its time constants, among those whose time constants are not the same."""
+    tried = list(structures)
     while True:
         chosen = _chosen(tried, held_out)
         found = best_taus(axes, chosen, every, MOST_STEPS)
         if are_told_apart(axes, chosen, found, every):
-            break
+            return chosen, found
         tried.remove(chosen)
-    return ThermalResponse(_term_of(axes, term, chosen, found), chosen, held_out)
 
 
 def _chosen(tried: Sequence[Structure], held_out: Mapping[str, LeftOut]) -> Structure:
@@ -165,7 +157,7 @@ def are_told_apart(axes: Sequence[Axis], structure: Structure, found: Taus, seen
 def _ways_differ(axis: Axis, structure: Structure, taus_s: Mapping[str, float], seen: NDArray[np.bool_]) -> bool:
     """Return whether warming and cooling have different time constants, by the curvature of what is left."""
     logarithms = np.log([taus_s[name] for name in structure.constants])
-    (part,) = _around([axis], structure, seen, logarithms)
+    (part,) = moved_around([axis], structure, seen, logarithms)
     freedom = max(len(part.residual) - axis.base.shape[1] - len(structure.columns) - len(logarithms), 1)
     information = part.slopes.T @ part.slopes / (part.chi2 / freedom)
     if np.linalg.cond(information) > MOST_CONDITION:
@@ -211,183 +203,19 @@ def _rises(data: FitData, leg: NDArray[np.bool_]) -> bool:
     return bool(np.mean(second) > np.mean(first))
 
 
-class Axis:
-    """One axis: the columns of the other effects, those of every time constant, and what is to be explained."""
-
-    def __init__(self, data: FitData, rest: ErrorModel, name: str) -> None:
-        self.data, self.name = data, name
-        design = axis_design(data, rest, name)
-        self.base = design.columns
-        self.y = data.outputs[name] - data.true_rate_dps(name) - design.offset_dps
-        self.above_k = data.channels.temperature_c(name) - rest.reference.temperature_c
-        self._folds: dict[bytes, Projected] = {}
-
-    @cached_property
-    def lags(self) -> NDArray[np.float64]:
-        """The columns of every time constant of the grid (m, .): of each part in turn, then of pairs of them."""
-        behind = [self._behind_k(float(tau_s)) for tau_s in GRID_S]
-        made = [LagElement("", "", part, 0.0).values(lag, self.above_k) for part in PARTS for lag in behind]
-        channels, (warming, cooling) = self.data.channels, GRID_S[PAIRS.T]
-        return np.column_stack([*made, channels.history.lags_two_ways_k(channels.columns, warming, cooling)])
-
-    def _behind_k(self, tau_s: float, cooling_tau_s: float | None = None) -> Array:
-        return self.data.channels.history.lag_k(self.data.channels.columns, tau_s, cooling_tau_s)
-
-    def columns(self, structure: Structure, taus_s: Mapping[str, float]) -> NDArray[np.float64]:
-        """Return the columns (m, k) of a structure at time constants, s."""
-        made = (
-            LagElement("", "", part, 0.0).values(self._behind_k(taus_s[name], taus_s.get("cooling_tau")), self.above_k)
-            for name, part in structure.columns
-        )
-        return np.column_stack([np.zeros((len(self.y), 0)), *made])
-
-    def projected(self, seen: NDArray[np.bool_]) -> Projected:
-        """Return the time constants' columns beside the base, over the noise, of the data sets of a mask."""
-        key = seen.tobytes()
-        if key not in self._folds:
-            self._folds[key] = Projected(self, seen)
-        return self._folds[key]
-
-    def over_noise(self, values: NDArray[np.float64], seen: NDArray[np.bool_]) -> NDArray[np.float64]:
-        """Return columns (m, k) of the data sets of a mask, whitened at the drift of the noise floor."""
-        scatter = self.data.take(seen).scatter(self.name)
-        white = scatter.white_var if scatter.white_var is not None else np.ones(int(seen.sum()))
-        return whitened(scatter, [self.data.noise_floor.axes[self.name].drift], white, values[seen])[0][0]
-
-    def left_over_noise(self, added: NDArray[np.float64], seen: NDArray[np.bool_]) -> Array:
-        """Return what a fit of base and added columns (m, k) leaves of the data sets of a mask, whitened."""
-        rows = self.over_noise(np.column_stack([self.base, added, self.y]), seen)
-        size = np.maximum(np.linalg.norm(rows[:, :-1], axis=0), 1e-300)
-        taken, *_ = np.linalg.lstsq(rows[:, :-1] / size, rows[:, -1], rcond=1e-9)
-        return np.asarray(rows[:, -1] - rows[:, :-1] / size @ taken)
-
-    def errors(self, added: NDArray[np.float64], seen: NDArray[np.bool_], tested: NDArray[np.bool_]) -> Array:
-        """Return what a fit of base and added columns (m, k) to some data sets leaves of others, deg/s."""
-        whole = np.concatenate([self.base, added], axis=1)
-        rows = self.over_noise(np.column_stack([whole, self.y]), seen)
-        size = np.maximum(np.linalg.norm(rows[:, :-1], axis=0), 1e-300)
-        taken, *_ = np.linalg.lstsq(rows[:, :-1] / size, rows[:, -1], rcond=1e-9)
-        return np.asarray(self.y[tested] - whole[tested] @ (taken / size))
-
-
-class Projected:
-    """Normal equations of the time constants' columns of one axis, beside its base."""
-
-    def __init__(self, axis: Axis, seen: NDArray[np.bool_]) -> None:
-        rows = axis.over_noise(np.column_stack([axis.base, axis.lags, axis.y]), seen)
-        base, rest = rows[:, : axis.base.shape[1]], rows[:, axis.base.shape[1] :]
-        whole = (rest**2).sum(axis=0)
-        if base.shape[1]:
-            directions, sizes, _ = np.linalg.svd(
-                base / np.maximum(np.linalg.norm(base, axis=0), 1e-300), full_matrices=False
-            )
-            directions = directions[:, sizes > 1e-9 * sizes[0]]
-            rest = rest - directions @ (directions.T @ rest)
-        alone = rest[:, : len(PARTS) * len(GRID_S)]  # columns that are also tried in twos
-        self._gram, self._pull = alone.T @ alone, rest[:, :-1].T @ rest[:, -1]
-        size = (rest[:, :-1] ** 2).sum(axis=0)
-        self._kept = size > LEAST_LEFT * np.maximum(whole[:-1], 1e-300)
-        self._single = self._pull**2 / np.where(self._kept, size, np.inf)
-
-    def gains(self, columns: NDArray[np.int64]) -> Array:
-        """Return the chi2 that each set of one or two columns (q, 1 or 2) takes off, (q,)."""
-        if columns.shape[1] == 1:
-            return self._single[columns[:, 0]]
-        i, j = columns.T
-        a, b, c = self._gram[i, i], self._gram[j, j], self._gram[i, j]
-        left = a * b - c**2
-        good = self._kept[i] & self._kept[j] & (left > LEAST_LEFT * a * b)
-        both = b * self._pull[i] ** 2 - 2 * c * self._pull[i] * self._pull[j] + a * self._pull[j] ** 2
-        return np.where(good, both / np.where(good, left, 1.0), np.maximum(self._single[i], self._single[j]))
-
-
-def _choices(structure: Structure) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return the columns (q, k) that a structure tries together, and the places of its constants on the grid."""
-    n = len(GRID_S)
-    if structure.two_ways:
-        return len(PARTS) * n + np.arange(len(PAIRS))[:, None], PAIRS
-    if structure.fixed:
-        places = np.arange(APART, n)[:, None]
-        at = np.column_stack([places, np.zeros_like(places)])  # the shortest of the grid
-    elif len(structure.constants) == 1:
-        places = np.arange(n)[:, None]
-        at = np.repeat(places, len(structure.columns), axis=1)
-    else:
-        first, second = np.indices((n, n)).reshape(2, -1)
-        kept = second >= first + APART
-        places = at = np.column_stack([first[kept], second[kept]])
-    offsets = np.array([PARTS.index(part) * n for _, part in structure.columns])
-    return at + offsets, places
-
-
-def best_taus(axes: Sequence[Axis], structure: Structure, seen: NDArray[np.bool_], steps: int = FEW_STEPS) -> Taus:
-    """Return axis -> name -> time constant, s, for the data sets of a mask: the grid's best, and steps from there."""
-    if not structure.columns:
-        return {axis.name: {} for axis in axes}
-    columns, places = _choices(structure)
-    gains = [axis.projected(seen).gains(columns) for axis in axes]
-    groups = [([axis], gain) for axis, gain in zip(axes, gains, strict=True)]
-    if not structure.per_axis:
-        groups = [(list(axes), np.sum(gains, axis=0))]
-    found: dict[str, Mapping[str, float]] = {}
-    for group, gain in groups:
-        begin = np.log(GRID_S[places[int(np.argmax(gain))]])
-        logarithms = refined(partial(_around, group, structure, seen), begin, LOG_BOUNDS, steps)
-        found |= {axis.name: structure.taus_s(logarithms) for axis in group}
-    return found
-
-
-def _around(group: Sequence[Axis], structure: Structure, seen: NDArray[np.bool_], logarithms: Array) -> list[Local]:
-    """Return what is left of each axis at logarithms of time constants, and what each of them moves."""
-    taus_s = structure.taus_s(logarithms)
-    found = []
-    for axis in group:
-        own = axis.columns(structure, taus_s)
-        moved = [
-            (axis.columns(structure, {**taus_s, name: taus_s[name] * np.exp(STEP)}) - own) / STEP
-            for name in structure.constants
-        ]
-        rows = axis.over_noise(np.column_stack([axis.base, own, *moved, axis.y]), seen)
-        found.append(Local(rows, axis.base.shape[1], own.shape[1]))
-    return found
-
-
-def left_out_by(
-    axes: Sequence[Axis], structure: Structure, stretches: Sequence[tuple[NDArray[np.bool_], NDArray[np.bool_]]]
-) -> LeftOut:
-    """Return the errors of stretches by fits to the rest, time constants included."""
-    found = []
-    for seen, tested in stretches:
-        taus_s = best_taus(axes, structure, seen)
-        found += [
-            (axis, tested, axis.errors(axis.columns(structure, taus_s[axis.name]), seen, tested)) for axis in axes
-        ]
-    return pooled(found)
-
-
-def pooled(errors: Sequence[tuple[Axis, NDArray[np.bool_], Array]]) -> LeftOut:
-    """Return the errors of stretches together: of an axis, the data sets that were tested, and their errors, deg/s."""
-    chi2 = 0.0
-    for axis, tested, found in errors:
-        whole = np.zeros(len(tested))
-        whole[tested] = found
-        chi2 += float(np.sum(axis.over_noise(whole[:, None], tested) ** 2))
-    every = np.concatenate([found for *_, found in errors])
-    return LeftOut(float(np.sqrt(np.mean(every**2))), chi2, len(every))
-
-
-def _term_of(axes: Sequence[Axis], term: Term, structure: Structure, found: Taus) -> Term:
-    """Return the term with time constants of a structure, those of each axis or of all."""
-    kept = {name: value for name, value in term.parameters.items() if not name.endswith("_s") and name != "curved"}
-    if any(part == "curved" for _, part in structure.columns):
-        kept["curved"] = 1.0
-    apart = structure.per_axis and len(axes) > 1
+def _term_of(axes: Sequence[Axis], term: Term, structures: Mapping[str, Structure], found: Taus) -> Term:
+    """Return the term with the time constants of the axes' structures, those of each axis or of all."""
+    named = {name: value for name, value in term.parameters.items() if not name.endswith("_s")}
+    kept = {name: value for name, value in named.items() if not name.startswith("curved")}
+    curved = [axis for axis, each in structures.items() if any(part == "curved" for _, part in each.columns)]
+    kept |= {"curved": 1.0} if len(curved) == len(axes) else {f"curved_{axis}": 1.0 for axis in curved}
+    apart = any(structure.per_axis for structure in structures.values()) and len(axes) > 1
     for axis in axes if apart else axes[:1]:
         of_axis = f"_{axis.name}" if apart else ""
         kept |= {f"{name}{of_axis}_s": value for name, value in found[axis.name].items()}
     return replace(term, parameters=kept)
 
 
-def has_lag(model: ErrorModel) -> Term | None:
-    """Return the lag of a model; None where it has none."""
-    return next((term for term in model.terms if isinstance(kind_of(term), ThermalLag)), None)
+def lags_of(model: ErrorModel) -> list[Term]:
+    """Return the lags of a model, of the bias and of the scale factor."""
+    return [term for term in model.terms if isinstance(kind_of(term), Lag)]

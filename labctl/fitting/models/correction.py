@@ -15,6 +15,9 @@ from labctl.fitting.models.sine_form import sine_form_of
 from labctl.fitting.numeric.arrays import Array
 
 Correct = Callable[[Array, Array, Mapping[str, Array]], Array]
+#: Steps in which a scale factor that lags is solved with the rest of a law, and the change of the rate, as a share of
+#: the largest, at which they end. Each shrinks the error by the scale errors of both, a few thousand times.
+SCALE_STEPS, SCALE_CLOSE = 12, 1e-15
 
 
 def correct_across(
@@ -33,6 +36,26 @@ def correct_across(
     outputs = {axis: raw[:, i] for i, axis in enumerate(axes)}
     corrected = fitted.compensate(outputs, Channels(columns, outputs), across_dps)
     return np.column_stack([corrected[axis] for axis in axes])
+
+
+def with_scale(correct: Callable[[Array], Array], output: Array, scale: Array, low: float, high: float) -> Array:
+    """Return rates w, (n, axes) deg/s, with w = correct(output - scale * w), for scale errors (n, axes) of a lag.
+
+    `correct` is the correction by the rest of a law of the rate. Outside `low` to `high`, deg/s, the error at the edge
+    is taken. What is no number stays so. Where the steps end they change the rate by rounding alone.
+    """
+    gain = 1.0 + scale
+    rate = correct(output) / gain
+    before = np.inf
+    for _ in range(SCALE_STEPS):
+        step = (correct(output - scale * np.clip(rate, low, high)) - rate) / gain
+        rate = rate + step
+        change = float(np.max(np.abs(step[~np.isnan(step)]), initial=0.0))
+        size = float(np.max(np.abs(rate[~np.isnan(rate)]), initial=1.0))
+        if change <= SCALE_CLOSE * size or not change < before:
+            break
+        before = change
+    return rate
 
 
 def correction(fitted: FittedModel, axes: tuple[str, ...]) -> Correct:

@@ -17,7 +17,7 @@ from labctl.errors import BadInput
 from labctl.fitting.data.channels import BODY_AXES, Channels
 from labctl.fitting.data.temperature.history import LoggedColumns, TemperatureHistory, rounded_plays
 from labctl.fitting.effects import Term, kind_of
-from labctl.fitting.effects.thermal_lag import LagElement, Part, lag_elements
+from labctl.fitting.effects.thermal_lag import Lag, LagElement, Part, ScaleFactorLag, lag_elements
 from labctl.fitting.models.fitted_model import FittedModel, without
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.following import Steps
@@ -32,6 +32,12 @@ STATE_EQUATION = (
     "width_k / 2 of T and adds size * (T - at_c) / (width_k / 2), with bow_c = [low, high] times 4 q (1 - q), "
     "q = (T - low) / (high - low) from 0 to 1"
 )
+#: What is added where an element has a `scale`.
+SCALE_EQUATION = "; the difference of a lag times its scale is added to the scale factor of each axis, so that {law}"
+LAWS = {
+    "rate": "the output is what the rest of the model gives, plus bias and scale * difference * rate",
+    "output": "scale * difference * output is subtracted with the rest of the errors",
+}
 #: Samples that are followed at once, so that they stay in the processor's cache.
 BLOCK = 16384
 
@@ -48,6 +54,7 @@ class Follower:
     bow: tuple[float, float] | None = None  #: lowest and highest temperature, deg C, where the size goes to 0
     part: Part = "all"  #: what of a lag makes the error
     reference_c: float = 0.0  #: of a curved lag: the temperature that the squares are taken about, deg C
+    scale: Array | None = None  #: (axes,) of a lag of the scale factor: its error, 1, in place of deg/s; None: none
 
     def to_json(self) -> JsonObject:
         """Return what a program needs that follows the temperature itself, as JSON."""
@@ -57,6 +64,7 @@ class Follower:
         return {
             "kind": "lag", "tau_s": self.parameter, "cooling_tau_s": self.cooling_s or self.parameter,
             "is_curved": self.part == "curved", "reference_c": self.reference_c, "size": self.size.tolist(),
+            **({} if self.scale is None else {"scale": self.scale.tolist()}),
         }  # fmt: skip
 
     @property
@@ -84,6 +92,18 @@ class Follower:
 
 
 @dataclass(frozen=True)
+class Remembered:
+    """What the temperatures before add to samples: to the bias, and to the scale factor."""
+
+    bias_dps: Array  #: (n, axes) deg/s
+    scale: Array | None = None  #: (n, axes), times the rate, or times the output of a direct law; None: nothing
+
+    def with_bias(self, bias_dps: Array) -> Remembered:
+        """Return the same with more of the bias, (n, axes) deg/s."""
+        return Remembered(self.bias_dps + bias_dps, self.scale)
+
+
+@dataclass(frozen=True)
 class Memory:
     """The part of a model that remembers."""
 
@@ -96,7 +116,7 @@ class Memory:
         return [follower for term in self.part.model.terms for follower in self._of(term)]
 
     def _of(self, term: Term) -> list[Follower]:
-        if term.effect == "thermal_lag":
+        if isinstance(kind_of(term), Lag):
             return self._lags(term)
         size = np.array([self._size(term.effect, axis, "leg") for axis in self.axes])
         width_k = term.parameters.get("width_k", 3.0)
@@ -116,21 +136,34 @@ class Memory:
                     (element.tau_s, element.cooling_tau_s, element.part), np.zeros(len(self.axes))
                 )
                 of_axes[k] += self._size(term.effect, axis, element.column)
-        about = self.part.model.reference.temperature_c
+        about, none = self.part.model.reference.temperature_c, np.zeros(len(self.axes))
+        of_scale = term.effect == ScaleFactorLag.id
         return [
-            Follower("lag", tau_s, cooling_s, size, None, part, about if part == "curved" else 0.0)
+            Follower(
+                "lag", tau_s, cooling_s, none if of_scale else size, None, part, about if part == "curved" else 0.0,
+                size if of_scale else None,
+            )
             for (tau_s, cooling_s, part), size in sizes.items()
-        ]
+        ]  # fmt: skip
 
     def _size(self, effect: str, axis: str, column: str) -> float:
         fit = self.part.axes[axis]
         owned = (k for k, (owner, name) in enumerate(zip(fit.effects, fit.names, strict=True)) if owner == effect)
         return next((float(fit.values[k, 0]) for k in owned if fit.names[k] == column), 0.0)
 
-    def of_history(self, history: TemperatureHistory, columns: LoggedColumns) -> Array:
-        """Return the error of each row of a recording whose history is known, (n, axes) deg/s."""
-        still = {axis: np.zeros(len(next(iter(columns.values())))) for axis in BODY_AXES}
-        channels = Channels(dict(columns), still, history)
+    @property
+    def has_scale(self) -> bool:
+        """Whether a part of the error grows with the rate."""
+        return any(follower.scale is not None for follower in self.followers)
+
+    def of_history(self, history: TemperatureHistory, columns: LoggedColumns) -> Remembered:
+        """Return the errors of each row, (n, axes), of a recording whose history is known."""
+        n = len(next(iter(columns.values())))
+        still, turning = (self._at(history, columns, np.full(n, rate)) for rate in (0.0, 1.0))
+        return Remembered(still, turning - still if self.has_scale else None)
+
+    def _at(self, history: TemperatureHistory, columns: LoggedColumns, rate_dps: Array) -> Array:
+        channels = Channels(dict(columns), dict.fromkeys(BODY_AXES, rate_dps), history)
         return np.column_stack([self.part.error_dps(channels, axis) for axis in self.axes])
 
 
@@ -148,7 +181,13 @@ class RunningMemory:
 
     def __init__(self, memory: Memory) -> None:
         self._followers = memory.followers
+        self._axes = len(memory.axes)
+        #: (followers, axes) of the bias, and beside them where there are any those of the scale factor.
         self._sizes = np.array([follower.size for follower in self._followers])
+        if memory.has_scale:
+            none = np.zeros(self._axes)
+            scales = [none if follower.scale is None else follower.scale for follower in self._followers]
+            self._sizes = np.concatenate([self._sizes, np.array(scales)], axis=1)
         self.state: MemoryState | None = None  #: None before the first sample
 
     def reset(self) -> None:
@@ -171,19 +210,21 @@ class RunningMemory:
         """The time of the last sample, s; None before the first."""
         return self.state.t_s if self.state is not None else None
 
-    def error_dps(self, t_s: float, temperature_c: float) -> Array:
-        """Return the error at a sample, (axes,) deg/s, in order of time; one that is no number moves nothing."""
-        return self.errors_dps(np.array([t_s]), np.array([temperature_c]))[0]
-
-    def errors_dps(self, t_s: Array, temperature_c: Array) -> Array:
-        """Return the errors at samples (n,) in order of time, (n, axes) deg/s, and move on to the last of them.
+    def errors(self, t_s: Array, temperature_c: Array) -> Remembered:
+        """Return the errors at samples (n,) in order of time, (n, axes) each, and move on to the last of them.
 
         A sample that is no number moves nothing.
         """
+        found = self._errors(t_s, temperature_c)
+        if found.shape[1] == self._axes:
+            return Remembered(found)
+        return Remembered(found[:, : self._axes], found[:, self._axes :])
+
+    def _errors(self, t_s: Array, temperature_c: Array) -> Array:
         known = np.isfinite(t_s) & np.isfinite(temperature_c)
         if not known.all():
             found = np.full((len(t_s), self._sizes.shape[1]), np.nan)
-            found[known] = self.errors_dps(t_s[known], temperature_c[known])
+            found[known] = self._errors(t_s[known], temperature_c[known])
             return found
         found = np.empty((len(t_s), self._sizes.shape[1]))
         for begin in range(0, len(t_s), BLOCK):
@@ -205,8 +246,8 @@ class RunningMemory:
         return rows.T @ self._sizes
 
 
-def course(running: RunningMemory, t_s: Array, temperature_c: Array) -> Array:
-    """Return the error of samples at times (n,) and temperatures (n,), (n, axes) or one for all, (n, axes) deg/s.
+def course(running: RunningMemory, t_s: Array, temperature_c: Array) -> Remembered:
+    """Return the errors of samples at times (n,) and temperatures (n,), (n, axes) or one for all, (n, axes) each.
 
     Raises BadInput for times that go back.
     """
@@ -217,13 +258,14 @@ def course(running: RunningMemory, t_s: Array, temperature_c: Array) -> Array:
         before = t_s[row - 1] if row else last
         raise BadInput(f"sample {row + 1}: t_s = {t_s[row]:.9g} s is before {before:.9g} s; give them in order of time")
     warm = temperature_c.mean(axis=1) if temperature_c.ndim == 2 else np.broadcast_to(temperature_c, t_s.shape)
-    return running.errors_dps(t_s, np.asarray(warm))
+    return running.errors(t_s, np.asarray(warm))
 
 
 def split_memory(fitted: FittedModel, axes: tuple[str, ...]) -> tuple[FittedModel, Memory | None]:
     """Return a model without what remembers, and that part; None where nothing of it does.
 
-    The part is the same at every rate, so that it is taken off the output before the rest is solved for the rate.
+    Of the part, what is the same at every rate is taken off the output before the rest is solved for the rate; what
+    grows with the rate is solved with the rest (`with_scale`).
     """
     remembering = [term.effect for term in fitted.model.terms if kind_of(term).remembers]
     if not remembering:
@@ -242,4 +284,5 @@ def state_json(fitted: FittedModel) -> StateJson | None:
     _, memory = split_memory(fitted, tuple(fitted.axes))
     if memory is None:
         return None
-    return {"equation": STATE_EQUATION, "elements": [each.to_json() for each in memory.followers]}
+    more = SCALE_EQUATION.format(law=LAWS[fitted.model.argument]) if memory.has_scale else ""
+    return {"equation": STATE_EQUATION + more, "elements": [each.to_json() for each in memory.followers]}

@@ -16,6 +16,7 @@ def remembered_by(calibration: Calibration) -> list[Follower]:
             cooling_s=each.cooling_s, is_curved=each.part == "curved",
             reference_c=each.reference_c if each.part == "curved" else None,
             size=dict(zip(calibration.axes, each.size.tolist(), strict=True)),
+            scale=None if each.scale is None else dict(zip(calibration.axes, each.scale.tolist(), strict=True)),
         )
         for each in (memory.followers if memory is not None else ())
     ]  # fmt: skip

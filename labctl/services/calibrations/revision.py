@@ -12,6 +12,7 @@ from labctl.calibration import build_calibration
 from labctl.errors import BadInput
 from labctl.fitting import FitResult
 from labctl.fitting.criticism import best_shapes, criticise
+from labctl.fitting.criticism.thermal_family import LAG, ThermalFamily, hint_of_added
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.effects import CATALOGUE, Term, kind_of, parse_term, read_formulas
 from labctl.fitting.estimation.fit import fit_preset
@@ -49,6 +50,7 @@ class _Change:
     measured: Measurements
     before: FitResult
     after: FitResult
+    hint: ThermalFamily | None = None  #: of an added lag that is not certain
 
     @property
     def points(self) -> Recording:
@@ -69,6 +71,7 @@ class _Change:
             "recordings": list(self.measured.recordings), "improved_from": self.row.version,
             "before": self.before.error.to_dict(), "plausible": plausible(self.after, technology),
             "warnings": [as_json(warning) for warning in self.warnings],
+            "thermal_hint": None if self.hint is None else self.hint.hint_json(),
         }  # fmt: skip
 
 
@@ -176,7 +179,10 @@ def _fitted(row: CalibrationRecord, measured: Measurements, request: ImproveRequ
     add = tuple(_shaped(measured, base, term) for term in wanted)
     before = fit_preset(context, changed(model))
     after = fit_preset(context, with_shapes(context, changed(model, add, tuple(request.remove)), all_of_them=bool(add)))
-    return _Change(row, measured, before, after)
+    hint = hint_of_added(context, base, [term.effect for term in add])
+    if hint is not None:
+        hint = replace(hint, shapes=after.shapes.get(LAG, {}))
+    return _Change(row, measured, before, after, hint)
 
 
 def _terms(texts: Sequence[str]) -> list[Term]:

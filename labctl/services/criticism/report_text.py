@@ -83,6 +83,7 @@ def answer_of(
         confounded_with=list(verdict.confounded),
         remainder=verdict.remainder,
         thermal_response=found.family.to_json() if found.family is not None else None,
+        thermal_hint=found.hint.hint_json() if found.hint is not None else None,
         not_physical=list(verdict.not_physical),
         named_axes={name: list(axes) for name, axes in verdict.axes.items()},
         further=[list(group) for group in verdict.further],
@@ -160,6 +161,7 @@ def sentences(found: Criticism, experiments: Sequence[Experiment] = ()) -> list[
     """Return the verdict in words, one sentence each, the answer first; what to do next is the first experiment."""
     verdict = found.verdict
     family = [] if found.family is None else [found.family.sentence]
+    family += [] if found.hint is None else [found.hint.hint]
     first = not_logged(found) or doubtful(found) or _first(found)
     said = [first, *family, *what_to_log(found), *coarse_steps(found)]
     if verdict.remainder is not None and verdict.groups:

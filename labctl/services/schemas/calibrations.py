@@ -19,6 +19,7 @@ from labctl.json_types.models import (
     ReferenceJson,
     TemperatureBasisJson,
     TermJson,
+    ThermalHintJson,
     UsualRange,
 )
 from labctl.json_types.poses import PosesJson
@@ -202,6 +203,10 @@ class ChangedModel(FittedResponse):
         description="For each effect: the usual range of its size, and whether the fitted size is inside."
     )
     left_out: list[LeftOut] = Field(description="Effects in the fitted model that the exported calibration leaves out.")
+    thermal_hint: ThermalHintJson | None = Field(
+        default=None, description="Of a thermal lag that was added at rest and is not certain: what it leaves of "
+        "stretches left out, and why it is not certain; else null.",
+    )  # fmt: skip
 
 
 class ImproveResponse(ChangedModel):
@@ -253,6 +258,10 @@ class Follower(ResponseModel):
         description="For each axis: error per K of temperature lag, (deg/s)/K, or error at an edge of the "
         "hysteresis, deg/s."
     )
+    scale: dict[str, float] | None = Field(
+        default=None, description="Of a lag of the scale factor, for each axis: error of the scale factor per K of "
+        "temperature lag, 1/K (1/K2 where is_curved); null: the scale factor does not lag.",
+    )  # fmt: skip
 
 
 class VersionFacts(ResponseModel):

@@ -19,10 +19,10 @@ from labctl.json_types.criticism import (
     ResidualMap,
     SlowProcess,
     Suspect,
-    ThermalFamilyJson,
     WorstDataSet,
 )
 from labctl.json_types.joint import JointJson
+from labctl.json_types.models import ThermalFamilyJson, ThermalHintJson
 from labctl.json_types.views import Views
 from labctl.services.schemas.base import ResponseModel
 from labctl.services.schemas.warnings import WARNINGS, DataWarning
@@ -112,6 +112,9 @@ class CriticismResponse(ResponseModel):
     )
     thermal_response: ThermalFamilyJson | None = Field(
         default=None, description="At rest, over several legs: the thermal response that predicts the legs left out."
+    )
+    thermal_hint: ThermalHintJson | None = Field(
+        default=None, description="One that predicts them better than the model, but too little to be named, and why."
     )
     not_physical: list[str] = Field(
         default_factory=list,

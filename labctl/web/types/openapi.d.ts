@@ -4709,6 +4709,8 @@ export interface components {
             remainder: components["schemas"]["Remainder"] | null;
             /** @description At rest, over several legs: the thermal response that predicts the legs left out. */
             thermal_response: components["schemas"]["ThermalFamilyJson"] | null;
+            /** @description One that predicts them better than the model, but too little to be named, and why. */
+            thermal_hint: components["schemas"]["ThermalHintJson"] | null;
             /**
              * Not Physical
              * @description Effects that explain these data equally well, but at a size that the unit cannot have.
@@ -5892,6 +5894,13 @@ export interface components {
             size: {
                 [key: string]: number;
             };
+            /**
+             * Scale
+             * @description Of a lag of the scale factor, for each axis: error of the scale factor per K of temperature lag, 1/K (1/K2 where is_curved); null: the scale factor does not lag.
+             */
+            scale: {
+                [key: string]: number;
+            } | null;
         };
         /**
          * FrequencySpectrum
@@ -6210,6 +6219,8 @@ export interface components {
              * @description Effects in the fitted model that the exported calibration leaves out.
              */
             left_out: components["schemas"]["labctl__json_types__models__LeftOut"][];
+            /** @description Of a thermal lag that was added at rest and is not certain: what it leaves of stretches left out, and why it is not certain; else null. */
+            thermal_hint: components["schemas"]["ThermalHintJson"] | null;
             /** Version */
             version: number;
             /** Parent */
@@ -6298,6 +6309,8 @@ export interface components {
              * @description Effects in the fitted model that an export leaves out, each with the RMS of its contribution to the rate, deg/s.
              */
             left_out: components["schemas"]["labctl__json_types__models__LeftOut"][];
+            /** @description Of a thermal lag that was added at rest and is not certain: what it leaves of stretches left out, and why it is not certain; else null. */
+            thermal_hint: components["schemas"]["ThermalHintJson"] | null;
             /** Version */
             version: number;
             /** Parent */
@@ -8174,6 +8187,8 @@ export interface components {
              * @description Effects in the fitted model that the exported calibration leaves out.
              */
             left_out: components["schemas"]["labctl__json_types__models__LeftOut"][];
+            /** @description Of a thermal lag that was added at rest and is not certain: what it leaves of stretches left out, and why it is not certain; else null. */
+            thermal_hint: components["schemas"]["ThermalHintJson"] | null;
             /** @description Residuals of the changed model, by data set. */
             residuals: components["schemas"]["ResidualColumns"];
         };
@@ -9881,6 +9896,34 @@ export interface components {
             before_rms_dps: number;
             /** After Rms Dps */
             after_rms_dps: number;
+        };
+        /**
+         * ThermalHintJson
+         * @description A thermal response that predicts too little to be named, and `why`; what other effects leave alone, deg/s.
+         *
+         *     `text` says it in a sentence.
+         */
+        ThermalHintJson: {
+            /** Structure */
+            structure: string;
+            /** Time Constants */
+            time_constants: {
+                [key: string]: components["schemas"]["Coefficient"];
+            };
+            /** Alike */
+            alike: string[];
+            /** Before Rms Dps */
+            before_rms_dps: number;
+            /** After Rms Dps */
+            after_rms_dps: number;
+            /** Rivals Rms Dps */
+            rivals_rms_dps: {
+                [key: string]: number;
+            };
+            /** Why */
+            why: string;
+            /** Text */
+            text: string;
         };
         /**
          * TimeLine

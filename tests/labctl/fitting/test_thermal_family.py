@@ -8,13 +8,20 @@ import numpy as np
 import pytest
 
 from labctl.fitting.criticism import Criticism, criticise
-from labctl.fitting.criticism.thermal_family import LAG, ThermalFamily, thermal_family, with_family
+from labctl.fitting.criticism.thermal_family import (
+    LAG,
+    ThermalFamily,
+    hint_of_added,
+    thermal_family,
+    with_family,
+)
 from labctl.fitting.criticism.verdict import Verdict
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.effects import Term
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.presets import preset_for
 from labctl.recording import Recording, to_points
+from labctl.services.criticism.report_text import sentences
 from tests.helpers.rest import at_rest, flowing, follow
 
 UNEXPLAINED = Verdict("unexplained", depends_on=("t_s",))
@@ -70,6 +77,46 @@ def test_a_course_that_repeats_in_no_leg_is_no_response() -> None:
     t_s = np.asarray(recording.columns["t_s"], dtype=np.float64)
     stepped = np.asarray(recording.columns["gyro_z"]) + 0.02 * (t_s > 4000.0)
     assert family_of(Recording(recording.info, {**recording.columns, "gyro_z": stepped})) is None
+
+
+@pytest.fixture(scope="module")
+def half_explained() -> Recording:
+    """Return a unit whose lag is as large as a wander in time that follows no temperature."""
+    recording = at_rest(("z",), lag_s=400.0)
+    t_s = np.asarray(recording.columns["t_s"], dtype=np.float64)
+    wander = 8e-3 * np.sin(2 * np.pi * t_s / 1300.0 + 0.7)
+    return Recording(recording.info, {**recording.columns, "gyro_z": np.asarray(recording.columns["gyro_z"]) + wander})
+
+
+def test_a_response_that_predicts_a_part_is_a_hint_and_not_named(half_explained: Recording) -> None:
+    data, model = based(half_explained)
+    family = thermal_family(data, model, UNEXPLAINED)
+    assert family is not None
+    assert not family.is_certain
+    assert family.after.is_below(family.before)
+    assert with_family(UNEXPLAINED, family) is UNEXPLAINED
+    told = family.hint_json()
+    assert told["after_rms_dps"] < told["before_rms_dps"]
+    assert "% of the chi2 of these stretches" in told["why"]
+    assert f"from {told['before_rms_dps']:.3g} to {told['after_rms_dps']:.3g} deg/s" in told["text"]
+    assert set(told["rivals_rms_dps"]) == {"temperature_rate", "thermal_hysteresis"}
+
+
+def test_an_added_lag_has_a_hint_only_where_it_is_not_certain(half_explained: Recording) -> None:
+    data, model = based(half_explained)
+    assert hint_of_added(data, model, [LAG]) is not None
+    assert hint_of_added(data, model, ["thermal_hysteresis"]) is None
+    certain, base = based(at_rest(("z",), lag_s=400.0))
+    assert hint_of_added(certain, base, [LAG]) is None
+
+
+def test_the_hint_stands_in_the_criticism_without_advice(half_explained: Recording) -> None:
+    found = criticise(half_explained, based(half_explained)[1], points=to_points(half_explained))
+    assert found.family is None
+    assert found.hint is not None
+    assert LAG not in found.verdict.named
+    assert not [advice for advice in found.advice if advice["add"]]
+    assert found.hint.hint in sentences(found)
 
 
 def test_other_effects_stay_beside_the_family() -> None:

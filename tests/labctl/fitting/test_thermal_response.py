@@ -12,15 +12,8 @@ from labctl.fitting import fit
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.effects import Term
 from labctl.fitting.effects.thermal_lag import lag_elements
-from labctl.fitting.estimation.thermal_response import (
-    MOST_STEPS,
-    STRUCTURES,
-    Axis,
-    are_told_apart,
-    best_taus,
-    stretches_of,
-    thermal_response,
-)
+from labctl.fitting.estimation.thermal_flows import MOST_STEPS, STRUCTURES, Axis, best_taus
+from labctl.fitting.estimation.thermal_response import are_told_apart, stretches_of, thermal_response
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.recording import Recording
 from tests.helpers.rest import RATE_HZ, at_rest, flowing, follow
@@ -68,6 +61,36 @@ def test_two_flows_are_found_where_one_does_not_predict_the_legs_left_out() -> N
     found = shapes(flowing({"z": mixture}))
     assert found["tau_s"][0] == pytest.approx(90.0, rel=0.3)
     assert found["second_tau_s"][0] == pytest.approx(1500.0, rel=0.3)
+
+
+def test_axes_of_different_structures_have_one_each() -> None:
+    recording = flowing({"x": partial(follow, tau_s=300.0), "y": mixture, "z": partial(follow, tau_s=700.0)})
+    found = fit(recording, effects=EFFECTS)
+    taus = {name: entry["value"] for name, entry in found.to_json()["shapes"]["thermal_lag"].items()}
+    assert set(taus) == {"tau_x_s", "tau_y_s", "second_tau_y_s", "tau_z_s"}
+    assert taus["tau_x_s"] == pytest.approx(300.0, rel=0.05)
+    assert taus["tau_z_s"] == pytest.approx(700.0, rel=0.05)
+    assert taus["second_tau_y_s"] == pytest.approx(1500.0, rel=0.2)
+    leg = next(leg["rms_dps"] for leg in found.error.heldout_by_leg if leg["fitted"] == "all legs but one")
+    assert leg is not None
+    assert found.error.noise_floor_dps is not None
+    assert leg < 1.1 * found.error.noise_floor_dps
+
+
+def test_structures_by_axis_are_said_axis_by_axis() -> None:
+    data = fit_data_of(flowing({"x": partial(follow, tau_s=300.0), "y": mixture}))
+    model = ErrorModel("", (Term("bias"), Term("bias_temperature", 2)))
+    response = thermal_response(data, model, Term("thermal_lag"))
+    assert response is not None
+    assert response.structure.id == "by_axis"
+    assert response.structure.sentence == "on x one time constant; on y two time constants"
+    assert not response.held_out["two_flows"].is_below(response.held_out["by_axis"])
+
+
+def test_a_curved_law_may_be_that_of_one_axis() -> None:
+    term = Term("thermal_lag", None, {"tau_x_s": 200.0, "tau_y_s": 300.0, "curved_y": 1.0})
+    assert [e.part for e in lag_elements(term, "x")] == ["all"]
+    assert [e.part for e in lag_elements(term, "y")] == ["all", "curved"]
 
 
 def test_a_lag_that_is_longer_while_the_unit_cools_is_found_as_that() -> None:

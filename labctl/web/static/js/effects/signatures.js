@@ -131,6 +131,14 @@ const ALL = {
   missed_steps: single("rate", (x) => (Math.abs(x) > 0.75 ? -Math.sign(x) * (0.5 + 2 * (Math.abs(x) - 0.75)) : 0)),
   temperature_rate: single("time", (t) => 0.9 * temperatureSlope(t), { course: temperatureCourse }),
   thermal_lag: single("time", laggedTemperature, { course: temperatureCourse }),
+  scale_factor_lag: {
+    over: "time",
+    lines: [
+      ["rate forwards", laggedTemperature],
+      ["rate backwards", (t) => -laggedTemperature(t)],
+    ],
+    course: temperatureCourse,
+  },
   thermal_hysteresis: {
     over: "temperature",
     lines: [

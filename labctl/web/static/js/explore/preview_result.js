@@ -96,10 +96,12 @@ export function plausibility(state, found, change) {
     const range = found.plausible[id];
     return range ? [{ id, ...range }] : [];
   });
-  return ranges.length
+  const hint = found.thermal_hint ? [h("li", {}, found.thermal_hint.text)] : [];
+  return ranges.length || hint.length
     ? h(
         "ul",
         { class: "plain" },
+        hint,
         ranges.map(({ id, ...range }) =>
           h(
             "li",
