@@ -7,6 +7,7 @@ import numpy as np
 from instruments.errors import LinkError
 from instruments.interfaces.gyro import Gyro, Readings
 from instruments.interfaces.table import Spin
+from instruments.positions import Position
 from procedures.contracts.errors import BadData, GuardTripped, StepFailed
 from procedures.contracts.journal import DataSetHeader, DataSetState
 from procedures.contracts.steps import Acquire
@@ -93,6 +94,7 @@ def _take(context: ExecutionContext, step: Acquire) -> dict[str, float]:
     counts = {
         name: ReadingCounts(gyro.sample_rate_hz * (gate[1] - gate[0])) for name, gyro in context.bench.gyros.items()
     }
+    context.response.begin((step.mounting, step.run))
     with context.monitor.taking_readings(spin, counts):
         context.poll()
         _wait_for_gate(context, watch, gate[0])
@@ -106,6 +108,7 @@ def _take(context: ExecutionContext, step: Acquire) -> dict[str, float]:
             _read_late(context, number, gate, counts, late_readings.WAIT_S)
             _demand_readings(counts)
             _count_missing(context, number, gate, counts)
+            _demand_answer(context, step, spin)
             rates = _note_angles(context, encoder, spin, gate, number)
         except BaseException as error:
             reason = str(error) or type(error).__name__
@@ -115,6 +118,14 @@ def _take(context: ExecutionContext, step: Acquire) -> dict[str, float]:
     context.unchecked.append(number)
     taken = {f"readings.{name}": float(count.valid + count.invalid) for name, count in counts.items()}
     return {"rate_dps": spin.rate_dps, "gate_s": gate[1] - gate[0], **rates, **taken}
+
+
+def _demand_answer(context: ExecutionContext, step: Acquire, spin: Spin) -> None:
+    """Raise BadData for a unit whose output does not follow the rate of the table."""
+    position = Position.of(step.position)
+    for name, gyro in context.bench.gyros.items():
+        if complaint := context.response.complaint(name, spin.rate_dps, position, gyro.limits.max_rate_dps):
+            raise BadData(name, complaint)
 
 
 def _note_angles(
@@ -246,6 +257,7 @@ def _read_round(
         kept = cut(readings, gate, context.recorder.time)
         if len(kept) or kept.lost or kept.damaged:
             counts[name].add(kept)
+            context.response.add(name, kept)
             beside = context.monitor.references.beside(kept)
             context.recorder.journal.readings(number, name, beside, context.monitor.chamber_c)
 

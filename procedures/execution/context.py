@@ -18,6 +18,7 @@ from procedures.execution.active_bench import ActiveBench
 from procedures.monitoring.event_recorder import CampaignRecorder
 from procedures.monitoring.guards import GuardViolation
 from procedures.monitoring.monitor import BenchMonitor
+from procedures.monitoring.unit_response import UnitResponse
 from procedures.recipe.recipe import Recipe
 
 #: From poll to poll. With a second of reading and a unit's reply in between, rows of the environment are never more
@@ -45,6 +46,7 @@ class ExecutionContext:
     unchecked: list[int] = field(default_factory=list)  #: data sets since home was last found where it was left
     clock_session: int = 1  #: of timed runs: a resumed campaign begins another
     clock_runs: list[ClockRun] = field(default_factory=list)  #: every run so far that timed the step clock
+    response: UnitResponse = field(default_factory=UnitResponse)  #: of the units to the rates of the table
     warned_of_rate: bool = False  #: whether it was said that the table does not turn as commanded
     _prompts: int = field(default=0, repr=False)
     _set: dict[str, dict[str, str]] = field(default_factory=dict, repr=False)  #: unit -> how it was set so far

@@ -28,6 +28,7 @@ from procedures.execution.safe_state import make_safe
 from procedures.execution.soak_criterion import SoakCriterion
 from procedures.execution.table_checks import check_home, measure_clock
 from procedures.execution.waiting import pass_time, polls, record_for
+from procedures.monitoring.turn_course import nominal_outputs
 
 Figures = dict[str, float]
 #: A unit that is silent when its stream is opened is asked again after these.
@@ -71,7 +72,9 @@ def open_streams(context: ExecutionContext, run: int, *, dropping: bool = True) 
 def _open_stream(context: ExecutionContext, gyro: Gyro) -> None:
     for pause_s in (*STARTING_PAUSES_S, None):
         try:
-            context.require_same_settings(gyro.name, gyro.identify().reported)
+            identity = gyro.identify()
+            context.require_same_settings(gyro.name, identity.reported)
+            context.response.expect(gyro.name, nominal_outputs(tuple(gyro.channels), identity.output))
             gyro.start()
         except LinkError:
             if pause_s is None:

@@ -25,6 +25,7 @@ class Nominal:
     channel: Channel
     offset: float
     scale: float
+    is_scaled: bool = True  #: whether its scale factor is stated, or its unit is one of rates
 
     def rate_dps(self, raw: NDArray[np.int64]) -> Array:
         """Return rates (n,) of raw integers (n,)."""
@@ -42,7 +43,8 @@ def nominal_outputs(
         axis = channel.name.removeprefix(PREFIX)
         said = output.get(axis, {})
         usual = RATE_UNITS.get(str(said.get("unit", channel.unit)), 1.0)
-        found[axis] = Nominal(channel, float(said.get("offset", 0.0)), float(said.get("scale", usual)))
+        unit, scale = str(said.get("unit", channel.unit)), float(said.get("scale", usual))
+        found[axis] = Nominal(channel, float(said.get("offset", 0.0)), scale, unit in RATE_UNITS or "scale" in said)
     return found
 
 

@@ -185,3 +185,20 @@ def test_missed_steps_end_the_campaign_and_the_data_sets_since_the_last_check(tm
     assert states == ["complete"] * 5 + ["partial"] * 5
     (reasons,) = rows(location, "select distinct reason from data_sets where state = 'partial'")
     assert "steps were missed" in reasons[0]
+
+
+def test_a_unit_that_sends_angles_instead_of_rates_is_found_by_turning_the_table(tmp_path: Path) -> None:
+    """Like a DSP-3000 in incremental mode that hears no command: 1 deg/s where the table turns at 10."""
+    location = str(tmp_path / "lab.sqlite")
+    with open_store(location, write=True) as store:
+        prepared = prepare(store, RECIPE, checked_bench(), VirtualClock(), clip=False)
+        device = prepared.bench.simulation.device("sim://kvh-rd2100/fog")._device  # type: ignore[union-attr]
+        line = device.line
+        device.line = lambda rate_dps, temperature_c: line(rate_dps / 10.0, temperature_c)
+        answer = run(store, prepared)
+    assert answer.state == "failed"
+    assert "fog: from " in answer.reason
+    assert "10.1 % of that, limits 50 and 200 %" in answer.reason
+    assert "one that sends the angle of each sample instead of the rate" in answer.reason
+    states = rows(location, "select state, count(*) from data_sets group by state")
+    assert dict(states)["complete"] == 1
