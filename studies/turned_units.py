@@ -12,7 +12,7 @@ from datetime import UTC, datetime
 import numpy as np
 
 from labctl.recording import Recording, RecordingInfo
-from studies.rest_units import DRIFT_DPS, DRIFT_TAU_S, WHITE, Array, lagged
+from studies.rest_units import DRIFT_DPS, DRIFT_TAU_S, WHITE, Array
 
 COLD_C, HOT_C, DWELL_S = -10.0, 55.0, 1200.0
 #: Seconds of a data set and between two, and the rates that are drawn from, deg/s.
@@ -45,6 +45,22 @@ def course(hidden: Turned) -> Array:
     kernel = np.hanning(121) / np.hanning(121).sum()
     sharp = np.interp(np.arange(0.0, t_s[-1]), t_s, warm)
     return np.convolve(np.pad(sharp, 60, mode="edge"), kernel, mode="valid")
+
+
+def followed(warm: Array, tau_s: float) -> Array:
+    """Return the temperature of an element that follows `warm`, given second by second, by Heun's rule.
+
+    The slope at the start of each second is that towards the temperature then: taken towards the one at its end, the
+    element would be half a second ahead, which a rate table shows.
+    """
+    now, found = float(warm[0]), np.empty(len(warm))
+    found[0] = now
+    values = warm.tolist()
+    for k in range(1, len(values)):
+        slope = (values[k - 1] - now) / tau_s
+        now += (slope + (values[k] - (now + slope)) / tau_s) / 2
+        found[k] = now
+    return found
 
 
 def turned_unit(seed: int, hidden: Turned) -> Recording:
@@ -91,7 +107,7 @@ def _run(rng: np.random.Generator, hidden: Turned, warm: Array, number: int) -> 
     }  # fmt: skip
     for k, axis in enumerate(hidden.axes):
         of_scale, of_bias = (
-            lagged(warm, tau_s * hidden.of_axes[k])[rows] if tau_s else warm[rows]
+            followed(warm, tau_s * hidden.of_axes[k])[rows] if tau_s else warm[rows]
             for tau_s in (hidden.scale_lag_s, hidden.bias_lag_s)
         )
         turning = rate if k == number else np.zeros(len(rows))

@@ -27,6 +27,7 @@ from labctl.fitting.criticism.separation import (
     separation_power,
 )
 from labctl.fitting.criticism.suspects import Suspect
+from labctl.fitting.criticism.thermal_family import ThermalFamily, hint_of_added
 from labctl.fitting.criticism.verdict import Verdict
 from labctl.fitting.criticism.visibility import EffectVisibility, Schedule, effect_visibilities, schedule_of
 
@@ -41,12 +42,14 @@ __all__ = [
     "Schedule",
     "SizeReference",
     "Suspect",
+    "ThermalFamily",
     "Verdict",
     "best_shapes",
     "criticise",
     "effect_visibilities",
     "fit_means",
     "has_one_rising_leg",
+    "hint_of_added",
     "leading_signal",
     "residual_maps",
     "schedule_of",

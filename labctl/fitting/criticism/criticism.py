@@ -250,7 +250,7 @@ def _with_time_constants(
     if family is None:
         return None
     after = fit_preset(data, changed(forward, (family.response.term,)))
-    return replace(family, shapes=after.shapes.get(LAG, {}))
+    return family.with_shapes(after.shapes)
 
 
 def _without_large_residual(verdict: Verdict, base: FitResult | None) -> Verdict:

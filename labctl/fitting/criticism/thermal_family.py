@@ -49,6 +49,10 @@ class ThermalFamily:
         """Whether it predicts so much that it is named; else it is a hint."""
         return self.after.chi2 <= MOST_LEFT * self.before.chi2
 
+    def with_shapes(self, shapes: Mapping[str, dict[str, Coefficient]]) -> ThermalFamily:
+        """Return the same with the time constants of a fit with it, effect -> name -> value with u."""
+        return replace(self, shapes=shapes.get(LAG, {}))
+
     @property
     def before(self) -> LeftOut:
         """What the model leaves without it."""

@@ -40,6 +40,8 @@ from labctl.fitting.numeric.blas_threads import single_threaded
 #: Time constants of warming and cooling differ by more than so many standard uncertainties of their ratio, where the
 #: data tell both.
 TOLD_APART, MOST_CONDITION = 3.0, 1e12
+#: Chi2 by which a structure of one axis leaves less of all data for each coefficient more, over the noise.
+SEEN = 16.0
 #: Data sets that a stretch needs, legs up to which each is left out, and how far beyond the others it is tested, K.
 LEAST_SETS, MOST_LEGS, BEYOND_K = 4, 12, 1.0
 #: What stands for structures that differ from axis to axis.
@@ -108,8 +110,29 @@ def _of_axis(
         known = [each for each in errors.get(structure.id, ()) if each[0] is axis]
         tried.append(of_axis)
         own[of_axis.id] = known if structure.per_axis else errors_of([axis], of_axis, stretches)
-    structure, found = _told_apart([axis], tried, {name: pooled(left) for name, left in own.items()}, every)
-    return _OfAxis(axis.name, structure, found[axis.name], own[structure.id])
+    held_out = {name: pooled(left) for name, left in own.items()}
+    while True:
+        structure, found = _told_apart([axis], tried, held_out, every)
+        taus_s = found[axis.name]
+        if structure is tried[0] or _is_seen(axis, structure, taus_s, tried[0], every):
+            return _OfAxis(axis.name, structure, taus_s, own[structure.id])
+        tried.remove(structure)
+
+
+def _is_seen(
+    axis: Axis, structure: Structure, taus_s: Mapping[str, float], simplest: Structure, every: NDArray[np.bool_]
+) -> bool:
+    """Return whether a structure also leaves clearly less of all data of one axis than the simplest.
+
+    Few stretches are left out of one axis, and the errors within one are those of one extrapolation: chance.
+    """
+    simple_s = best_taus([axis], simplest, every, MOST_STEPS)[axis.name]
+    left, simple = (
+        float(np.sum(axis.left_over_noise(axis.columns(each, taus), every) ** 2))
+        for each, taus in ((structure, taus_s), (simplest, simple_s))
+    )
+    more = structure.coefficients(1) - simplest.coefficients(1)
+    return simple - left > SEEN * max(more, 1) * max(left / len(every), 1.0)
 
 
 def _by_axis(structures: Mapping[str, Structure]) -> Structure:

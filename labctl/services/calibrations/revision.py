@@ -11,8 +11,7 @@ from datetime import datetime
 from labctl.calibration import build_calibration
 from labctl.errors import BadInput
 from labctl.fitting import FitResult
-from labctl.fitting.criticism import best_shapes, criticise
-from labctl.fitting.criticism.thermal_family import LAG, ThermalFamily, hint_of_added
+from labctl.fitting.criticism import ThermalFamily, best_shapes, criticise, hint_of_added
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.effects import CATALOGUE, Term, kind_of, parse_term, read_formulas
 from labctl.fitting.estimation.fit import fit_preset
@@ -180,9 +179,7 @@ def _fitted(row: CalibrationRecord, measured: Measurements, request: ImproveRequ
     before = fit_preset(context, changed(model))
     after = fit_preset(context, with_shapes(context, changed(model, add, tuple(request.remove)), all_of_them=bool(add)))
     hint = hint_of_added(context, base, [term.effect for term in add])
-    if hint is not None:
-        hint = replace(hint, shapes=after.shapes.get(LAG, {}))
-    return _Change(row, measured, before, after, hint)
+    return _Change(row, measured, before, after, None if hint is None else hint.with_shapes(after.shapes))
 
 
 def _terms(texts: Sequence[str]) -> list[Term]:
