@@ -13,7 +13,7 @@ from labctl.recording.recording import Recording
 from labctl.recording.sanity.readings.examination import examine
 
 #: Kinds of findings whose readings can be left out.
-MAY_BE_LEFT_OUT = ("frozen", "clipped", "thermometer", "spikes", "repeated", "moved", "noise_changes")
+MAY_BE_LEFT_OUT = ("frozen", "clipped", "thermometer", "spikes", "repeated", "moved", "noise_changes", "shifted")
 ALL = "all"
 
 
