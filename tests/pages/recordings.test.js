@@ -3,8 +3,10 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
+import { count } from "../../labctl/web/static/js/core/format.js";
 import { channelName, channelTitle, channelUnit } from "../../labctl/web/static/js/recordings/channels.js";
 import { recordingFiles } from "../../labctl/web/static/js/recordings/file_input.js";
+import { leaveOutChoices, leftOutText } from "../../labctl/web/static/js/recordings/leave_out.js";
 import { continuousPieces, envelopeOutline, meanLine } from "../../labctl/web/static/js/recordings/trace_pieces.js";
 import { coefficientColumns, isSingle } from "../../labctl/web/static/js/unit/coefficient_table.js";
 
@@ -64,4 +66,22 @@ test("coefficients over temperature are columns, single ones are none", () => {
   const bias = { value: 1, u: null, unit: "deg/s", identified: true, at_most: null };
   assert.deepEqual(coefficientColumns({ axes: { z: { coefficients: { bias } } } }), []);
   assert.ok(isSingle(bias) && !isSingle(own.scale_factor) && !isSingle(own.temperature_c) && !isSingle(undefined));
+});
+
+test("readings that can be left out are one choice for each kind", () => {
+  const warnings = [
+    { what: "spikes", channel: "gyro_x", n: 2, may_leave_out: true },
+    { what: "gaps", channel: "t_s", n: 4, may_leave_out: false },
+    { what: "spikes", channel: "gyro_y", n: 1, may_leave_out: true },
+    { what: "time_back", channel: "t_s", n: 1200, may_leave_out: true },
+  ];
+  assert.deepEqual(leaveOutChoices(warnings, 60000), [
+    { kind: "spikes", text: `spikes: 2 of gyro_x, 1 of gyro_y (of ${count(60000)} readings)` },
+    { kind: "time_back", text: `time_back: ${count(1200)} (of ${count(60000)} readings)` },
+  ]);
+  assert.deepEqual(leaveOutChoices([], 5), []);
+  assert.equal(
+    leftOutText({ what: "spikes", n: 2, of: 400, channel: "gyro_x", why: "far off" }),
+    "Left out: 2 of 400 readings of gyro_x (far off).",
+  );
 });

@@ -57,6 +57,14 @@ ImporterField = Annotated[
 OptionField = Annotated[
     list[str] | None, Form(max_length=20, description="Option of the importer, as KEY=VALUE; may be repeated.")
 ]
+LeaveOutField = Annotated[
+    list[str] | None,
+    Form(
+        max_length=20,
+        description="Kind of finding whose readings are left out, such as spikes; all: every kind that can be left "
+        "out; may be repeated. They are marked as bad, counted and stated in `left_out`.",
+    ),
+]
 ModifiedField = Annotated[
     float | None, Form(ge=0, le=4e12, description="When the file was last written, ms since 1970-01-01 UTC.")
 ]
@@ -65,7 +73,9 @@ router = APIRouter(prefix="/api/recordings", tags=["recordings"])
 
 
 @command_route(router, IMPORT_RECORDING, "Import a recording")
-async def import_recording(request: Request, files: list[UploadFile], service: ServiceDep) -> ImportResponse:
+async def import_recording(
+    request: Request, files: list[UploadFile], service: ServiceDep, leave_out: LeaveOutField = None
+) -> ImportResponse:
     """Import a recording in the interchange format: `recording.toml`, its data file and, if there is one, the
     environment file, as parts of one multipart form. Either the whole recording is stored or nothing; an error
     names file, column and row."""
@@ -73,7 +83,7 @@ async def import_recording(request: Request, files: list[UploadFile], service: S
         request,
         import_files,
         [(file.filename or "", file.file) for file in files],
-        lambda folder: service.execute(IMPORT_RECORDING, RecordingFolder(folder)),
+        lambda folder: service.execute(IMPORT_RECORDING, RecordingFolder(folder, _kinds(leave_out))),
     )
 
 
@@ -85,6 +95,7 @@ async def import_log(
     column_map: MapField = "",
     importer: ImporterField = "",
     option: OptionField = None,
+    leave_out: LeaveOutField = None,
     modified_ms: ModifiedField = None,
 ) -> ImportResponse:
     """Take in a file of another format (CSV, Parquet, ULog, ROS bag) by the map of its columns, or by the one that is
@@ -96,7 +107,7 @@ async def import_log(
         file.filename or "",
         file.file,
         modified_ms,
-        lambda path: service.execute(IMPORT_LOG, LogFile(path, given, importer or None, options)),
+        lambda path: service.execute(IMPORT_LOG, LogFile(path, given, importer or None, options, _kinds(leave_out))),
     )
 
 
@@ -108,10 +119,11 @@ async def preview(
     column_map: MapField = "",
     importer: ImporterField = "",
     option: OptionField = None,
+    leave_out: LeaveOutField = None,
     modified_ms: ModifiedField = None,
 ) -> LogPreview:
     """The proposed map of a log, or what it becomes by the map that is sent; its first rows, traces, and everything
-    that is wrong. Nothing is stored."""
+    that is wrong, in the columns and in single readings. Nothing is stored."""
     given, options = sent_map(column_map), parsed_options(option or ())
     return await with_files(
         request,
@@ -119,8 +131,12 @@ async def preview(
         file.filename or "",
         file.file,
         modified_ms,
-        lambda path: service.computation.run(preview_log, path, importer or None, options, given),
+        lambda path: service.computation.run(preview_log, path, importer or None, options, given, _kinds(leave_out)),
     )
+
+
+def _kinds(sent: list[str] | None) -> tuple[str, ...]:
+    return tuple(kind for kind in sent or () if kind)
 
 
 @router.get("/templates/{kind}", summary="A template", response_class=PlainTextResponse)

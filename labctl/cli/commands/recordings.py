@@ -43,8 +43,8 @@ LeaveOut = Annotated[
         "--leave-out",
         metavar="KIND",
         help="Leave out the readings of one kind of finding: time_back, frozen, clipped, thermometer, spikes, "
-        "repeated, moved, noise_changes, or all of these; may be repeated. They are marked as bad, counted and stated "
-        "in the recording.",
+        "repeated, moved, noise_changes, shifted, or all of these; may be repeated. They are marked as bad, counted "
+        "and stated in the recording.",
     ),
 ]
 

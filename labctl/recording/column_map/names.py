@@ -5,16 +5,21 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from labctl.recording.column_map.units import QUANTITIES, find_unit, is_lsb, unit_of_target
+from labctl.recording.column_map.units import QUANTITIES, find_unit, is_lsb, names_of_units, unit_of_target
 from labctl.recording.columns import BY_NAME
 
 _BRACKETS = re.compile(r"^(.*?)[\s_.-]*[\[(]\s*([^\])]+?)\s*[\])]\s*$")
-#: Units that stand at the end of a name without brackets, longest first.
-_ENDINGS = (
-    "rad_per_s", "deg_per_s", "rad/sec", "deg/sec", "rad_s2", "m_s2", "rad_s", "deg_s", "rad/s", "deg/s", "mdps",
-    "m/s^2", "m/s2", "m/s²", "°/s", "rads", "dps", "degc", "deg c", "celsius", "kelvin", "degf", "msec", "usec", "nsec",
-    "sec", "°c", "mg", "ms", "us", "ns", "lsb", "raw", "ut", "mt", "deg", "rad", "s", "c", "k", "f", "g", "v",
-)  # fmt: skip
+#: Units that stand at the end of a name without brackets, longest first; in place of a stroke also "_" or "_per_".
+_ENDINGS = tuple(
+    sorted(
+        {
+            name.lower().replace("/", between)
+            for name in (*names_of_units(), "m/s2", "lsb", "raw")
+            for between in ("/", "_", "_per_")
+        },
+        key=lambda name: (-len(name), name),
+    )
+)
 _AXIS = r"(?P<axis>[xyz])"
 _INDEX = {"0": "x", "1": "y", "2": "z"}
 _ANY = r"(?:.*[_ ])?"
@@ -133,9 +138,7 @@ def _divided(name: str) -> list[tuple[str, str]]:
 
 
 def _plain_unit(text: str) -> str:
-    return {"rad_per_s": "rad/s", "deg_per_s": "deg/s", "rad_s": "rad/s", "deg_s": "deg/s", "m_s2": "m/s2"}.get(
-        text.lower(), text
-    )
+    return re.sub(r"(?<=[A-Za-z])(?:_per_|_)(?=(?:s|sec|h|hr|hour|min|s2|s\^2)$)", "/", text, flags=re.IGNORECASE)
 
 
 def _is_unit_of(target: str, unit: str) -> bool:

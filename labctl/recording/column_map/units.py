@@ -28,6 +28,7 @@ _RATE = (
     Unit("rad/s", 180.0 / math.pi, aliases=("rads", "rad/sec", "rps", "radps", "rad_s", "radians/s")),
     Unit("mdps", 1e-3, aliases=("mdeg/s", "millideg/s", "m°/s")),
     Unit("mrad/s", 0.18 / math.pi, aliases=("mradps",)),
+    Unit("urad/s", 0.18e-3 / math.pi, aliases=("µrad/s", "μrad/s", "uradps")),
     Unit("deg/h", 1.0 / 3600.0, aliases=("dph", "°/h", "deg/hr", "deg/hour")),
     Unit("rpm", 6.0, aliases=("turns/min", "1/min", "rev/min")),
 )
@@ -51,10 +52,13 @@ _TEMPERATURE = (
     Unit("K", 1.0, -273.15, aliases=("kelvin", "degk")),
     Unit("degF", 5.0 / 9.0, -160.0 / 9.0, aliases=("f", "°f", "deg f", "fahrenheit", "℉")),
     Unit("mdegC", 1e-3, aliases=("m°c", "mc", "millidegc")),
+    Unit("cdegC", 1e-2, aliases=("c°c", "centidegc", "centi-degc")),
+    Unit("ddegC", 1e-1, aliases=("d°c", "decidegc", "deci-degc")),
 )
 _FORCE = (
     Unit("g", 1.0, aliases=("gee", "g0", "gn")),
     Unit("mg", 1e-3, aliases=("milli-g",)),
+    Unit("ug", 1e-6, aliases=("µg", "μg", "micro-g")),
     Unit("m/s2", 1.0 / STANDARD_GRAVITY, aliases=("m/s^2", "m/s²", "mps2", "m/s/s", "ms-2", "m/s**2", "m_s2")),
 )
 _ANGLE = (
@@ -102,6 +106,12 @@ def find_unit(quantity: str, text: str) -> Unit | None:
         if folded == _folded(unit.name) or folded in {_folded(alias) for alias in unit.aliases}:
             return unit
     return None
+
+
+def names_of_units() -> list[str]:
+    """Return the names and aliases of all units but the times since 1970, as they may end the name of a column."""
+    units = [unit for each in QUANTITIES.values() for unit in each if not unit.is_epoch]
+    return [name for unit in units for name in (unit.name, *unit.aliases)]
 
 
 def is_lsb(text: str) -> bool:

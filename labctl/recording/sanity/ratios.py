@@ -42,23 +42,14 @@ def _of_position(sets: Summary, along: Position) -> Iterator[Finding]:
     if fast < LEAST_DPS or not np.isfinite(output).all():
         return
     numbers = np.asarray(sets["dataset"])
+    slow = np.abs(rate) <= LEAST_SHARE * fast
+    if slow.any() and (wrapped := _wrapped(along, numbers, rate, output, float(np.median((output - rate)[slow])))):
+        yield wrapped
+        return
     apart = rate - (output - float(np.median(output - rate)))
     off = np.abs(apart) > OFF_SHARE * np.maximum(np.abs(rate), LEAST_SHARE * fast)
     agreeing = int((~off).sum())
     if not off.any() or agreeing < LEAST_AGREEING or agreeing < AGREEING_SHARE * len(off):
-        return
-    jump = float(np.median(np.abs(apart[off])))
-    top = float(np.abs(output).max())
-    one_jump = bool(np.all(np.abs(np.abs(apart[off]) / jump - 1) < SAME_JUMP))
-    outward = bool(np.all(np.sign(apart[off]) == np.sign(rate[off])))
-    if one_jump and outward and jump / 2 > (1 - SAME_JUMP) * top and int(off.sum()) > 1:
-        yield Finding(
-            "wrapped", "certain", f"axis {along.axis}, {numbers_in_words(numbers[off])}",
-            f"the output is {jump:.6g} deg/s from the rate, always towards the other end of its range, and never "
-            f"beyond {top:.6g} deg/s: its number wraps round there",
-            jump, "deg/s", "an output that follows the rate",
-            "leave these data sets out, or give the words as unsigned or wider ones (signed_bits of the column map)",
-        )  # fmt: skip
         return
     for row in np.flatnonzero(off):
         given, shown = float(rate[row]), float(rate[row] - apart[row])
@@ -69,3 +60,27 @@ def _of_position(sets: Summary, along: Position) -> Iterator[Finding]:
             along.sign * shown, "deg/s", f"{along.sign * given:.6g} deg/s",
             "correct the rate, its sign or the number of the data set, or leave the data set out",
         )  # fmt: skip
+
+
+def _wrapped(along: Position, numbers: Array, rate: Array, output: Array, bias_dps: float) -> Finding | None:
+    """Return that an output wraps round, if the (m,) data sets that are off all jump by one range; else None.
+
+    `bias_dps` is that of the slow data sets: of the fast ones most may be wrapped.
+    """
+    apart = rate - (output - bias_dps)
+    off = np.abs(apart) > OFF_SHARE * np.maximum(np.abs(rate), LEAST_SHARE * float(np.abs(rate).max()))
+    if off.sum() < 2 or (~off).sum() < LEAST_AGREEING:
+        return None
+    jump = float(np.median(np.abs(apart[off])))
+    top = float(np.abs(output).max())
+    one_jump = bool(np.all(np.abs(np.abs(apart[off]) / jump - 1) < SAME_JUMP))
+    outward = bool(np.all(np.sign(apart[off]) == np.sign(rate[off])))
+    if not (one_jump and outward and jump / 2 > (1 - SAME_JUMP) * top):
+        return None
+    return Finding(
+        "wrapped", "certain", f"axis {along.axis}, {numbers_in_words(numbers[off])}",
+        f"the output is {jump:.6g} deg/s from the rate, always towards the other end of its range, and never "
+        f"beyond {top:.6g} deg/s: its number wraps round there",
+        jump, "deg/s", "an output that follows the rate",
+        "leave these data sets out, or give the words as unsigned or wider ones (signed_bits of the column map)",
+    )  # fmt: skip

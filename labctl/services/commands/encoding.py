@@ -26,10 +26,11 @@ def log_file(opened: ExitStack, request: LogFile) -> Mapping[str, object]:
         "column_map": "" if request.column_map is None else map_text(request.column_map),
         "importer": request.importer or "",
         "option": list(request.options),
+        "leave_out": list(request.leave_out),
     }
     return {"files": [("file", (request.path.name, content))], "data": fields}
 
 
 def recording_files(opened: ExitStack, request: RecordingFolder) -> Mapping[str, object]:
     """Send the files of a recording as parts of one form. Raises BadRecording for a folder without any."""
-    return {"files": recording_parts(opened, request.folder)}
+    return {"files": recording_parts(opened, request.folder), "data": {"leave_out": list(request.leave_out)}}

@@ -65,11 +65,14 @@ from labctl.services.simulation.effect_sizes import with_sizes
 
 
 def _import_recording(context: CommandContext, asked: RecordingFolder) -> ImportResponse:
-    return transfer.import_folder(context.store, asked.folder, context.now())
+    with importers.as_interchange(asked.folder, importers.INTERCHANGE, leave_out=asked.leave_out) as folder:
+        return transfer.import_folder(context.store, folder, context.now())
 
 
 def _import_log(context: CommandContext, asked: LogFile) -> ImportResponse:
-    with importers.as_interchange(asked.path, asked.importer, asked.options, asked.column_map) as folder:
+    with importers.as_interchange(
+        asked.path, asked.importer, asked.options, asked.column_map, leave_out=asked.leave_out
+    ) as folder:
         return transfer.import_folder(context.store, folder, context.now())
 
 

@@ -131,6 +131,7 @@ class LogFile:
     column_map: ColumnMap | None = None
     importer: str | None = None
     options: tuple[str, ...] = ()
+    leave_out: tuple[str, ...] = ()  #: kinds of findings whose readings are left out
 
 
 @dataclass(frozen=True)
@@ -138,3 +139,4 @@ class RecordingFolder:
     """A folder that holds a recording in the interchange format."""
 
     folder: Path
+    leave_out: tuple[str, ...] = ()  #: kinds of findings whose readings are left out

@@ -23,7 +23,7 @@ from labctl.recording.raw_table import RawTable
 from labctl.recording.sanity.readings import without
 from labctl.services.recordings.logs import Accept, MappedFile, given_layout, mapped_file
 from labctl.services.recordings.staging import staging_folder
-from labctl.services.recordings.time_order import OUT_OF_ORDER, OutOfOrder, leaves_out_rows
+from labctl.services.recordings.time_order import OUT_OF_ORDER, OutOfOrder, leaves_out_rows, refuse_unknown
 
 
 def _importer(found: object) -> Importer[Any] | TableImporter[Any]:
@@ -54,6 +54,7 @@ def as_interchange(
     that there is not, BadRecording for what cannot be read.
     """
     given = parsed_options(options)
+    refuse_unknown(leave_out)
     chosen = name or surest(path)
     if chosen == INTERCHANGE and not given:
         if column_map is not None:
@@ -151,14 +152,20 @@ def read_with(
     return _checked(path, found, read_by)
 
 
-def log_with_map(path: Path, name: str | None, options: Mapping[str, str], column_map: ColumnMap | None) -> MappedFile:
-    """Return what a log would become, with everything that is wrong with it; raises BadInput, BadRecording."""
+def log_with_map(
+    path: Path, name: str | None, options: Mapping[str, str], column_map: ColumnMap | None,
+    out_of_order: OutOfOrder | None = None,
+) -> MappedFile:  # fmt: skip
+    """Return what a log would become, with everything that is wrong with it; raises BadInput, BadRecording.
+
+    With `out_of_order` the rows whose time goes back are left out.
+    """
     chosen = name or surest(path)
     importer, given = _importer_and_options(chosen, options)
     if not isinstance(importer, TableImporter):
         raise BadInput(f"{path}: importer {chosen} determines the columns itself; import it with `labctl import`")
     with _failures_named(path, chosen):
-        return mapped_file(chosen, importer, path, given, column_map)
+        return mapped_file(chosen, importer, path, given, column_map, (), out_of_order)
 
 
 @contextmanager

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,12 +10,17 @@ from numpy.typing import NDArray
 
 from labctl.recording.column_map import ColumnMap, map_document, map_text
 from labctl.recording.column_map.sources import source, unused
+from labctl.recording.column_map.time_order import in_order_of_time
 from labctl.recording.column_map.units import LSB, QUANTITIES, unit_of_target
 from labctl.recording.columns import COLUMNS
 from labctl.recording.raw_table import RawTable
+from labctl.recording.sanity.readings import examine
 from labctl.services.recordings.importers import log_with_map
 from labctl.services.recordings.logs import MappedFile
+from labctl.services.recordings.time_order import OutOfOrder, leaves_out_rows, refuse_unknown
+from labctl.services.recordings.warnings import warning_of
 from labctl.services.schemas.recordings import LogColumn, LogPreview, LogTarget, LogTrace
+from labctl.services.schemas.warnings import DataWarning
 from labctl.store import Store
 
 #: Bins of a trace, and columns that have one.
@@ -32,9 +37,15 @@ def preview_log(
     importer: str | None,
     options: Mapping[str, str],
     column_map: ColumnMap | None,
+    leave_out: Sequence[str] = (),
 ) -> LogPreview:
-    """Return what a log would become by a map, or by the one that is proposed; raises BadInput, BadRecording."""
-    found = log_with_map(path, importer, options, column_map)
+    """Return what a log would become by a map, or by the one that is proposed; raises BadInput, BadRecording.
+
+    `leave_out` are kinds of findings whose readings are to be left out; of them only `time_back` changes what a log
+    becomes, the others mark readings.
+    """
+    refuse_unknown(leave_out)
+    found = log_with_map(path, importer, options, column_map, OutOfOrder() if leaves_out_rows(leave_out) else None)
     table, chosen = found.table, found.column_map
     taken = {target: source(table, mapped.source) for target, mapped in chosen.columns.items()}
     target_of = {column.name: target for target, column in taken.items() if column is not None}
@@ -53,6 +64,7 @@ def preview_log(
         map_toml=map_text(chosen),
         guesses=found.guesses,
         problems=found.problems,
+        warnings=_warnings(found),
         unused=unused(table, chosen),
         serial=log.recording.info.serial if log is not None else None,
         motion=log.motion if log is not None else None,
@@ -61,6 +73,14 @@ def preview_log(
         traces=_traces(table, found),
         targets=_targets(),
     )
+
+
+def _warnings(found: MappedFile) -> list[DataWarning]:
+    """Return what is wrong with single rows and readings, as an inspection of the file says it."""
+    _, of_rows = in_order_of_time(found.table, found.column_map)
+    of_readings = [] if found.log is None else examine(found.log.recording)
+    findings = [*([] if of_rows is None else [of_rows]), *(each.finding for each in of_readings)]
+    return [warning_of(each) for each in findings]
 
 
 def _duration(found: MappedFile) -> float | None:

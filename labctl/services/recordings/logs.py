@@ -17,6 +17,7 @@ from labctl.recording.column_map import (
     propose,
     recording_of,
 )
+from labctl.recording.column_map.day_column import with_days
 from labctl.recording.importer import TableImporter, TableOptionsT
 from labctl.recording.logs.beside import joined
 from labctl.recording.raw_table import RawTable
@@ -57,14 +58,16 @@ def mapped_file(
     `beside` are the tables of further files of the same run. With `out_of_order` the rows whose time goes back are
     left out, and that keeps which they were.
     """
-    table = joined(importer.table(path, given_layout(options, column_map)), beside, column_map)
+    read, of_day = with_days(importer.table(path, given_layout(options, column_map)))
+    table = joined(read, beside, column_map)
     proposal = propose(table) if column_map is None else completed(table, column_map)
     chosen = proposal.column_map
     if options.serial is not None:
         chosen = checked_map({**map_document(chosen), "serial": options.serial}, "--option serial")
     if options.started_at is not None:
         chosen = chosen.model_copy(update={"started_at": options.started_at})
-    made = MappedFile(name, importer.title, table, chosen, column_map is None, proposal.guesses)
+    guesses = [*([of_day] if of_day else []), *proposal.guesses]
+    made = MappedFile(name, importer.title, table, chosen, column_map is None, guesses)
     used = table if out_of_order is None else out_of_order.rows_in_order(table, chosen)
     try:
         log = recording_of(used, chosen)

@@ -5,16 +5,27 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
+from labctl.errors import BadInput
 from labctl.recording import Recording
 from labctl.recording.column_map import ColumnMap
 from labctl.recording.column_map.time_order import in_order_of_time
 from labctl.recording.info import LeftOut
 from labctl.recording.raw_table import RawTable
 from labctl.recording.sanity import Finding
-from labctl.recording.sanity.readings.leaving_out import ALL
+from labctl.recording.sanity.readings.leaving_out import ALL, MAY_BE_LEFT_OUT
 
 #: The kind of finding whose rows are left out before a log is made a recording: such rows have no place in one.
 OUT_OF_ORDER = "time_back"
+
+
+def refuse_unknown(kinds: Sequence[str]) -> None:
+    """Raise BadInput for a kind of finding whose readings cannot be left out."""
+    known = (OUT_OF_ORDER, *MAY_BE_LEFT_OUT, ALL)
+    if unknown := [kind for kind in kinds if kind not in known]:
+        raise BadInput(
+            f"--leave-out {unknown[0][:60]}: readings of this kind cannot be left out; choose from "
+            f"{', '.join(known[:-1])} or {ALL}"
+        )
 
 
 def leaves_out_rows(kinds: Sequence[str]) -> bool:

@@ -263,6 +263,10 @@ class LogPreview(ResponseModel):
         description="Assumptions inferred from the data, such as units that no column name states."
     )
     problems: list[str] = Field(description="Everything that prevents the import; empty: the file can be imported.")
+    warnings: list[DataWarning] = Field(
+        description="What is wrong with single rows and readings; those with `may_leave_out` can be left out by the "
+        "field `leave_out` of the import, by their kind `what`."
+    )
     unused: list[str] = Field(description="Columns of the file that are not used.")
     serial: str | None
     motion: str | None = Field(

@@ -1287,7 +1287,7 @@ export interface paths {
         /**
          * Preview a log
          * @description The proposed map of a log, or what it becomes by the map that is sent; its first rows, traces, and everything
-         *     that is wrong. Nothing is stored.
+         *     that is wrong, in the columns and in single readings. Nothing is stored.
          */
         post: operations["preview_api_recordings_logs_preview_post"];
         delete?: never;
@@ -3043,6 +3043,11 @@ export interface components {
              */
             option?: string[] | null;
             /**
+             * Leave Out
+             * @description Kind of finding whose readings are left out, such as spikes; all: every kind that can be left out; may be repeated. They are marked as bad, counted and stated in `left_out`.
+             */
+            leave_out?: string[] | null;
+            /**
              * Modified Ms
              * @description When the file was last written, ms since 1970-01-01 UTC.
              */
@@ -3052,6 +3057,11 @@ export interface components {
         Body_import_recording_api_recordings_post: {
             /** Files */
             files: string[];
+            /**
+             * Leave Out
+             * @description Kind of finding whose readings are left out, such as spikes; all: every kind that can be left out; may be repeated. They are marked as bad, counted and stated in `left_out`.
+             */
+            leave_out?: string[] | null;
         };
         /** Body_preview_api_recordings_logs_preview_post */
         Body_preview_api_recordings_logs_preview_post: {
@@ -3074,6 +3084,11 @@ export interface components {
              * @description Option of the importer, as KEY=VALUE; may be repeated.
              */
             option?: string[] | null;
+            /**
+             * Leave Out
+             * @description Kind of finding whose readings are left out, such as spikes; all: every kind that can be left out; may be repeated. They are marked as bad, counted and stated in `left_out`.
+             */
+            leave_out?: string[] | null;
             /**
              * Modified Ms
              * @description When the file was last written, ms since 1970-01-01 UTC.
@@ -7201,6 +7216,11 @@ export interface components {
              * @description Everything that prevents the import; empty: the file can be imported.
              */
             problems: string[];
+            /**
+             * Warnings
+             * @description What is wrong with single rows and readings; those with `may_leave_out` can be left out by the field `leave_out` of the import, by their kind `what`.
+             */
+            warnings: components["schemas"]["DataWarning"][];
             /**
              * Unused
              * @description Columns of the file that are not used.

@@ -7,13 +7,15 @@ from collections.abc import Iterator
 import numpy as np
 
 from labctl.recording.sanity.finding import Finding
-from labctl.recording.sanity.readings.series import Array, Marked, Rows, Series, rows_in_words, runs
+from labctl.recording.sanity.readings.series import Array, Marked, Rows, Series, noise_of, rows_in_words, runs
 
 #: Readings of a block in which the noise is found, least blocks of a data set, and the share of its largest third
 #: differences that do not count: single readings far off are another fault.
 BLOCK, LEAST_BLOCKS, OFF_SHARE = 40, 5, 0.1
 #: The noise changes where so many blocks in a row have so many times more or less than usual, and those beside not.
 LASTING, TIMES = 2, 3.0
+#: A whole data set is noisy that has so many times the noise of those at the same speed, of so many sets in all.
+SET_TIMES, LEAST_SETS = 6.0, 5
 #: An output whose step is above so many noises has no noise that could be compared.
 COARSE = 1.5
 #: The time between readings changes where so many blocks in a row have so many times more or less.
@@ -33,6 +35,9 @@ def check_noise(series: Series) -> Iterator[Marked]:
         for part in series.parts:
             rows[part], times = _other_noise(values[part])
             ratio = max(ratio, times, key=lambda each: abs(np.log(each)))
+        for part, times in _noisy_sets(series, values):
+            rows[part] = True
+            ratio = max(ratio, times, key=lambda each: abs(np.log(each)))
         if not rows.any():
             continue
         yield Marked(
@@ -45,6 +50,27 @@ def check_noise(series: Series) -> Iterator[Marked]:
             ),
             rows,
         )  # fmt: skip
+
+
+def _noisy_sets(series: Series, values: Array) -> list[tuple[slice, float]]:
+    """Return the data sets whose noise is far above those at the same speed, and above the others, with the ratio.
+
+    The motor of a table shakes a unit at some speeds, but in each data set at them.
+    """
+    if series.rate_dps is None or len(series.parts) < LEAST_SETS:
+        return []
+    noises = np.array([noise_of(values[part]) for part in series.parts])
+    speed = np.abs([series.rate_dps[part.start] for part in series.parts])
+    usual = float(np.median(noises))
+    found = []
+    for k, part in enumerate(series.parts):
+        like = noises[(speed == speed[k]) & (np.arange(len(noises)) != k)]
+        if not len(like) or min(float(np.min(like)), usual) <= 0:
+            continue
+        times = float(noises[k] / max(float(np.max(like)), usual))  # along the table's axis an output has more noise
+        if times > SET_TIMES:
+            found.append((part, times))
+    return found
 
 
 def _other_noise(values: Array) -> tuple[Rows, float]:

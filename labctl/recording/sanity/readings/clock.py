@@ -20,6 +20,11 @@ CLOSE = 0.5
 STEPS = 51
 #: Readings are missing where a step of time is so many usual ones, and so many usual deviations from them.
 GAP_STEPS, GAP_DEVIATIONS = 2.5, 12.0
+#: One reading is missing where a step is two usual ones within this share of one, and so many usual deviations longer
+#: than one, while the steps beside it are whole: a reading that only came late is followed by a short step.
+NEAR_STEP, WHOLE_STEP = 0.2, 0.8
+#: Fewer single readings are missing from no mean that one could tell.
+LEAST_SINGLE = 3
 #: More rows out of order than this share are no accident, and are not left out.
 MOST_OUT = 0.02
 
@@ -118,6 +123,9 @@ def check_gaps(series: Series) -> Iterator[Marked]:
     usual = _usual_steps(np.diff(series.t_s), series.step_s)
     spread = ROBUST * float(np.median(np.abs(steps[same] - usual[same]))) if same.any() else 0.0
     wide = same & (steps > np.maximum(GAP_STEPS * usual, usual + GAP_DEVIATIONS * spread))
+    single = same & _is_one_missing(steps / usual, spread / usual)
+    if single.sum() >= LEAST_SINGLE:
+        wide |= single
     if not wide.any():
         return
     rows = np.concatenate([[False], wide])
@@ -135,6 +143,13 @@ def check_gaps(series: Series) -> Iterator[Marked]:
         ),
         rows,
     )  # fmt: skip
+
+
+def _is_one_missing(ratio: Array, spread: Array) -> Rows:
+    """Return where one reading is missing, (n,), from steps of time and their spread over the usual step."""
+    beside = np.pad(ratio, 1, constant_values=1.0)
+    whole = np.minimum(beside[:-2], beside[2:]) > WHOLE_STEP
+    return np.asarray((np.abs(ratio - 2.0) < NEAR_STEP) & (ratio > 1.0 + GAP_DEVIATIONS * spread) & whole)
 
 
 def _usual_steps(steps: Array, usual: float) -> Array:

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from labctl.recording.sanity.finding import Finding
-from labctl.recording.sanity.readings.series import Array, Marked, Rows, Series, gain_of, rows_in_words, runs
+from labctl.recording.sanity.readings.series import Array, Marked, Rows, Series, gain_of, rows_in_words, runs, spread_of
 
 #: The probability, for a whole channel, of a run of equal readings that is called frozen; and its least length.
 CHANCE, LEAST_RUN = 1e-6, 20
@@ -18,6 +18,8 @@ USUAL_RUN, COARSE_NOISES = 50, 0.8
 COARSE_STEPS = 5.0
 #: An output frozen in this share of the readings, or in most of a data set, makes a fit certainly wrong.
 CERTAIN_SHARE, MOST_OF_SET = 0.1, 0.9
+#: An output comes in coarse steps from so many times its noise on; a value is a multiple of a step within this share.
+COARSE_LATTICE, ON_LATTICE = 1.9, 0.02
 #: Rows are written again where this share more of them equal the row before than equal that three rows before.
 REPEATED_SHARE, DEVIATIONS = 0.003, 5.0
 
@@ -31,6 +33,9 @@ def check_frozen(series: Series) -> Iterator[Marked]:
             continue
         begin, end = max(runs(rows), key=lambda run: run[1] - run[0])
         steady = n == len(values)
+        if steady and (step := step_of_one_code(series, name)) is not None:
+            yield _one_code(series, name, step)
+            continue
         whole = not steady and any(rows[part].mean() > MOST_OF_SET for part in series.parts)
         sure = whole or CERTAIN_SHARE * len(series) < n < len(series)
         seconds = float(series.t_s[end - 1] - series.t_s[begin])
@@ -45,6 +50,45 @@ def check_frozen(series: Series) -> Iterator[Marked]:
             ),
             rows,
         )  # fmt: skip
+
+
+def step_of_one_code(series: Series, name: str) -> float | None:
+    """Return the step that an output is coarse in that stays at one value, deg/s; None for one that is dead.
+
+    Other outputs show it: they come in coarse steps, and the value is a multiple of theirs; or they stay at one value
+    each too, as those of one converter do, and only a limit is known: 0 is returned.
+    """
+    if series.rate_dps is None or np.ptp(series.rate_dps):
+        return None  # a table that turns would move an output of any step
+    value = float(series.outputs[name][0])
+    others = {other: values for other, values in series.outputs.items() if other != name}
+    if not any(np.ptp(values) for values in others.values()):
+        return 0.0
+    coarse = [
+        series.code_steps[other]
+        for other, readings in others.items()
+        if series.code_steps[other] > COARSE_LATTICE * spread_of(readings)
+    ]
+    return next((step for step in coarse if abs(value / step - round(value / step)) < ON_LATTICE), None)
+
+
+def _one_code(series: Series, name: str, step: float) -> Marked:
+    values = series.outputs[name]
+    if step:
+        why = f"another output comes in steps of {step:.4g} deg/s, and this value is a multiple of them"
+    else:
+        why = "no other output changes either"
+    return Marked(
+        Finding(
+            "quantised", "likely", name,
+            f"the output is {values[0]:.6g} deg/s in all {len(values)} readings: its steps are far larger than its "
+            f"noise ({why}), or the unit does not measure",
+            step or None, "deg/s", "readings that differ by their noise",
+            "log the output with more digits or a finer converter, and check that the unit is switched on",
+            channel=name, n=len(values),
+        ),
+        np.ones(len(values), dtype=bool),
+    )  # fmt: skip
 
 
 def frozen_rows(series: Series, name: str, values: Array) -> Rows:

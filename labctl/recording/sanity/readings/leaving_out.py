@@ -13,7 +13,7 @@ from labctl.recording.recording import Recording
 from labctl.recording.sanity.readings.examination import examine
 
 #: Kinds of findings whose readings can be left out.
-MAY_BE_LEFT_OUT = ("frozen", "clipped", "thermometer", "spikes", "repeated", "moved", "noise_changes")
+MAY_BE_LEFT_OUT = ("frozen", "clipped", "thermometer", "spikes", "repeated", "moved", "noise_changes", "shifted")
 ALL = "all"
 
 
@@ -21,14 +21,8 @@ def without(recording: Recording, kinds: Sequence[str], name: str) -> Recording:
     """Return a recording whose readings of some kinds of findings are marked with valid = 0; `name` is its file's.
 
     What is left out is stated in `left_out` of its head. Nothing is removed: the readings stay as they were measured.
-    Raises BadInput for an unknown kind, for one that cannot be left out, and where no reading would stay.
+    Raises BadInput for readings that cannot be left out, and where no reading would stay.
     """
-    unknown = [kind for kind in kinds if kind not in (*MAY_BE_LEFT_OUT, ALL)]
-    if unknown:
-        raise BadInput(
-            f"--leave-out {unknown[0]}: readings of this kind cannot be left out; choose from "
-            f"time_back, {', '.join(MAY_BE_LEFT_OUT)} or {ALL}"
-        )
     found = [each for each in examine(recording) if ALL in kinds or each.finding.what in kinds]
     chosen = [each for each in found if each.finding.may_leave_out]
     if refused := [each.finding for each in found if not each.finding.may_leave_out and each.finding.what in kinds]:

@@ -31,6 +31,13 @@ INTERMIXED, INTERMIXED_CODES, LEAST_SHARE, LEAST_TURNS, LEVEL_READINGS, BETWEEN 
 BESIDE, LEAST_BESIDE, APART = 60, 10, 3.5
 #: One output alone changes its level by this many noises, with this share of the readings of its data set on each side.
 APART_ALONE, ALONE_SHARE = 6.0, 0.1
+#: And by so many times what such differences usually are: an output that a filter has smoothed differs by more.
+STEPS_USUAL = 6.0
+#: Within a drift: the readings next to the step show it as the means do, and no step leads back by this share of it.
+AT_ONCE, BACK_SHARE = (0.6, 1.7), 0.3
+#: Readings change by turns between two devices where the difference is as steady as this, over so many blocks; a line
+#: at half the sampling rate swells and fades.
+STEADY, STEADY_BLOCKS = 0.2, 8
 
 
 def check_units(series: Series) -> Iterator[Marked]:
@@ -89,19 +96,48 @@ def _gains_agree(series: Series, names: list[str], rows: Rows, *, off: float) ->
     `off` the ratio, as a logarithm, by little.
     """
     if series.rate_dps is None or min(_rms(series.rate_dps[rows]), _rms(series.rate_dps[~rows])) < LEAST_RATE_DPS:
+        if any(_levels_differ(series.outputs[name], rows) for name in names):
+            return False  # a filter lowers the noise, and leaves the level
         return len(names) > 1 or _levels_agree(series.outputs[names[0]], rows) or off < VERY_NEAR
-    rate = series.rate_dps
-    gains = [
-        [abs(float(values[part] @ rate[part])) / float(rate[part] @ rate[part]) for part in (rows, ~rows)]
-        for values in (series.outputs[name] for name in names)
-    ]
-    low, high = max(gains, key=max)
+    low, high = (_gain_along(series, names, part) for part in (rows, ~rows))
     return low > 0 and abs(np.log(high / low / DEG_PER_RAD)) < GAIN_NEAR
+
+
+def _gain_along(series: Series, names: list[str], rows: Rows) -> float:
+    """Return the usual size of the outputs over the table's rate in data sets within some rows, of the largest each."""
+    assert series.rate_dps is not None
+    if series.motion == "profile":
+        rate = series.rate_dps[rows]
+        return max(abs(float(series.outputs[name][rows] @ rate)) for name in names) / float(rate @ rate)
+    sizes = []
+    for part in series.parts:
+        speed = abs(float(np.median(series.rate_dps[part])))
+        if speed >= LEAST_RATE_DPS and rows[part].mean() > 0.5:
+            sizes.append(max(abs(float(np.median(series.outputs[name][part]))) for name in names) / speed)
+    return float(np.median(sizes)) if sizes else 0.0
 
 
 def _levels_agree(values: Array, rows: Rows) -> bool:
     low, high = (abs(float(np.median(values[part]))) for part in (rows, ~rows))
     return low > 0 and abs(np.log(max(high / low, 1e-12) / DEG_PER_RAD)) < NEAR
+
+
+def _levels_differ(values: Array, rows: Rows) -> bool:
+    """Whether the level changes by another factor than the unit where the readings in rad/s begin or end.
+
+    A filter that is switched leaves it, and the noise falls.
+    """
+    for row in np.flatnonzero(rows[1:] != rows[:-1]) + 1:
+        length = max(len(values) // BLOCKS, LEAST_IN_BLOCK)  # the row is known to a block
+        parts = [values[max(row - 3 * length, 0) : row - length], values[row + length : row + 3 * length]]
+        if min(len(part) for part in parts) < LEAST_IN_BLOCK // 2:
+            continue
+        low, high = parts if rows[row - 1] else parts[::-1]
+        spreads = [float(np.percentile(np.abs(part - np.median(part)), 90)) for part in (low, high)]
+        off = abs(float(np.median(low)) - float(np.median(high)) / DEG_PER_RAD)
+        if off > 2.0 * (spreads[0] + spreads[1] / DEG_PER_RAD):
+            return True
+    return False
 
 
 def _rms(values: Array) -> float:
@@ -229,8 +265,11 @@ def _alternates(values: Array) -> bool:
     swing = np.diff(values)
     sign = np.where(np.arange(len(swing)) % 2, -1.0, 1.0)
     mean = float(np.median(sign * swing))
-    own = float(np.median(np.abs(values[2:] - values[:-2]))) * 1.4826 / np.sqrt(2)
-    return abs(mean) > BY_TURNS * max(own, 1e-300)
+    own = float(np.median(np.abs(values[2:] - values[:-2]))) * ROBUST / np.sqrt(2)
+    if abs(mean) <= BY_TURNS * max(own, 1e-300):
+        return False
+    blocks = [float(np.median(block)) for block in np.array_split(sign * swing, STEADY_BLOCKS)]
+    return float(np.ptp(blocks)) < 2 * STEADY * abs(mean)
 
 
 def _after(series: Series) -> Iterator[Marked]:
@@ -241,17 +280,19 @@ def _after(series: Series) -> Iterator[Marked]:
         found = {name: _steps_of_level(values[part], series.noises[name]) for name, values in series.residuals.items()}
         row = int(np.argmax(np.sum([np.abs(step) for step in found.values()], axis=0)))
         apart = {name: float(step[row]) for name, step in found.items() if abs(step[row]) > APART}
-        lasting = {name for name in apart if _lasts(series.residuals[name][part], row, series.noises[name])}
+        lasting = {
+            name for name in apart if _lasts(series.residuals[name][part], row, series.noises[name], found[name])
+        }
         if len(lasting) < 2:
             share = min(row, n - row) / n
             lasting = lasting if series.motion == "rest" and share > ALONE_SHARE else set()  # else a rate changes
             alone = [name for name in lasting if abs(apart[name]) > APART_ALONE]
-            yield from (_level_step(series, name, part.start + row, part, apart[name]) for name in alone)
+            yield from (_level_step(series, name, part.start + row, part) for name in alone)
             continue
         rows = np.zeros(len(series), dtype=bool)
         rows[part.start + row : part.stop] = True
         name = max(lasting, key=lambda each: abs(apart[each]))
-        size = apart[name] * series.noises[name]
+        size = _size_at(series.residuals[name][part], row)
         yield Marked(
             Finding(
                 "two_devices", "likely", f"{', '.join(sorted(lasting))}, from row {part.start + row + 1} on",
@@ -264,10 +305,10 @@ def _after(series: Series) -> Iterator[Marked]:
         )  # fmt: skip
 
 
-def _level_step(series: Series, name: str, row: int, part: slice, apart: float) -> Marked:
+def _level_step(series: Series, name: str, row: int, part: slice) -> Marked:
     rows = np.zeros(len(series), dtype=bool)
     rows[row : part.stop] = True
-    size = apart * series.noises[name]
+    size = _size_at(series.residuals[name][part], row - part.start)
     return Marked(
         Finding(
             "level_step", "likely", f"{name}, from row {row + 1} on",
@@ -292,14 +333,27 @@ def _steps_of_level(values: Array, noise: float) -> Array:
     before, after = np.maximum(at - low, 1), np.maximum(high - at, 1)
     step = (total[high] - total[at]) / after - (total[at] - total[low]) / before
     step[(at < LEAST_BESIDE) | (at > n - LEAST_BESIDE)] = 0.0
-    return np.asarray(step / noise)
+    usual = STEPS_USUAL / APART * ROBUST * float(np.median(np.abs(step[LEAST_BESIDE : n - LEAST_BESIDE])))
+    return np.asarray(step / max(noise, usual))
 
 
-def _lasts(values: Array, row: int, noise: float) -> bool:
-    """Whether a level changes at a row at once and for good: not a creep, not a turn that ends."""
-    near = max(LEAST_BESIDE // 2, 3)
-    step = float(
-        np.median(values[row + 1 : row + 1 + near * 2]) - np.median(values[max(row - 1 - near * 2, 0) : row - 1])
-    )
+def _size_at(values: Array, row: int) -> float:
+    """Return by how much the level of (n,) readings next to a row changes."""
+    before, after = values[max(row - 1 - LEAST_BESIDE, 0) : row - 1], values[row + 1 : row + 1 + LEAST_BESIDE]
+    return float(np.median(after) - np.median(before))
+
+
+def _lasts(values: Array, row: int, noise: float, steps: Array) -> bool:
+    """Whether a level changes at a row at once and for good: not a creep, not a turn that ends.
+
+    Of `steps` (n,), those of the level at each row, none leads back.
+    """
+    step = _size_at(values, row)
+    if abs(step) <= 2.5 * noise:
+        return False
     whole = float(np.median(values[row:]) - np.median(values[:row]))
-    return abs(step) > 2.5 * noise and whole * step > 0 and 0.5 < whole / step < 2.0
+    if 0.5 < whole / step < 2.0:
+        return True
+    # with a drift of the same size the medians differ by something else
+    at_once = AT_ONCE[0] < step / noise / steps[row] < AT_ONCE[1]
+    return at_once and float((-np.sign(step) * steps).max()) < BACK_SHARE * abs(float(steps[row]))

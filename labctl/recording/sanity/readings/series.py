@@ -104,12 +104,13 @@ def series_of(recording: Recording) -> Series | None:
         still = np.zeros(n, dtype=bool) if rate is None else rate == 0
     if info.motion == "profile":
         still = np.zeros(n, dtype=bool)  # between two rates the unit is said to stand for an instant only
+    at_rest = info.motion == "rates" and rate is not None and not rate.any()  # a rest, written as rates of 0
     return Series(
         np.asarray(columns["t_s"], dtype=np.float64), np.asarray(columns["dataset"], dtype=np.int64), rate, still,
         {f"gyro_{axis}": recording.gyro_dps(axis) for axis in info.axes},
         {name: values for name, values in numbers.items() if name.endswith("_c")},
         {name: values for name, values in numbers.items() if not name.endswith("_c")},
-        info.motion,
+        "rest" if at_rest else info.motion,
     )  # fmt: skip
 
 

@@ -83,7 +83,7 @@ def _check_jumps(series: Series, name: str, values: Array, usable: Rows) -> Iter
     at = np.flatnonzero(usable)
     if len(at) < 4 * BESIDE:
         return
-    jumps = _lasting_jumps(series.t_s[at], values[at])
+    jumps = lasting_jumps(series.t_s[at], values[at])
     if not jumps:
         return
     if (fahrenheit := _in_fahrenheit(values[at], jumps)) is not None:
@@ -119,7 +119,7 @@ def _check_jumps(series: Series, name: str, values: Array, usable: Rows) -> Iter
     )  # fmt: skip
 
 
-def _lasting_jumps(t_s: Array, values: Array) -> list[int]:
+def lasting_jumps(t_s: Array, values: Array) -> list[int]:
     """Return the first readings after a jump, of (n,) temperatures at (n,) times."""
     steps = np.diff(values)
     changes = np.flatnonzero(steps) + 1

@@ -6,6 +6,7 @@ import { setChildren, h } from "../core/elements.js";
 import { count } from "../core/format.js";
 import { busyIndicator, notice } from "../core/components.js";
 import { droppedFiles, isLog, recordingFiles } from "./file_input.js";
+import { leftOutText } from "./leave_out.js";
 import { logPreview } from "./log_preview.js";
 
 /** @import { Imported } from "../../../types/api.js" */
@@ -149,6 +150,7 @@ function acceptedNotice(made, left) {
       `Imported as recording ${made.recording} of unit ${made.serial}: ${count(made.datasets)} data sets, ${count(made.readings)} readings.`,
     ),
     warnings.map((warning) => h("p", {}, `${warning.severity === "certain" ? "Wrong" : "Check"}: ${warning.text}`)),
+    made.left_out.map((each) => h("p", { class: "small" }, leftOutText(each))),
     made.measured_at === null
       ? h(
           "p",

@@ -3,8 +3,8 @@
 import { get } from "../core/http/api.js";
 import { h, whenNearViewport } from "../core/elements.js";
 import { figure } from "../core/figure.js";
-import { count } from "../core/format.js";
 import { card, fitWarnings, loadInto } from "../core/components.js";
+import { leftOutText } from "./leave_out.js";
 
 /** @import { Inspection } from "../../../types/api.js" */
 /** @import { Picture } from "../../../types/pages.js" */
@@ -26,13 +26,7 @@ export function inspectionCard(recording, signal) {
 
 /** @param {Inspection} found */
 function inspected(found) {
-  const left = found.left_out.map((each) =>
-    h(
-      "li",
-      {},
-      `Left out: ${count(each.n)} of ${count(each.of)} readings${each.channel ? ` of ${each.channel}` : ""} (${each.why}).`,
-    ),
-  );
+  const left = found.left_out.map((each) => h("li", {}, leftOutText(each)));
   return h(
     "div",
     { class: "stack" },

@@ -8,6 +8,7 @@ import { axisColour, colour, figure } from "../core/figure.js";
 import { count, duration } from "../core/format.js";
 import { busyIndicator, button, notice, table } from "../core/components.js";
 import { labelledField, option, selectField } from "../core/fields.js";
+import { leaveOutChoices } from "./leave_out.js";
 import { entryOf, withKey, withTarget, withUnit } from "./log_map.js";
 
 /** @import { Imported, LogPreview } from "../../../types/api.js" */
@@ -39,12 +40,15 @@ export function logPreview(file, taken) {
   const place = h("div", { class: "stack", "aria-live": "polite" });
   /** @type {string[]} */
   let options = [];
+  /** @type {Set<string>} */
+  const leaveOut = new Set();
 
   /** @param {MapDocument | string | null} map */
   const fields = (map) => ({
     column_map: typeof map === "string" ? map : map ? JSON.stringify(map) : "",
     modified_ms: String(file.lastModified),
     option: options,
+    leave_out: [...leaveOut],
   });
 
   /** @param {MapDocument | string | null} map */
@@ -95,6 +99,7 @@ export function logPreview(file, taken) {
       place,
       h("p", { class: "lead" }, `${seen.file}: ${seen.title}, ${count(seen.rows)} rows`),
       seen.problems.length ? problemList(seen.problems) : summary(seen),
+      readingsNotice(seen, leaveOut, () => look(map)),
       seen.guesses.map((guess) => h("p", { class: "small" }, `Guessed: ${guess}`)),
       settings(seen, map, look),
       columnTable(seen, map, look),
@@ -167,6 +172,36 @@ const summary = (seen) =>
     ),
     seen.unused.length ? h("p", { class: "small" }, `Not used: ${seen.unused.join(", ")}.`) : null,
   );
+
+/**
+ * What is wrong with single readings, and a choice for each kind that can be left out.
+ * @param {LogPreview} seen
+ * @param {Set<string>} chosen
+ * @param {() => unknown} lookAgain
+ */
+function readingsNotice(seen, chosen, lookAgain) {
+  if (!seen.warnings.length) return null;
+  const choices = leaveOutChoices(seen.warnings, seen.rows).map(({ kind, text }) => {
+    /** @type {HTMLInputElement} */
+    const box = h("input", {
+      type: "checkbox",
+      checked: chosen.has(kind),
+      onchange: () => {
+        if (box.checked) chosen.add(kind);
+        else chosen.delete(kind);
+        if (kind === "time_back") lookAgain(); // such rows have no place in a recording: the others are looked at anew
+      },
+    });
+    return h("label", { class: "check" }, box, text);
+  });
+  return notice(
+    "bad",
+    seen.warnings.map((each) => h("p", {}, `${each.severity === "certain" ? "Wrong" : "Check"}: ${each.text}`)),
+    choices.length
+      ? h("fieldset", { class: "stack" }, h("legend", {}, "Leave out of every fit (the readings are kept)"), choices)
+      : null,
+  );
+}
 
 /**
  * @param {LogPreview} seen

@@ -1,0 +1,82 @@
+"""Two outputs that change places from a row on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+
+import numpy as np
+
+from labctl.recording.sanity.finding import Finding
+from labctl.recording.sanity.readings.factors import (
+    COARSE,
+    LEVEL_SHARE,
+    NOISE_CHANGES,
+    U_LOG_NOISE,
+    beside,
+    candidates,
+    edges_of,
+)
+from labctl.recording.sanity.readings.series import Marked, Series, spread_of
+
+#: The level of each is that of the other before within so many standard uncertainties, and not its own by so many.
+AGREES, CHANGES = 4.0, 8.0
+
+
+def check_exchanged(series: Series) -> Iterator[Marked]:
+    """Yield the pairs of outputs of which each goes on at the level of the other."""
+    if series.motion not in ("rest", "rates"):
+        return
+    fine = [name for name in series.outputs if series.code_steps[name] <= COARSE * series.noises[name]]
+    for one, other in combinations(fine, 2):
+        places = (
+            part.start + row
+            for part in series.parts
+            for row in sorted({row for name in (one, other) for row in candidates(series.outputs[name][part])})
+            if _is_exchanged(series, (one, other), part, row)
+        )
+        first = next(places, None)
+        if first is None:
+            continue
+        rows = np.zeros(len(series), dtype=bool)
+        rows[first:] = True
+        yield Marked(
+            Finding(
+                "axes_swapped", "certain", f"{one} and {other}, from row {first + 1} on",
+                f"the outputs change places at row {first + 1}: each goes on at the level of the other",
+                float(first + 1), "row", "the same columns in every row",
+                f"exchange {one} and {other} from row {first + 1} on, or divide the recording there",
+                channel=other, n=int(rows.sum()),
+            ),
+            rows,
+        )  # fmt: skip
+
+
+def _is_exchanged(series: Series, names: tuple[str, str], part: slice, row: int) -> bool:
+    one, other = (edges_of(series.outputs[name][part], row) for name in names)
+    if one is None or other is None or min(*one[1::2], *other[1::2]) <= 0:
+        return False
+    (before_a, u_before_a, after_a, u_after_a), (before_b, u_before_b, after_b, u_after_b) = one, other
+    off = max(
+        abs(after_a - before_b) / float(np.hypot(np.hypot(u_after_a, u_before_b), LEVEL_SHARE * before_b)),
+        abs(after_b - before_a) / float(np.hypot(np.hypot(u_after_b, u_before_a), LEVEL_SHARE * before_a)),
+    )
+    if off > AGREES:
+        return False
+    apart = abs(before_a - before_b) / float(np.hypot(u_before_a, u_before_b))
+    changed = min(
+        abs(after_a - before_a) / float(np.hypot(u_after_a, u_before_a)),
+        abs(after_b - before_b) / float(np.hypot(u_after_b, u_before_b)),
+    )
+    return min(apart, changed) > CHANGES or _noises_are(series, names, part, row)
+
+
+def _noises_are(series: Series, names: tuple[str, str], part: slice, row: int) -> bool:
+    """Whether the noises of two outputs of different noise are exchanged at a row."""
+    before, after = zip(*(beside(series.outputs[name][part], row) for name in names), strict=True)
+    noises = [spread_of(each) for each in (*before, *after)]
+    if min(noises) <= 0:
+        return False
+    first, then = (float(np.log(noises[k] / noises[k + 1])) for k in (0, 2))
+    u = U_LOG_NOISE * 2.0 / np.sqrt(min(len(each) for each in (*before, *after)))
+    return abs(first) > NOISE_CHANGES * u and abs(first + then) < NOISE_CHANGES * u

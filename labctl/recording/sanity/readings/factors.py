@@ -1,0 +1,192 @@
+"""An output that is multiplied from a row on: another unit of measure, another range with the old scale, or a sign."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from labctl.recording.sanity.finding import Finding
+from labctl.recording.sanity.readings.series import Array, Marked, Series, spread_of
+
+#: Readings on either side of a row that show level and noise, at least and at most, and those next to it left out.
+LEAST_BESIDE, MOST_BESIDE, GUARD = 12, 120, 3
+DEG_PER_RAD = 180.0 / np.pi
+#: Factors of a range that was switched while the old scale was kept; a gain of any other size is no switch.
+RANGES = (2.0, 4.0, 8.0, 16.0)
+#: Level and noise agree with a factor within so many standard uncertainties, and disagree with none by so many.
+AGREES, LEVEL_CHANGES, NOISE_CHANGES = 3.5, 6.0, 3.0
+#: Standard uncertainty of the logarithm of a noise of n readings, by third differences, times sqrt(n): they are
+#: correlated, the sum of the squares of their correlations is 2.31.
+U_LOG_NOISE = 1.1
+#: An output whose step is above so many noises shows neither.
+COARSE = 1.5
+#: A level is known to this share of itself, and the slope of a drift changes by as much as it is beside.
+LEVEL_SHARE = 1e-3
+#: A sign changes at once: so many readings next to the row differ as the levels do, within this share. Smaller levels
+#: than so many noises may change theirs by drift.
+AT_ONCE, AT_ONCE_SHARE, LEVEL_NOISES = 3, 0.35, 3.0
+#: The noise of all readings after a row over that of all before it is the factor, within this, as a logarithm.
+LASTS = 0.4
+#: Rows with the largest changes that are examined in a data set.
+CANDIDATES = 3
+
+
+@dataclass(frozen=True)
+class Change:
+    """By which factor an output changes from a row of its data set on."""
+
+    row: int
+    factor: float
+    size: float  #: of the change of its level, in standard uncertainties
+
+
+def check_factors(series: Series) -> Iterator[Marked]:
+    """Yield the outputs whose level and noise are both multiplied by one known factor from a row on."""
+    if series.motion not in ("rest", "rates"):
+        return  # where the rate changes all the time no level is known beside a row
+    found: dict[str, tuple[int, Change]] = {}
+    for name, values in series.outputs.items():
+        if series.code_steps[name] > COARSE * series.noises[name]:
+            continue
+        changes = [(part.start, change) for part in series.parts if (change := _change(series, values[part]))]
+        if changes:
+            found[name] = max(changes, key=lambda each: each[1].size)
+    for name, (start, change) in found.items():
+        yield _marked(series, name, start + change.row, change)
+
+
+def _change(series: Series, values: Array) -> Change | None:
+    """Return the surest change by a factor within the readings of a data set, (n,)."""
+    factors = [DEG_PER_RAD, 1 / DEG_PER_RAD, *RANGES, *(1 / each for each in RANGES)]
+    if series.motion == "rates":
+        factors.append(-1.0)  # at rest a unit that was turned over shows as much of the Earth's rate
+    changes = [
+        change for row in candidates(values) for factor in factors if (change := _by_factor(values, row, factor))
+    ]
+    return max(changes, key=lambda each: each.size, default=None)
+
+
+def candidates(values: Array) -> list[int]:
+    """Return the rows at which the level, or the noise, of (n,) readings changes most; none of too few readings."""
+    n = len(values)
+    if n < 2 * (LEAST_BESIDE + GUARD):
+        return []
+    beside = int(np.clip(n // 8, LEAST_BESIDE, MOST_BESIDE // 2))
+    at = np.arange(LEAST_BESIDE, n - LEAST_BESIDE + 1)
+    low, high = np.maximum(at - beside, 0), np.minimum(at + beside, n)
+    third = np.abs(np.diff(values, 3))
+    jerk = np.log(np.maximum(np.concatenate([third[:1], third, third[-2:]]), 1e-12 + float(np.median(third)) / 100.0))
+    rows: list[int] = []
+    for course in (np.clip(values, *np.percentile(values, [0.5, 99.5])), jerk):
+        total = np.concatenate([[0.0], np.cumsum(course - course.mean())])
+        step = np.abs((total[high] - total[at]) / (high - at) - (total[at] - total[low]) / (at - low))
+        for _ in range(CANDIDATES):
+            best = int(np.argmax(step))
+            rows.append(int(at[best]))
+            step[max(best - beside, 0) : best + beside] = 0.0
+    return rows
+
+
+def _by_factor(values: Array, row: int, factor: float) -> Change | None:
+    """Return the change at a row if level and noise beside it agree with a factor, and not with none."""
+    before, after = beside(values, row)
+    edges = edges_of(values, row)
+    noises = [spread_of(each) for each in (before, after)] if edges else [0.0]
+    if edges is None or min(noises) <= 0:
+        return None
+    levels, u = edges[::2], edges[1::2]
+    u_noise = U_LOG_NOISE * float(np.hypot(1 / np.sqrt(len(before)), 1 / np.sqrt(len(after))))
+    ratio = float(np.log(noises[1] / noises[0]))
+    if abs(ratio - np.log(abs(factor))) > AGREES * u_noise:
+        return None
+    expected = factor * levels[0]
+    u_level = float(np.hypot(np.hypot(factor * u[0], u[1]), LEVEL_SHARE * expected))
+    size = abs(levels[1] - levels[0]) / float(np.hypot(*u))
+    if abs(levels[1] - expected) > AGREES * u_level or size < LEVEL_CHANGES:
+        return None
+    if factor == -1.0:
+        known = min(abs(level) for level in levels) > LEVEL_NOISES * max(noises)
+        return Change(row, factor, size) if known and _is_at_once(values, row, levels[1] - levels[0]) else None
+    lasts = abs(np.log(spread_of(values[row + GUARD :]) / spread_of(values[: row - GUARD]) / factor)) < LASTS
+    if abs(ratio) < NOISE_CHANGES * u_noise or not lasts:
+        return None
+    return Change(row, factor, size)
+
+
+def beside(values: Array, row: int) -> tuple[Array, Array]:
+    """Return the readings before and after a row of (n,), without those next to it."""
+    return values[max(row - GUARD - MOST_BESIDE, 0) : max(row - GUARD, 0)], values[row + GUARD :][:MOST_BESIDE]
+
+
+def edges_of(values: Array, row: int) -> tuple[float, float, float, float] | None:
+    """Return the level of (n,) readings just before a row, its uncertainty, and those just after; None near the ends.
+
+    An even drift on either side is followed to the row.
+    """
+    before, after = beside(values, row)
+    if min(len(before), len(after)) < LEAST_BESIDE:
+        return None
+    return *_at_edge(before, last=True), *_at_edge(after, last=False)
+
+
+def _is_at_once(values: Array, row: int, change: float) -> bool:
+    """Whether the readings next to a row, of (n,), change by as much as the levels do: no drift through 0."""
+    before, after = values[max(row - 1 - AT_ONCE, 0) : row - 1], values[row + 1 : row + 1 + AT_ONCE]
+    return bool(abs(float(after.mean() - before.mean()) / change - 1) < AT_ONCE_SHARE)
+
+
+def _at_edge(values: Array, *, last: bool) -> tuple[float, float]:
+    """Return the level of (n,) readings that drift evenly at their last or first row, and its uncertainty."""
+    n = len(values)
+    x = np.linspace(-0.5, 0.5, n)
+    middle, slope = float(values.mean()), float(values @ x) / float(x @ x)
+    residual = values - middle - slope * x
+    u = float(np.sqrt(np.sum(residual**2) / max(n - 2, 1)))
+    return middle + slope * (0.5 if last else -0.5), 2.0 * u / np.sqrt(n)
+
+
+def _marked(series: Series, name: str, row: int, change: Change) -> Marked:
+    rows = np.zeros(len(series), dtype=bool)
+    rows[row:] = True
+    size = abs(change.factor)
+    where = f"{name}, from row {row + 1} on"
+    n = int(rows.sum())
+    if change.factor < 0:
+        return Marked(
+            Finding(
+                "sign", "certain", where,
+                f"the output changes its sign at row {row + 1}: its level is {change.factor:g} times that before, with "
+                "the same noise",
+                change.factor, "1", "one sign in a recording", f"change the sign of {name} from row {row + 1} on, or "
+                "divide the recording there",
+                channel=name, n=n,
+            ),
+            rows,
+        )  # fmt: skip
+    if size in (DEG_PER_RAD, 1 / DEG_PER_RAD):
+        unit, other = ("deg/s", "rad/s") if size > 1 else ("rad/s", "deg/s")
+        return Marked(
+            Finding(
+                "mixed_units", "certain", where,
+                f"level and noise of {name} are {size:.3g} times those of the rows before, 180/pi or its inverse: "
+                f"from row {row + 1} on the output is in {unit}, before in {other}",
+                size, "1", "one unit in a file",
+                "convert the rows of one part in the file (180/pi = 57.2958), or import the two parts as recordings "
+                "of their own",
+                channel=name, n=n,
+            ),
+            rows,
+        )  # fmt: skip
+    return Marked(
+        Finding(
+            "gain_changes", "certain", where,
+            f"level and noise of {name} are {size:.3g} times those of the rows before: the range was switched, and the "
+            "scale of the output was not",
+            size, "1", "one scale in a recording",
+            f"multiply {name} by {1 / size:g} from row {row + 1} on, or divide the recording there",
+            channel=name, n=n,
+        ),
+        rows,
+    )  # fmt: skip
