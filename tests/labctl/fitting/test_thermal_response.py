@@ -78,8 +78,7 @@ def test_axes_of_different_structures_have_one_each() -> None:
 
 
 def test_structures_by_axis_are_said_axis_by_axis() -> None:
-    laws = {"x": partial(follow, tau_s=300.0), "y": mixture, "z": partial(follow, tau_s=700.0)}
-    data = fit_data_of(flowing(laws))
+    data = fit_data_of(flowing({"x": partial(follow, tau_s=300.0), "y": mixture, "z": partial(follow, tau_s=700.0)}))
     model = ErrorModel("", (Term("bias"), Term("bias_temperature", 2)))
     response = thermal_response(data, model, Term("thermal_lag"))
     assert response is not None
