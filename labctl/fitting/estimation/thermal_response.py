@@ -78,10 +78,7 @@ def thermal_response(data: FitData, model: ErrorModel, term: Term) -> ThermalRes
     if len(axes) > 1:
         own = [_of_axis(axis, errors, stretches, every) for axis in axes]
         held_out[BY_AXIS] = pooled([each for part in own for each in part.errors])
-        fewer = sum(part.structure.coefficients(1) for part in own) < chosen.coefficients(len(axes))
-        mixed, common = held_out[BY_AXIS], held_out[chosen.id]
-        is_better = not common.is_below(mixed) if fewer else mixed.is_below(common)
-        if is_better and len({part.structure.id for part in own}) > 1:
+        if len({part.structure.id for part in own}) > 1 and held_out[BY_AXIS].is_below(held_out[chosen.id]):
             structures = {part.name: part.structure for part in own}
             found = {part.name: part.taus_s for part in own}
             chosen = _by_axis(structures)

@@ -78,13 +78,13 @@ def test_axes_of_different_structures_have_one_each() -> None:
 
 
 def test_structures_by_axis_are_said_axis_by_axis() -> None:
-    data = fit_data_of(flowing({"x": partial(follow, tau_s=300.0), "y": mixture}))
+    data = fit_data_of(flowing({"x": partial(follow, tau_s=300.0), "y": mixture, "z": partial(follow, tau_s=700.0)}))
     model = ErrorModel("", (Term("bias"), Term("bias_temperature", 2)))
     response = thermal_response(data, model, Term("thermal_lag"))
     assert response is not None
     assert response.structure.id == "by_axis"
-    assert response.structure.sentence == "on x one time constant; on y two time constants"
-    assert not response.held_out["two_flows"].is_below(response.held_out["by_axis"])
+    assert response.structure.sentence == "on x one time constant; on y two time constants; on z one time constant"
+    assert response.held_out["by_axis"].is_below(response.held_out["two_flows"])
 
 
 def test_a_curved_law_may_be_that_of_one_axis() -> None:
