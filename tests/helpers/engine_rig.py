@@ -7,6 +7,7 @@ from types import SimpleNamespace
 from typing import Any
 
 from instruments.clock import VirtualClock
+from instruments.positions import Position
 from procedures.contracts.control import Control
 from procedures.contracts.operator import UnitHandlerOperator
 from procedures.execution.engine import Engine
@@ -28,6 +29,7 @@ class Rig:
         self.clock = VirtualClock()
         self.clock.sleep(1000.25)  # campaign time is not clock time
         self.trace: list[str] = []
+        self.sign = 1.0  #: of the units' mounting
         self.table = FakeTable(self.clock, self.trace, "table")
         self.chamber = FakeChamber(self.clock, self.trace, "chamber")
         self.gyros = {name: FakeGyro(self.clock, self.trace, name) for name in gyros}
@@ -36,6 +38,7 @@ class Rig:
         self.imu = self.gyros[gyros[0]]
         self.references: dict[str, Any] = {}
         self.journal = RecordingJournal(self.trace)
+        self.journal.hooks.append(self._mounted)
         self.control = Control()
         self.unit_handler = SimpleNamespace(
             mount=lambda position: self.trace.append(f"hand.mount {position}"),
@@ -43,6 +46,11 @@ class Rig:
         )
         self.operator: Any = UnitHandlerOperator(self.unit_handler)
         self.engine: Any = None
+
+    def _mounted(self, what: str, header: Any) -> None:
+        """Have the units in the position of a data set, whoever was asked to turn them."""
+        if what == "dataset_opened":
+            self.sign = Position.of(header.step.position).sign
 
     def recipe(self, **changes: Any) -> Recipe:
         """A small recipe with every kind of step: two mountings, two powered sessions."""

@@ -176,7 +176,7 @@ class FakeGyro(Fake):
         first = self.next_sample
         self.next_sample += n
         raw = {
-            "gyro_z": np.full(n, round(self.bench.table.rate_dps / 0.001)),
+            "gyro_z": np.full(n, round(self.bench.sign * self.bench.table.rate_dps / 0.001)),
             "temperature_c": np.full(n, round((self.temperature_c() - 1.0) / 0.01)),
         }
         t_s = np.arange(first, first + n) / self.sample_rate_hz
