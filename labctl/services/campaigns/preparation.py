@@ -8,12 +8,13 @@ from datetime import datetime
 
 from instruments.bench import Bench, open_bench
 from instruments.bench_config import BenchFile, SimulationSettings
-from instruments.clock import VIRTUAL_START, Clock, PacedClock, ScaledClock, SystemClock
+from instruments.clock import VIRTUAL_START, Clock, PacedClock
 from instruments.configuration import configuration_of
 from instruments.drivers.unit_handlers import ManualUnitHandler
 from instruments.errors import InstrumentError
 from instruments.interfaces.gyro import Gyro, GyroIdentity
 from instruments.interfaces.table import RateTable
+from instruments.shared_clock import clock_outside
 from instruments.standards import Standard
 from labctl.acting_user import actor
 from labctl.errors import BadInput, Conflict
@@ -131,8 +132,7 @@ def clock_for(bench: BenchFile, speed: float | None, start: datetime | None = No
             )
         if speed is not None:
             raise BadInput(f"--speed {speed:g}: bench {bench.name} runs in real time; leave the option out")
-        simulation = bench.simulation
-        return ScaledClock(simulation.speed) if simulation is not None and simulation.control else SystemClock()
+        return clock_outside(bench)
     return PacedClock(start=start or VIRTUAL_START) if speed is None else PacedClock(speed, start=start)
 
 
