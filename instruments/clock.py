@@ -19,7 +19,7 @@ from contextlib import AbstractContextManager, nullcontext
 from datetime import UTC, datetime, timedelta
 from typing import Protocol, runtime_checkable
 
-#: A thread that attends to a clock reads it this often, s of real time.
+#: A thread that attends to a clock reads it this often, s of real time, unless the clock says more often.
 LOOK_EVERY_S = 0.004
 
 
@@ -52,6 +52,16 @@ class AttendedClock(Protocol):
         """Whether it does."""
         ...
 
+    @property
+    def look_every_s(self) -> float:
+        """How often a thread that attends reads the clock, s of real time."""
+        ...
+
+    @property
+    def latency_s(self) -> float:
+        """Clock time that bytes may take from one process to the other while no thread counts as late."""
+        ...
+
     def attending(self) -> AbstractContextManager[Callable[[], None]]:
         """Have the clock wait for this thread: it calls what is given at least every `LOOK_EVERY_S`."""
         ...
@@ -60,6 +70,25 @@ class AttendedClock(Protocol):
 def stands_in_stalls(clock: Clock) -> bool:
     """Return whether a clock of real or scaled time stands still while this computer does not run the bench."""
     return isinstance(clock, AttendedClock) and clock.stands_in_stalls
+
+
+def latency_s(clock: Clock) -> float:
+    """Return how long bytes may be on their way because threads of a shared clock take turns, s of the clock."""
+    return clock.latency_s if isinstance(clock, AttendedClock) else 0.0
+
+
+def look_every_s(clock: Clock) -> float:
+    """Return how often a thread that attends to a clock reads it, s of real time."""
+    return clock.look_every_s if isinstance(clock, AttendedClock) else LOOK_EVERY_S
+
+
+def wait_s(clock: Clock, timeout_s: float) -> float:
+    """Return for how long a library may wait without reading the clock, s of real time.
+
+    Where the clock waits for this thread that is less than the time-out of `timeout_s` clock seconds: ask again until
+    `Deadline.is_over`.
+    """
+    return look_every_s(clock) if stands_in_stalls(clock) else clock.wall_s(timeout_s)
 
 
 def sleep_until(clock: Clock, t_s: float) -> None:
@@ -100,6 +129,10 @@ class ScaledClock:
 
     #: Whether the clock stands still while this computer does not run a thread that attends to it.
     stands_in_stalls = False
+    #: Clock time that bytes may take from one process to the other while no thread counts as late.
+    latency_s = 0.0
+    #: How often a thread that attends reads the clock, s of real time.
+    look_every_s = LOOK_EVERY_S
     #: Least useful time-out of a client library, s of real time, at every speed.
     MIN_WALL_TIMEOUT_S = 0.05
 

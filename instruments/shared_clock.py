@@ -25,8 +25,11 @@ from instruments.clock import Clock, RealWall, ScaledClock, SystemClock, Wall
 
 log = logging.getLogger(__name__)
 
-#: The clock stands still while a thread that attends is later than this, s of real time.
-LATE_S = 0.012
+#: The clock stands still while a thread that attends is later than this: s of the clock, and at most s of real time.
+#: The first is the latency of all links, and so below what makes a stream count as late.
+LATE_CLOCK_S, LATE_S = 0.06, 0.012
+#: A thread that attends reads the clock this often in that time.
+LOOKS = 3
 #: The process of a thread that is later than `DOUBTED_S` may have ended; from `GIVEN_UP_S` on none is waited for.
 DOUBTED_S, GIVEN_UP_S = 0.25, 5.0
 #: Longest wait of a sleep until it reads the clock again, s of real time.
@@ -83,6 +86,11 @@ class ClockFile:
         """Clock seconds in one of real time while nothing is late."""
         return self._times[SPEED]
 
+    @property
+    def late_s(self) -> float:
+        """How late a thread that attends may be without the clock standing still, s of real time."""
+        return min(LATE_S, LATE_CLOCK_S / self.speed)
+
     def count(self) -> tuple[float, float] | None:
         """Return until when time was counted, and how much, s of real time.
 
@@ -129,18 +137,18 @@ class ClockFile:
 
     def horizon_s(self, now_s: float) -> float:
         """Return until when time may be counted, at most `now_s`: no thread that attends is late by then."""
-        horizon_s = now_s
+        horizon_s, allowed_s = now_s, self.late_s
         for place in range(FIRST_PLACE, self._numbers[END], 2):
             if not (process := self._numbers[place]):
                 continue
             looked_s = self._times[place + 1]
             late_s = now_s - looked_s
-            if looked_s + LATE_S >= horizon_s or late_s > GIVEN_UP_S:
+            if looked_s + allowed_s >= horizon_s or late_s > GIVEN_UP_S:
                 continue
             if late_s > DOUBTED_S and not _lives(process):
                 self.leave_place(place)
                 continue
-            horizon_s = looked_s + LATE_S
+            horizon_s = looked_s + allowed_s
         return horizon_s
 
     def close(self) -> None:
@@ -174,10 +182,13 @@ class SharedClock(ScaledClock):
 
     def __init__(self, file: ClockFile, *, owns: bool = False, wall: Wall | None = None) -> None:
         super().__init__(file.speed)
+        self.look_every_s = file.late_s / LOOKS
+        self.latency_s = 2 * (self.look_every_s + file.late_s) * file.speed
         self._file, self._owns, self._wall = file, owns, wall or RealWall()
         self._lock = threading.RLock()  # a signal handler may read the clock while its thread does
         self._never = threading.Condition()
-        self._counted_s = 0.0  # s of real time; never less than was told before
+        self._here = threading.local()  # its `place`: that of the present thread, where it attends
+        self._counted_s = 0.0  # s of real time; never less than was returned before
         self._zero_s = self._counted()
 
     @property
@@ -186,28 +197,41 @@ class SharedClock(ScaledClock):
         return self._file.path
 
     def now_s(self) -> float:
-        return (self._counted() - self._zero_s) * self.speed
+        now_s = (self._counted() - self._zero_s) * self.speed
+        if (place := self._place) is not None:
+            self._file.look(place, self._wall.now_s())
+        return now_s
 
     def sleep(self, duration_s: float) -> None:
         until_s = self.now_s() + duration_s
+        step_s = STEP_S if self._place is None else self.look_every_s
         while (left_s := until_s - self.now_s()) > TINY_S:
             with self._never:
-                self._wall.wait(self._never, min(left_s / self.speed, STEP_S))
+                self._wall.wait(self._never, min(left_s / self.speed, step_s))
 
     @contextmanager
     def attending(self) -> Iterator[Callable[[], None]]:
-        """Have the clock wait for this thread, which calls what it is given at least every `LOOK_EVERY_S`."""
-        place = self._file.take_place(self._wall.now_s())
+        """Have the clock wait for this thread, which reads it, sleeps on it or calls what it is given all the time.
 
-        def look() -> None:
-            if self._owns:
-                self._counted()  # first: the time in which this thread was late is not counted
-            self._file.look(place, self._wall.now_s())
-
+        Whatever else it does, it takes at most `late_s` of real time from the clock.
+        """
+        if self._place is not None:
+            yield self._look
+            return
+        self._here.place = self._file.take_place(self._wall.now_s())
         try:
-            yield look
+            yield self._look
         finally:
-            self._file.leave_place(place)
+            self._file.leave_place(self._here.place)
+            self._here.place = None
+
+    @property
+    def _place(self) -> int | None:
+        """The place of this thread, where it attends."""
+        return getattr(self._here, "place", None)
+
+    def _look(self) -> None:
+        self.now_s()
 
     def _counted(self) -> float:
         """Return how much time was counted, s of real time; the owner writes it down."""

@@ -12,7 +12,7 @@ from typing import Protocol
 from pymodbus.client import ModbusSerialClient, ModbusTcpClient
 
 from instruments.bench_config import is_simulated_address
-from instruments.clock import Clock
+from instruments.clock import Clock, wait_s
 from instruments.errors import LinkError
 from instruments.transport.adapters import require_adapter
 from instruments.transport.opened_port import open_port
@@ -59,11 +59,11 @@ class HardwareLinks:
 
     def serial_port(self, url: str, *, baudrate: int, timeout_s: float, line: Line = EIGHT_N_1) -> SerialPort:
         """Return an open port, locked for this process; raises what pyserial raises."""
-        return open_port(url, baudrate=baudrate, timeout_s=self._clock.wall_s(timeout_s), line=line)
+        return open_port(url, baudrate=baudrate, timeout_s=wait_s(self._clock, timeout_s), line=line)
 
     def port_timeout_s(self, timeout_s: float) -> float:
         """Return the seconds of real time of a time-out in seconds of the bench clock."""
-        return self._clock.wall_s(timeout_s)
+        return wait_s(self._clock, timeout_s)
 
     def tcp_client(self, host: str, tcp_port: int, *, timeout_s: float) -> ModbusTcpClient:
         """Return a client of a real host, not connected yet."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pymodbus.client import ModbusTcpClient
 
-from instruments.clock import Clock, Deadline
+from instruments.clock import Clock, Deadline, wait_s
 
 
 class TcpClient(ModbusTcpClient):
@@ -12,7 +12,7 @@ class TcpClient(ModbusTcpClient):
 
     def __init__(self, host: str, tcp_port: int, clock: Clock, timeout_s: float) -> None:
         """Make a client that is not connected yet; `timeout_s` is in s of the clock."""
-        super().__init__(host, port=tcp_port, timeout=clock.wall_s(timeout_s), retries=0)
+        super().__init__(host, port=tcp_port, timeout=wait_s(clock, timeout_s), retries=0)
         self._clock, self._timeout_s = clock, timeout_s
 
     def recv(self, size: int | None) -> bytes:

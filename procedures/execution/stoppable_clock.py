@@ -40,6 +40,16 @@ class StoppableClock:
         """Whether the clock stands still while a thread that attends is late."""
         return self._clock.stands_in_stalls
 
+    @property
+    def look_every_s(self) -> float:
+        """How often a thread that attends reads the clock, s of real time."""
+        return self._clock.look_every_s
+
+    @property
+    def latency_s(self) -> float:
+        """Clock time that bytes may take from one process to the other."""
+        return self._clock.latency_s
+
     def attending(self) -> AbstractContextManager[Callable[[], None]]:
         """Have the clock wait for this thread, as the clock itself does."""
         return self._clock.attending()

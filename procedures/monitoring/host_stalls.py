@@ -10,7 +10,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from instruments.clock import LOOK_EVERY_S, Clock, SystemClock, attending, stands_in_stalls
+from instruments.clock import Clock, SystemClock, attending, stands_in_stalls
 from procedures.contracts.journal import Event
 
 PERIOD_S = 0.1
@@ -41,15 +41,17 @@ class HostStalls:
 
     @contextmanager
     def watching(self) -> Iterator[None]:
-        """Read the time while the block runs, in a thread of its own, or have the clock stand still in stalls."""
-        waits = stands_in_stalls(self._clock)
-        if not self.speed and not waits:
-            yield
+        """Read the time while the block runs, in a thread of its own.
+
+        A clock that stands still in stalls waits for this thread instead.
+        """
+        if not self.speed:
+            with attending(self._clock):
+                yield
             return
         ended = threading.Event()
-        self._looked_s = self._wall.now_s() if self.speed else None
-        run = self._attend if waits else self._run
-        thread = threading.Thread(target=run, args=(ended,), name="host stalls", daemon=True)
+        self._looked_s = self._wall.now_s()
+        thread = threading.Thread(target=self._run, args=(ended,), name="host stalls", daemon=True)
         thread.start()
         try:
             yield
@@ -88,11 +90,6 @@ class HostStalls:
     def _run(self, ended: threading.Event) -> None:
         while not ended.wait(PERIOD_S):
             self.total_s()
-
-    def _attend(self, ended: threading.Event) -> None:
-        with attending(self._clock) as look:
-            while not ended.wait(LOOK_EVERY_S):
-                look()
 
     def _look(self) -> None:
         """Take in the time since it was read last; holds the lock."""

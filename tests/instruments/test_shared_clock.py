@@ -7,16 +7,18 @@ import subprocess
 import sys
 import threading
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
 
 from instruments.bench_config import BenchFile, SimulationSettings, read_bench
-from instruments.clock import LOOK_EVERY_S, ScaledClock, SystemClock, VirtualClock, attending
+from instruments.clock import ScaledClock, SystemClock, VirtualClock, attending
 from instruments.shared_clock import (
     DOUBTED_S,
     GIVEN_UP_S,
-    LATE_S,
+    LATE_CLOCK_S,
+    LOOKS,
     SIZE,
     THREADS,
     ClockFile,
@@ -32,11 +34,13 @@ from tests.helpers.virtual_wall import VirtualWall
 
 SPEED = 30.0
 #: What is counted of a stall: until a thread is late, and between two looks before and after.
+LATE_S = LATE_CLOCK_S / SPEED
+LOOK_EVERY_S = LATE_S / LOOKS
 COUNTED_S = LATE_S + 2 * LOOK_EVERY_S
 
 
 class Rig:
-    """A simulator and a process that drives it, one thread of each, on a wall that passes at once."""
+    """A simulator and a process that drives it, one thread of each, in real time that passes at once."""
 
     def __init__(self) -> None:
         self.wall, self._stack = VirtualWall(), contextlib.ExitStack()
@@ -44,10 +48,18 @@ class Rig:
         self._stack.callback(self.file.path.unlink)
         self.simulator = SharedClock(self.file, owns=True, wall=self.wall)
         self.driver = SharedClock(ClockFile(self.file.path), wall=self.wall)
+        # both from one thread, in which a test also reads the clocks: their places are those of other threads
         self.looks = {"simulator": self.attend(self.simulator), "driver": self.attend(self.driver)}
 
     def attend(self, clock: SharedClock) -> Callable[[], None]:
-        return self._stack.enter_context(clock.attending())
+        place = self.file.take_place(self.wall.now_s())
+        self._stack.callback(self.file.leave_place, place)
+
+        def look() -> None:
+            clock.now_s()
+            self.file.look(place, self.wall.now_s())
+
+        return look
 
     def run(self, duration_s: float, *, without: str = "") -> None:
         """Let real time pass while every thread looks as it should, except those of one process."""
@@ -121,7 +133,7 @@ def test_a_sleep_lasts_through_a_stall(rig: Rig) -> None:
     rig.wall.meanwhile[name] = halted
     rig.driver.sleep(SPEED * 0.3)
     # each wait of a sleep is longer than a thread may be late, and only the rest of it counts
-    assert rig.wall.now_s() - begun_s > 2.0 + 0.3
+    assert rig.wall.now_s() - begun_s > 2.0 + 0.3 - LATE_S
     assert rig.driver.now_s() == pytest.approx(SPEED * 0.3)
 
 
@@ -147,9 +159,9 @@ def test_places_are_given_back(rig: Rig) -> None:
         with rig.driver.attending():
             pass
     for _ in range(THREADS - rig.file.attending):
-        rig.attend(rig.driver)
+        rig.file.take_place(rig.wall.now_s())
     with pytest.raises(OSError, match=f"more than {THREADS} threads"):
-        rig.attend(rig.driver)
+        rig.file.take_place(rig.wall.now_s())
 
 
 def test_a_bench_file_leads_to_the_clock_of_the_simulator() -> None:
@@ -198,14 +210,16 @@ def test_a_campaign_attends_and_has_no_stalls(rig: Rig) -> None:
     clock = stoppable(rig.driver, Control())
     stalls = HostStalls(clock, wall := VirtualClock())
     before = rig.file.attending
-    with stalls.watching():
-        while rig.file.attending == before:
-            pass
-        wall.sleep(100.0)
-        assert stalls.total_clock_s() == 0.0
-        assert stalls.news() is None
-    with attending(clock) as look:
-        look()
-        assert rig.file.attending >= before + 1
+
+    def watch() -> int:
+        with stalls.watching():
+            wall.sleep(100.0)
+            assert stalls.total_clock_s() == 0.0
+            assert stalls.news() is None
+            return rig.file.attending
+
+    with ThreadPoolExecutor(1) as pool:  # the threads of the rig attend already
+        assert pool.submit(watch).result() == before + 1
+    assert rig.file.attending == before
     with attending(VirtualClock()) as look:
         look()

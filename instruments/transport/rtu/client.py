@@ -8,7 +8,7 @@ import serial
 from pymodbus import FramerType
 from pymodbus.client import ModbusSerialClient
 
-from instruments.clock import Clock, Deadline
+from instruments.clock import Clock, Deadline, wait_s
 from instruments.transport.opened_port import open_port
 from instruments.transport.serial import BROKEN, Line, SerialPort
 
@@ -21,7 +21,7 @@ class RtuClient(ModbusSerialClient):
 
     def __init__(self, url: str, clock: Clock, *, baudrate: int, timeout_s: float, line: Line) -> None:
         """Make a client that is not connected yet; `timeout_s` is in s of the clock."""
-        super().__init__(url, framer=FramerType.RTU, baudrate=baudrate, timeout=clock.wall_s(timeout_s), retries=0)
+        super().__init__(url, framer=FramerType.RTU, baudrate=baudrate, timeout=wait_s(clock, timeout_s), retries=0)
         self._url, self._clock, self._baudrate, self._timeout_s, self._line = url, clock, baudrate, timeout_s, line
         self.failure: Exception | None = None  #: why the port could not be opened
 
@@ -33,7 +33,7 @@ class RtuClient(ModbusSerialClient):
                 port = open_port(
                     self._url,
                     baudrate=self._baudrate,
-                    timeout_s=self._clock.wall_s(self._timeout_s),
+                    timeout_s=wait_s(self._clock, self._timeout_s),
                     line=self._line,
                     inter_byte_timeout_s=self.inter_byte_timeout or None,
                 )

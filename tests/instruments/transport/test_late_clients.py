@@ -25,6 +25,7 @@ class Slow(VirtualClock):
         super().__init__()
         self.step_s = step_s
         self.stands_in_stalls = True
+        self.latency_s, self.look_every_s = 0.0, 0.01
 
     def attending(self) -> Any:
         raise NotImplementedError
@@ -38,7 +39,7 @@ class Slow(VirtualClock):
 
 
 class Port:
-    """A port on which a reply is there after it was looked at so often."""
+    """A port on which a reply is there from the given number of inspections on."""
 
     def __init__(self, looks: int) -> None:
         self.looks = looks
