@@ -155,7 +155,8 @@ class SimulationSettings(Strict):
     control: str | None = None  #: HOST:PORT of a simulator in another process, for its unit handler
     speed: float = Field(
         default=1.0, gt=0
-    )  #: clock seconds per second of real time of that process; `labctl simulator` writes both
+    )  #: clock seconds per second of real time of that process; `labctl simulator` writes these three
+    clock: str | None = None  #: file by which that process shares its clock; absent at speed 1
 
 
 class DriverRelease(Strict):

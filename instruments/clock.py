@@ -3,7 +3,8 @@
 Durations are seconds of the clock's own monotonic time, which starts at 0; records carry aware UTC. In virtual time a
 sleep advances the clock at once, so a 45-hour campaign takes the time of its arithmetic; in paced time (simulators in
 this process) a sleep advances it too, but at most `speed` times as fast as real time; in scaled time (simulators in
-another process) one second of real time is `speed` clock seconds, whatever the computer manages to do in it.
+another process) one second of real time is `speed` clock seconds, but none that this computer did not run a thread on
+which the bench depends (`instruments/shared_clock.py`).
 """
 
 from __future__ import annotations
@@ -14,8 +15,12 @@ import time
 from bisect import insort
 from collections import deque
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from datetime import UTC, datetime, timedelta
-from typing import Protocol
+from typing import Protocol, runtime_checkable
+
+#: A thread that attends to a clock reads it this often, s of real time, unless the clock says more often.
+LOOK_EVERY_S = 0.004
 
 
 class Clock(Protocol):
@@ -38,9 +43,70 @@ class Clock(Protocol):
         ...
 
 
+@runtime_checkable
+class AttendedClock(Protocol):
+    """A clock that may stand still while threads on which the bench depends are late."""
+
+    @property
+    def stands_in_stalls(self) -> bool:
+        """Whether it does."""
+        ...
+
+    @property
+    def look_every_s(self) -> float:
+        """How often a thread that attends reads the clock, s of real time."""
+        ...
+
+    @property
+    def latency_s(self) -> float:
+        """Clock time that bytes may take from one process to the other while no thread counts as late."""
+        ...
+
+    def attending(self) -> AbstractContextManager[Callable[[], None]]:
+        """Have the clock wait for this thread: it calls what is given at least every `LOOK_EVERY_S`."""
+        ...
+
+
+def stands_in_stalls(clock: Clock) -> bool:
+    """Return whether a clock of real or scaled time stands still while this computer does not run the bench."""
+    return isinstance(clock, AttendedClock) and clock.stands_in_stalls
+
+
+def latency_s(clock: Clock) -> float:
+    """Return how long bytes may be on their way because threads of a shared clock take turns, s of the clock."""
+    return clock.latency_s if isinstance(clock, AttendedClock) else 0.0
+
+
+def look_every_s(clock: Clock) -> float:
+    """Return how often a thread that attends to a clock reads it, s of real time."""
+    return clock.look_every_s if isinstance(clock, AttendedClock) else LOOK_EVERY_S
+
+
+def wait_s(clock: Clock, timeout_s: float) -> float:
+    """Return for how long a library may wait without reading the clock, s of real time.
+
+    Where the clock waits for this thread that is less than the time-out of `timeout_s` clock seconds: ask again until
+    `Deadline.is_over`.
+    """
+    return look_every_s(clock) if stands_in_stalls(clock) else clock.wall_s(timeout_s)
+
+
 def sleep_until(clock: Clock, t_s: float) -> None:
     """Wait until the clock reads `t_s`; returns at once when it is already later."""
     clock.sleep(t_s - clock.now_s())
+
+
+class Deadline:
+    """The end of a time-out of `timeout_s` clock seconds, which begins now and which a library counts in real time."""
+
+    def __init__(self, clock: Clock, timeout_s: float) -> None:
+        self._clock = clock
+        self._end_s = clock.now_s() + timeout_s
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the time-out, over in real time, is over by the clock too, which may have stood still meanwhile."""
+        return not stands_in_stalls(self._clock) or self._clock.now_s() >= self._end_s
 
 
 #: When virtual time begins where no other instant is stated.
@@ -61,6 +127,12 @@ class ScaledClock:
     is not positive, and for a start without a time zone.
     """
 
+    #: Whether the clock stands still while this computer does not run a thread that attends to it.
+    stands_in_stalls = False
+    #: Clock time that bytes may take from one process to the other while no thread counts as late.
+    latency_s = 0.0
+    #: How often a thread that attends reads the clock, s of real time.
+    look_every_s = LOOK_EVERY_S
     #: Least useful time-out of a client library, s of real time, at every speed.
     MIN_WALL_TIMEOUT_S = 0.05
 
@@ -83,6 +155,15 @@ class ScaledClock:
 
     def wall_s(self, duration_s: float) -> float:
         return max(duration_s / self.speed, self.MIN_WALL_TIMEOUT_S)
+
+    def attending(self) -> AbstractContextManager[Callable[[], None]]:
+        """Have the clock wait for this thread, if it is one that waits: call what is given every `LOOK_EVERY_S`."""
+        return nullcontext(_nothing)
+
+
+def attending(clock: Clock) -> AbstractContextManager[Callable[[], None]]:
+    """Have a clock wait for this thread as `ScaledClock.attending` does; virtual time waits for every thread."""
+    return clock.attending() if isinstance(clock, AttendedClock) else nullcontext(_nothing)
 
 
 class SystemClock(ScaledClock):

@@ -29,6 +29,7 @@ STUDIES = (
     "crash_recovery",
     "process_kill",
     "process_pairs",
+    "busy_campaigns",
     "stops",
     "stop_sequences",
     "page_stops",

@@ -20,6 +20,7 @@ from instruments.clock import Clock, ScaledClock
 from instruments.errors import LinkError
 from instruments.protocols.nidaqmx.service import INSTALL_GRPC
 from instruments.protocols.simulator_control import BUSY, IS_TURNING, MOUNT, OK, POWER, TURN, turn_of
+from instruments.shared_clock import SharedClock
 from instruments.simulators.links.device import SimulatedDevice
 from instruments.simulators.links.real_ports import LOCALHOST, RealPorts
 from instruments.simulators.links.rpc_server import RpcServer
@@ -33,7 +34,7 @@ class SimulationServer:
         self._bench, self._clock, self._log = bench, clock, log
         self._simulated = SimulatedBench(bench, clock)
         self._lock = threading.Lock()
-        self._ports = RealPorts()
+        self._ports = RealPorts(clock)
         self._rpc_servers: list[RpcServer] = []
         self.addresses: dict[str, str] = {}  #: device name, or "control" -> real address
 
@@ -48,6 +49,8 @@ class SimulationServer:
         simulation = record.get("simulation", {})
         speed = self._clock.speed if isinstance(self._clock, ScaledClock) else 1.0
         record["simulation"] = {**simulation, "control": self.addresses["control"], "speed": speed}
+        if isinstance(self._clock, SharedClock):
+            record["simulation"]["clock"] = str(self._clock.path)
         return BenchFile.model_validate(record)
 
     def wait(self) -> None:

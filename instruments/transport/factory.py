@@ -12,7 +12,7 @@ from typing import Protocol
 from pymodbus.client import ModbusSerialClient, ModbusTcpClient
 
 from instruments.bench_config import is_simulated_address
-from instruments.clock import Clock
+from instruments.clock import Clock, wait_s
 from instruments.errors import LinkError
 from instruments.transport.adapters import require_adapter
 from instruments.transport.opened_port import open_port
@@ -21,6 +21,10 @@ from instruments.transport.rpc.channel import RpcChannel, TimedChannel
 from instruments.transport.rtu.client import NOT_OPENED, RtuClient
 from instruments.transport.serial import EIGHT_N_1, Line, SerialPort
 from instruments.transport.stream_reader import PolledReader, StreamReader, ThreadedReader
+from instruments.transport.tcp_client import TcpClient
+
+#: A call of gRPC may take this long, s of real time: a busy computer is no silent instrument.
+LEAST_CALL_S = 1.0
 
 
 class LinkFactory(Protocol):
@@ -55,23 +59,23 @@ class HardwareLinks:
 
     def serial_port(self, url: str, *, baudrate: int, timeout_s: float, line: Line = EIGHT_N_1) -> SerialPort:
         """Return an open port, locked for this process; raises what pyserial raises."""
-        return open_port(url, baudrate=baudrate, timeout_s=self._clock.wall_s(timeout_s), line=line)
+        return open_port(url, baudrate=baudrate, timeout_s=wait_s(self._clock, timeout_s), line=line)
 
     def port_timeout_s(self, timeout_s: float) -> float:
         """Return the seconds of real time of a time-out in seconds of the bench clock."""
-        return self._clock.wall_s(timeout_s)
+        return wait_s(self._clock, timeout_s)
 
     def tcp_client(self, host: str, tcp_port: int, *, timeout_s: float) -> ModbusTcpClient:
         """Return a client of a real host, not connected yet."""
-        return ModbusTcpClient(host, port=tcp_port, timeout=self._clock.wall_s(timeout_s), retries=0)
+        return TcpClient(host, tcp_port, self._clock, timeout_s)
 
     def rtu_client(self, url: str, *, baudrate: int, timeout_s: float, line: Line = EIGHT_N_1) -> ModbusSerialClient:
         """Return a client on a real port, not connected yet."""
-        return RtuClient(url, baudrate=baudrate, timeout_s=self._clock.wall_s(timeout_s), line=line)
+        return RtuClient(url, self._clock, baudrate=baudrate, timeout_s=timeout_s, line=line)
 
     def rpc_channel(self, host: str, tcp_port: int, *, timeout_s: float) -> RpcChannel:
         """Return an open gRPC channel to a real host, without encryption; raises ImportError without grpcio."""
-        return TimedChannel(host, tcp_port, self._clock.wall_s(timeout_s))
+        return TimedChannel(host, tcp_port, max(self._clock.wall_s(timeout_s), LEAST_CALL_S))
 
 
 class Ports:

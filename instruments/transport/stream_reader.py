@@ -9,11 +9,9 @@ from __future__ import annotations
 import threading
 from typing import NamedTuple, Protocol
 
-from instruments.clock import Clock
+from instruments.clock import Clock, attending, look_every_s
 from instruments.transport.serial import BROKEN, SerialPort, StampingPort
 
-#: Polling interval of the thread, s of real time.
-LOOK_EVERY_S = 0.004
 #: A USB adapter holds bytes back for this long, s of real time (latency timer of the FTDI chips, as delivered).
 ADAPTER_HOLDS_S = 0.016
 #: Bytes that the thread keeps for a reader that does not come; the oldest go first.
@@ -115,12 +113,15 @@ class ThreadedReader:
         self._thread.join(JOIN_S)
 
     def _run(self) -> None:
-        while not self._closing.wait(LOOK_EVERY_S):
-            with self._lock:
-                if not self._closing.is_set():
-                    self._empty()
-                if self._broken is not None:
-                    return
+        every_s = look_every_s(self._clock)
+        with attending(self._clock) as look:
+            while not self._closing.wait(every_s):
+                with self._lock:
+                    if not self._closing.is_set():
+                        self._empty()
+                    if self._broken is not None:
+                        return
+                look()  # here: from one emptying to the next no more comes than a port holds
 
     def _empty(self) -> None:
         if self._broken is not None:

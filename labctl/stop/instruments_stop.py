@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from instruments.bench import open_bench
 from instruments.bench_config import BenchFile
-from instruments.clock import Clock, ScaledClock, SystemClock
+from instruments.shared_clock import clock_outside
 from procedures.execution.safe_state import TABLE, make_safe
 
 #: Before the second try of what could not be confirmed, s: a port that a process had open is free a moment later.
@@ -41,12 +41,6 @@ def stop_instruments(
         return InstrumentsLeft(stands=False, safe=False, text=f"the instruments cannot be reached: {error}")
 
 
-def clock_of(bench: BenchFile) -> Clock:
-    """Return the clock of instruments outside this process: that of `labctl simulator`, or the computer's."""
-    simulation = bench.simulation
-    return ScaledClock(simulation.speed) if simulation is not None and simulation.control else SystemClock()
-
-
 def _stopped(bench: BenchFile, say: Callable[[str], None], stands: Callable[[], None]) -> InstrumentsLeft:
     at_rest = False
 
@@ -58,7 +52,7 @@ def _stopped(bench: BenchFile, say: Callable[[str], None], stands: Callable[[], 
             at_rest = True
             stands()
 
-    clock = clock_of(bench)
+    clock = clock_outside(bench)
     with closing(open_bench(bench, clock)) as opened:
         complaints = make_safe(opened, clock, PAUSES_S, note)
     if complaints:

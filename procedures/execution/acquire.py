@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from instruments.clock import latency_s
 from instruments.errors import LinkError
 from instruments.interfaces.gyro import Gyro, Readings
 from instruments.interfaces.table import Spin
@@ -165,10 +166,11 @@ def _gate(spin: Spin, step: Acquire) -> tuple[float, float]:
 
 def _wait_for_gate(context: ExecutionContext, watch: TableWatch, from_s: float) -> None:
     """Let the table settle, then drop what the streams have buffered meanwhile, unless the gate is open already."""
-    while watch.next_s < from_s - LEAD_S:
+    clear_s = from_s - LEAD_S - latency_s(context.clock)
+    while watch.next_s < clear_s:
         pass_time(context, watch.next_s - context.clock.now_s(), pausing=False)
         watch.ask()
-    pass_time(context, from_s - LEAD_S - context.clock.now_s(), pausing=False)
+    pass_time(context, clear_s - context.clock.now_s(), pausing=False)
     if context.clock.now_s() >= from_s:
         return
     for name, gyro in context.bench.gyros.items():
@@ -220,7 +222,10 @@ def _read_late(
     """Wait for readings of the gate that are still on their way, until `wait_s` after its end."""
     gyros, every_s = context.bench.gyros, late_readings.EVERY_S / len(context.bench.gyros)
     while context.clock.now_s() < gate[1] + wait_s and any(
-        late_readings.is_late(gyro) or _missing(gyro, gate, counts[name]) for name, gyro in gyros.items()
+        late_readings.is_late(gyro)
+        or late_readings.pending(gyro, gate, counts[name])
+        or _missing(gyro, gate, counts[name])
+        for name, gyro in gyros.items()
     ):
         _read_round(context, number, gate, counts, every_s)
         checkpoint(context)
@@ -236,7 +241,8 @@ def _count_missing(
 ) -> None:
     """Count what never came as lost, and say it; too much of it raises GuardTripped."""
     for name, gyro in context.bench.gyros.items():
-        if missing := _missing(gyro, gate, counts[name]):
+        at_edges = late_readings.dropped(gyro, gate, counts[name]) + late_readings.pending(gyro, gate, counts[name])
+        if missing := max(_missing(gyro, gate, counts[name]), at_edges):
             lost = late_readings.lost_readings(gyro, missing)
             counts[name].add(lost)
             context.recorder.journal.readings(number, name, lost, context.monitor.air_c)
@@ -254,6 +260,7 @@ def _read_round(
         readings = gyro.read(max(slice_s, 1.5 / gyro.sample_rate_hz))
         if len(readings):
             context.monitor.add_readings(name, gyro, readings)
+            counts[name].note(readings.t_s, gate[0])
         kept = cut(readings, gate, context.recorder.time)
         if len(kept) or kept.lost or kept.damaged:
             counts[name].add(kept)

@@ -6,6 +6,7 @@ bytes back: the unit is read for at most `WAIT_S` after the gate. What has not c
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,7 @@ import numpy as np
 from instruments.interfaces.gyro import Gyro, Readings
 from instruments.interfaces.self_checks import LateTelling, StreamingGyro
 from instruments.transport.stream_period import COVERAGE, TOLERANCE
+from procedures.monitoring.bench_snapshot import ReadingCounts
 
 #: Readings of a gate are waited for until this long after its end, s of the clock.
 WAIT_S = 2.0
@@ -22,6 +24,8 @@ STEADY_S = 0.4
 EVERY_S = 0.1
 #: The first and the last reading of a gate may fall outside it.
 EDGES = 2.0
+#: A unit whose newest reading is further before the end of the gate than this, in periods, has more to send.
+PENDING = 1.5
 
 
 @dataclass(frozen=True)
@@ -53,6 +57,27 @@ def promise_of(gyro: Gyro, gate_s: float) -> Promise:
     readings = gate_s * gyro.sample_rate_hz
     own_clock = period is not None or isinstance(gyro, LateTelling)
     return Promise(readings, TOLERANCE * readings if own_clock else 0.0)
+
+
+def _periods(gyro: Gyro, duration_s: float) -> float:
+    """Return how many periods of a unit's readings a duration has."""
+    period = gyro.period if isinstance(gyro, StreamingGyro) else None
+    measured_s = None if period is None else period.measured_s
+    return duration_s / measured_s if measured_s else duration_s * gyro.sample_rate_hz
+
+
+def pending(gyro: Gyro, gate: tuple[float, float], count: ReadingCounts) -> int:
+    """Return how many readings of the end of a gate, clock time, have not come yet; 0 where the last one has."""
+    periods = _periods(gyro, gate[1] - max(count.newest_s, gate[0]))
+    return round(periods - 0.5) if periods > PENDING else 0
+
+
+def dropped(gyro: Gyro, gate: tuple[float, float], count: ReadingCounts) -> int:
+    """Return how many readings of the beginning of a gate are missing: dropped by a reader that came late."""
+    if not math.isfinite(count.first_s):
+        return 0
+    periods = _periods(gyro, count.first_s - gate[0])
+    return round(periods - 0.5) if periods > EDGES else 0
 
 
 def is_late(gyro: Gyro) -> bool:

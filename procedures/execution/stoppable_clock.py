@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from datetime import datetime
 from functools import partial
 
@@ -20,10 +22,9 @@ class StoppableClock:
     there; not once the bench is being made safe, and in no other thread.
     """
 
-    def __init__(self, clock: Clock, control: Control, speed: float) -> None:
-        """Wrap `clock`, of which `speed` seconds pass in a second of real time."""
+    def __init__(self, clock: ScaledClock, control: Control) -> None:
         self._clock, self._control = clock, control
-        self._slice_s = LOOK_S * speed
+        self._slice_s = LOOK_S * clock.speed
 
     def now_s(self) -> float:
         return self._clock.now_s()
@@ -33,6 +34,25 @@ class StoppableClock:
 
     def wall_s(self, duration_s: float) -> float:
         return self._clock.wall_s(duration_s)
+
+    @property
+    def stands_in_stalls(self) -> bool:
+        """Whether the clock stands still while a thread that attends is late."""
+        return self._clock.stands_in_stalls
+
+    @property
+    def look_every_s(self) -> float:
+        """How often a thread that attends reads the clock, s of real time."""
+        return self._clock.look_every_s
+
+    @property
+    def latency_s(self) -> float:
+        """Clock time that bytes may take from one process to the other."""
+        return self._clock.latency_s
+
+    def attending(self) -> AbstractContextManager[Callable[[], None]]:
+        """Have the clock wait for this thread, as the clock itself does."""
+        return self._clock.attending()
 
     def sleep(self, duration_s: float) -> None:
         until_s = self._clock.now_s() + duration_s
@@ -56,4 +76,4 @@ def stoppable(clock: Clock, control: Control) -> Clock:
     if isinstance(clock, PacedClock):  # it waits in steps of its own, which leave its readings as they are
         clock.before_wait = partial(end_here, control)
         return clock
-    return StoppableClock(clock, control, clock.speed) if isinstance(clock, ScaledClock) else clock
+    return StoppableClock(clock, control) if isinstance(clock, ScaledClock) else clock

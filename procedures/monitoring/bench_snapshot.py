@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
 
 from instruments.interfaces.gyro import Gyro, Readings
 
@@ -16,6 +20,15 @@ class ReadingCounts:
     valid: int = 0
     invalid: int = 0  #: marked bad by the instrument itself
     damaged: int = 0  #: lost, or not of the protocol
+    first_s: float = math.inf  #: clock time of the first reading in the data set
+    newest_s: float = -math.inf  #: clock time of the newest reading, also after the data set
+
+    def note(self, t_s: NDArray[np.float64], from_s: float) -> None:
+        """Note the clock times (n,) of readings of which those from `from_s` on may be of the data set."""
+        if len(t_s):
+            self.newest_s = max(self.newest_s, float(t_s[-1]))
+            if (inside := t_s[t_s >= from_s]).size:
+                self.first_s = min(self.first_s, float(inside[0]))
 
     def add(self, readings: Readings) -> None:
         """Count one block."""

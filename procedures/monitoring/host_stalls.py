@@ -10,7 +10,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from instruments.clock import Clock, SystemClock
+from instruments.clock import Clock, SystemClock, attending, stands_in_stalls
 from procedures.contracts.journal import Event
 
 PERIOD_S = 0.1
@@ -23,14 +23,16 @@ LONG_S = 1e6
 
 
 class HostStalls:
-    """Stalls while one campaign runs. In virtual and paced time there are none: the clock stands still meanwhile.
+    """Stalls while one campaign runs. Where the clock stands still meanwhile there are none: in virtual and paced time,
+    and in the time that a simulator shares with this process.
 
     `wall` is the real time of this computer; any thread may ask.
     """
 
     def __init__(self, clock: Clock, wall: Clock | None = None) -> None:
         self._wall = wall or SystemClock()
-        real = clock.wall_s(2 * LONG_S) > clock.wall_s(LONG_S)
+        self._clock = clock
+        real = clock.wall_s(2 * LONG_S) > clock.wall_s(LONG_S) and not stands_in_stalls(clock)
         self.speed = LONG_S / clock.wall_s(LONG_S) if real else 0.0  #: clock seconds in one of real time; 0: no stalls
         self._lock = threading.Lock()
         self._looked_s: float | None = None
@@ -39,9 +41,13 @@ class HostStalls:
 
     @contextmanager
     def watching(self) -> Iterator[None]:
-        """Read the time while the block runs, in a thread of its own."""
+        """Read the time while the block runs, in a thread of its own.
+
+        A clock that stands still in stalls waits for this thread instead.
+        """
         if not self.speed:
-            yield
+            with attending(self._clock):
+                yield
             return
         ended = threading.Event()
         self._looked_s = self._wall.now_s()

@@ -9,20 +9,23 @@ import tty
 from collections.abc import Callable
 from typing import Any
 
+from instruments.clock import Clock, SystemClock, attending, look_every_s
+
 #: Bytes from the host -> bytes of the instrument; called with b"" when the host sent nothing.
 Exchange = Callable[[bytes], bytes]
 
 LOCALHOST = "127.0.0.1"
-TICK_S = 0.005  #: wall time between two exchanges on a terminal
 ACCEPT_TIMEOUT_S = 0.2
 JOIN_TIMEOUT_S = 2.0
 BLOCK_BYTES = 4096  #: of one read; a terminal that is not read keeps this many last bytes
 
 
 class RealPorts:
-    """Open ports and their threads."""
+    """Open ports and their threads, for which `clock` waits where it is one that waits."""
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Clock | None = None) -> None:
+        self._clock = clock or SystemClock()
+        self._every_s = look_every_s(self._clock)
         self._closing = threading.Event()
         self._threads: list[threading.Thread] = []
         self._open: list[Any] = []
@@ -92,22 +95,25 @@ class RealPorts:
 
     def _carry_terminal(self, ours: int, exchange: Exchange) -> None:
         waiting = b""
-        while not self._closing.wait(TICK_S):
-            try:
-                received = os.read(ours, BLOCK_BYTES)
-            except BlockingIOError:
-                received = b""
-            waiting += exchange(received)
-            try:
-                waiting = waiting[os.write(ours, waiting) :] if waiting else b""
-            except BlockingIOError:
-                waiting = waiting[-BLOCK_BYTES:]  # the terminal is full: a port keeps its last bytes
+        with attending(self._clock) as look:
+            while not self._closing.wait(self._every_s):
+                try:
+                    received = os.read(ours, BLOCK_BYTES)
+                except BlockingIOError:
+                    received = b""
+                waiting += exchange(received)
+                try:
+                    waiting = waiting[os.write(ours, waiting) :] if waiting else b""
+                except BlockingIOError:
+                    waiting = waiting[-BLOCK_BYTES:]  # the terminal is full: a port keeps its last bytes
+                look()
         os.close(ours)
 
     def _carry_connection(self, connection: socket.socket, exchange: Exchange) -> None:
-        connection.settimeout(ACCEPT_TIMEOUT_S)
-        with connection:
+        connection.settimeout(self._every_s)
+        with connection, attending(self._clock) as look:
             while not self._closing.is_set():
+                look()
                 try:
                     received = connection.recv(BLOCK_BYTES)
                 except TimeoutError:

@@ -9,7 +9,8 @@ from pathlib import Path
 from instruments.bench_config import BenchFile, shipped_benches
 from instruments.checks.check import check
 from instruments.checks.findings import DeviceReport
-from instruments.clock import Clock, ScaledClock, SystemClock, VirtualClock, WallClock
+from instruments.clock import Clock, VirtualClock, WallClock
+from instruments.shared_clock import clock_outside, served_clock
 from instruments.simulation import Simulation, serve_simulation
 from labctl.errors import BadInput
 from labctl.services.benches.pace import asked_speed, reached_speed
@@ -80,10 +81,7 @@ def _device(report: DeviceReport, bench: BenchFile) -> DeviceCheck:
 
 def clock_of(bench: BenchFile) -> Clock:
     """Return the clock of a check: that of simulators in another process runs at their speed."""
-    if bench.is_simulated:
-        return VirtualClock()
-    remote = bench.simulation is not None and bench.simulation.control is not None
-    return ScaledClock(bench.simulation.speed) if remote and bench.simulation is not None else SystemClock()
+    return VirtualClock() if bench.is_simulated else clock_outside(bench)
 
 
 def shipped() -> list[ShippedBench]:
@@ -107,4 +105,6 @@ def serve_simulator(
     """
     if not 0 < speed < float("inf"):
         raise BadInput(f"--speed {speed}: give a positive number; 1 is real time")
-    serve_simulation(load_bench(source), ScaledClock(speed), out, ready, log)
+    bench = load_bench(source)
+    with served_clock(speed) as clock:
+        serve_simulation(bench, clock, out, ready, log)

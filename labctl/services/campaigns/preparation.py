@@ -8,12 +8,13 @@ from datetime import datetime
 
 from instruments.bench import Bench, open_bench
 from instruments.bench_config import BenchFile, SimulationSettings
-from instruments.clock import VIRTUAL_START, Clock, PacedClock, ScaledClock, SystemClock
+from instruments.clock import VIRTUAL_START, Clock, PacedClock, attending
 from instruments.configuration import configuration_of
 from instruments.drivers.unit_handlers import ManualUnitHandler
 from instruments.errors import InstrumentError
 from instruments.interfaces.gyro import Gyro, GyroIdentity
 from instruments.interfaces.table import RateTable
+from instruments.shared_clock import clock_outside
 from instruments.standards import Standard
 from labctl.acting_user import actor
 from labctl.errors import BadInput, Conflict
@@ -131,8 +132,7 @@ def clock_for(bench: BenchFile, speed: float | None, start: datetime | None = No
             )
         if speed is not None:
             raise BadInput(f"--speed {speed:g}: bench {bench.name} runs in real time; leave the option out")
-        simulation = bench.simulation
-        return ScaledClock(simulation.speed) if simulation is not None and simulation.control else SystemClock()
+        return clock_outside(bench)
     return PacedClock(start=start or VIRTUAL_START) if speed is None else PacedClock(speed, start=start)
 
 
@@ -170,9 +170,9 @@ def prepare(
     refuse_bad(store, standards_of(bench_file), today, bench_file.name)
     bench = opened or open_bench(bench_file, clock)
     try:
-        _identify_at_rest(bench, clock)
+        with attending(clock):
+            identities = _identities(bench, clock)
         plan = make_plan(recipe, BenchLimits.of(bench), clip=clip)
-        identities = {name: gyro.identify() for name, gyro in bench.gyros.items()}
         bench_file = _with_reported(store, bench_file, identities)
         standards = as_used(store, standards_of(bench_file), today)
         units = _units(bench, identities, bench_file, clock, recipe, standards)
@@ -210,6 +210,12 @@ def _with_reported(store: Store, bench: BenchFile, identities: Mapping[str, Gyro
     refuse_otherwise_set(bench, reported)
     refuse_changed(store, bench, reported)
     return bench.model_copy(update={"reported": reported})
+
+
+def _identities(bench: Bench, clock: Clock) -> dict[str, GyroIdentity]:
+    """Return what each unit is, once the bench is known to be at rest; raises InstrumentError."""
+    _identify_at_rest(bench, clock)
+    return {name: gyro.identify() for name, gyro in bench.gyros.items()}
 
 
 def _identify_at_rest(bench: Bench, clock: Clock) -> None:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 
 from instruments.interfaces.gyro import Readings
 from instruments.interfaces.self_checks import StreamPeriod
 from procedures.contracts.campaign_state import CampaignState
-from procedures.execution.late_readings import Promise, promise_of
+from procedures.execution.late_readings import Promise, dropped, pending, promise_of
+from procedures.monitoring.bench_snapshot import ReadingCounts
 from tests.helpers.engine_rig import Rig
 from tests.helpers.fake_instruments import FakeGyro
 
@@ -117,3 +119,24 @@ def test_the_promise_is_by_the_measured_period_and_its_uncertainty() -> None:
     assert found.readings == pytest.approx(97.0)
     assert found.u_readings == pytest.approx(0.388)
     assert (found.missing(95), found.missing(90)) == (0, 7)
+
+
+def counted(times_s: list[float]) -> ReadingCounts:
+    found = ReadingCounts(100.0)
+    found.note(np.array(times_s), GATE[0])
+    return found
+
+
+GATE = (20.0, 30.0)
+
+
+@pytest.mark.parametrize(("newest_s", "readings"), [(30.05, 0), (29.95, 0), (29.86, 0), (29.74, 2), (19.0, 100)])
+def test_the_end_of_a_gate_is_pending_until_a_reading_of_its_last_period_came(newest_s: float, readings: int) -> None:
+    assert pending(Rig().imu, GATE, counted([newest_s])) == pytest.approx(readings, abs=1)
+    assert bool(pending(Rig().imu, GATE, counted([newest_s]))) == bool(readings)
+
+
+@pytest.mark.parametrize(("first_s", "readings"), [(20.01, 0), (20.15, 0), (20.44, 4)])
+def test_readings_that_a_late_reader_dropped_at_the_beginning_are_missing(first_s: float, readings: int) -> None:
+    assert dropped(Rig().imu, GATE, counted([19.9, first_s, 21.0])) == readings
+    assert dropped(Rig().imu, GATE, counted([19.9])) == 0

@@ -1,0 +1,225 @@
+"""One clock of a simulator and of the processes that drive it: alike in all, and still while one of them is late."""
+
+from __future__ import annotations
+
+import contextlib
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from instruments.bench_config import BenchFile, SimulationSettings, read_bench
+from instruments.clock import ScaledClock, SystemClock, VirtualClock, attending
+from instruments.shared_clock import (
+    DOUBTED_S,
+    GIVEN_UP_S,
+    LATE_CLOCK_S,
+    LOOKS,
+    SIZE,
+    THREADS,
+    ClockFile,
+    SharedClock,
+    clock_outside,
+    served_clock,
+)
+from instruments.simulators.server import SimulationServer
+from procedures.contracts.control import Control
+from procedures.execution.stoppable_clock import stoppable
+from procedures.monitoring.host_stalls import HostStalls
+from tests.helpers.virtual_wall import VirtualWall
+
+SPEED = 30.0
+#: What is counted of a stall: until a thread is late, and between two looks before and after.
+LATE_S = LATE_CLOCK_S / SPEED
+LOOK_EVERY_S = LATE_S / LOOKS
+COUNTED_S = LATE_S + 2 * LOOK_EVERY_S
+
+
+class Rig:
+    """A simulator and a process that drives it, one thread of each, in real time that passes at once."""
+
+    def __init__(self) -> None:
+        self.wall, self._stack = VirtualWall(), contextlib.ExitStack()
+        self.file = ClockFile.made(SPEED, self.wall.now_s())
+        self._stack.callback(self.file.path.unlink)
+        self.simulator = SharedClock(self.file, owns=True, wall=self.wall)
+        self.driver = SharedClock(ClockFile(self.file.path), wall=self.wall)
+        # both from one thread, in which a test also reads the clocks: their places are those of other threads
+        self.looks = {"simulator": self.attend(self.simulator), "driver": self.attend(self.driver)}
+
+    def attend(self, clock: SharedClock) -> Callable[[], None]:
+        place = self.file.take_place(self.wall.now_s())
+        self._stack.callback(self.file.leave_place, place)
+
+        def look() -> None:
+            clock.now_s()
+            self.file.look(place, self.wall.now_s())
+
+        return look
+
+    def run(self, duration_s: float, *, without: str = "") -> None:
+        """Let real time pass while every thread looks as it should, except those of one process."""
+        for _ in range(round(duration_s / LOOK_EVERY_S)):
+            self.wall.pass_s(LOOK_EVERY_S)
+            for name, look in self.looks.items():
+                if name != without:
+                    look()
+
+    @property
+    def both_s(self) -> tuple[float, float]:
+        return self.simulator.now_s(), self.driver.now_s()
+
+    def close(self) -> None:
+        self._stack.close()
+
+
+@pytest.fixture
+def rig() -> Iterator[Rig]:
+    made = Rig()
+    yield made
+    made.close()
+
+
+def test_both_run_at_the_speed(rig: Rig) -> None:
+    rig.run(2.0)
+    assert rig.both_s == pytest.approx((SPEED * 2.0, SPEED * 2.0))
+
+
+@pytest.mark.parametrize("late", ["simulator", "driver"])
+def test_the_clock_of_both_stands_still_while_one_is_late(rig: Rig, late: str) -> None:
+    rig.run(1.0)
+    rig.run(1.3, without=late)
+    held = rig.both_s
+    assert held == pytest.approx((SPEED, SPEED), abs=SPEED * COUNTED_S)
+    rig.run(1.0)
+    now = rig.both_s
+    assert now[0] == pytest.approx(now[1])
+    assert now[0] - held[0] == pytest.approx(SPEED, abs=SPEED * COUNTED_S)
+
+
+def test_a_computer_that_stands_still_counts_for_neither(rig: Rig) -> None:
+    rig.run(1.0)
+    rig.wall.pass_s(3.0)
+    rig.looks["driver"]()
+    rig.wall.pass_s(0.01)
+    rig.run(1.0)
+    assert rig.both_s == pytest.approx((2 * SPEED, 2 * SPEED), abs=SPEED * (COUNTED_S + 0.01))
+    assert rig.simulator.now_s() == pytest.approx(rig.driver.now_s())
+
+
+def test_the_clock_never_goes_back(rig: Rig) -> None:
+    seen = [0.0]
+    for without in ("", "driver", "", "simulator", ""):
+        for _ in range(20):
+            rig.run(0.02, without=without)
+            seen.append(rig.driver.now_s())
+    assert seen == sorted(seen)
+
+
+def test_a_sleep_lasts_through_a_stall(rig: Rig) -> None:
+    name = threading.current_thread().name
+    begun_s = rig.wall.now_s()
+    stalls = [0.0, 0.0, 2.0]
+
+    def halted(_: threading.Condition) -> None:
+        rig.wall.pass_s(stalls.pop() if stalls else 0.0)
+        for look in rig.looks.values():
+            look()
+
+    rig.wall.meanwhile[name] = halted
+    rig.driver.sleep(SPEED * 0.3)
+    # each wait of a sleep is longer than a thread may be late, and only the rest of it counts
+    assert rig.wall.now_s() - begun_s > 2.0 + 0.3 - LATE_S
+    assert rig.driver.now_s() == pytest.approx(SPEED * 0.3)
+
+
+def test_a_thread_that_is_halted_for_good_is_not_waited_for(rig: Rig) -> None:
+    rig.run(GIVEN_UP_S + 1.0, without="driver")
+    assert rig.simulator.now_s() == pytest.approx(SPEED, rel=0.05)
+
+
+def test_a_process_that_has_ended_is_not_waited_for(rig: Rig) -> None:
+    code = (
+        "import sys; from pathlib import Path; from instruments.shared_clock import ClockFile\n"
+        "ClockFile(Path(sys.argv[1])).take_place(float(sys.argv[2]))"
+    )
+    subprocess.run([sys.executable, "-c", code, str(rig.file.path), str(rig.wall.now_s())], check=True)
+    rig.run(1.0 + DOUBTED_S)
+    assert rig.simulator.now_s() == pytest.approx(SPEED, rel=0.05)
+    rig.run(1.0)
+    assert rig.both_s == pytest.approx((2 * SPEED, 2 * SPEED), rel=0.05)
+
+
+def test_places_are_given_back(rig: Rig) -> None:
+    for _ in range(2 * THREADS):
+        with rig.driver.attending():
+            pass
+    for _ in range(THREADS - rig.file.attending):
+        rig.file.take_place(rig.wall.now_s())
+    with pytest.raises(OSError, match=f"more than {THREADS} threads"):
+        rig.file.take_place(rig.wall.now_s())
+
+
+def test_a_bench_file_leads_to_the_clock_of_the_simulator() -> None:
+    with served_clock(SPEED) as clock:
+        server = SimulationServer(read_bench("single-axis-sim"), clock)
+        try:
+            far = server.start()
+            found = clock_outside(far)
+            assert isinstance(found, SharedClock)
+            assert isinstance(clock, SharedClock)
+            assert found.path == clock.path
+            assert found.speed == SPEED
+        finally:
+            server.stop()
+    assert not found.path.exists()
+    assert not isinstance(clock_outside(far), SharedClock)  # its simulator has ended
+
+
+def outside(simulation: SimulationSettings | None) -> BenchFile:
+    return read_bench("single-axis-sim").model_copy(update={"simulation": simulation})
+
+
+def test_at_speed_1_and_on_a_real_bench_it_is_the_clock_of_this_computer() -> None:
+    with served_clock(1.0) as clock:
+        assert isinstance(clock, SystemClock)
+    assert isinstance(clock_outside(outside(None)), SystemClock)
+    assert isinstance(clock_outside(outside(SimulationSettings())), SystemClock)
+
+
+def test_another_file_is_none_of_a_clock(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    other = tmp_path / "other"
+    other.write_text("something")
+    with pytest.raises(OSError, match="has 9 bytes"):
+        ClockFile(other)
+    other.write_bytes(bytes(SIZE))
+    with pytest.raises(OSError, match="not the file of a clock"):
+        ClockFile(other)
+    found = clock_outside(outside(SimulationSettings(control="127.0.0.1:1", speed=4.0, clock=str(other))))
+    assert not isinstance(found, SharedClock)
+    assert isinstance(found, ScaledClock)
+    assert found.speed == 4.0
+    assert "clock.not_shared" in caplog.text
+
+
+def test_a_campaign_attends_and_has_no_stalls(rig: Rig) -> None:
+    clock = stoppable(rig.driver, Control())
+    stalls = HostStalls(clock, wall := VirtualClock())
+    before = rig.file.attending
+
+    def watch() -> int:
+        with stalls.watching():
+            wall.sleep(100.0)
+            assert stalls.total_clock_s() == 0.0
+            assert stalls.news() is None
+            return rig.file.attending
+
+    with ThreadPoolExecutor(1) as pool:  # the threads of the rig attend already
+        assert pool.submit(watch).result() == before + 1
+    assert rig.file.attending == before
+    with attending(VirtualClock()) as look:
+        look()
