@@ -19,7 +19,7 @@ from instruments.interfaces.reference import Reference
 from instruments.interfaces.table import RateTable
 from instruments.interfaces.unit_handler import UnitHandler
 from instruments.simulation import Simulation, open_simulation, simulated_links, simulated_unit_handler
-from instruments.transport.factory import Ports
+from instruments.transport.factory import Ports, Wire
 
 
 @dataclass(frozen=True)
@@ -48,25 +48,26 @@ class Bench:
             raise failures[0]
 
 
-def open_bench(bench: BenchFile, clock: Clock, simulation: Simulation | None = None) -> Bench:
+def open_bench(bench: BenchFile, clock: Clock, simulation: Simulation | None = None, wire: Wire | None = None) -> Bench:
     """Return the drivers of a bench; no byte is sent before one of them is used.
 
-    `simulation` is the world of the simulated instruments where it exists already. Raises pydantic.ValidationError for
+    `simulation` is the world of the simulated instruments where it exists already. `wire` records what passes between
+    drivers and instruments, or answers in place of the instruments. Raises pydantic.ValidationError for
     a driver that cannot be used and for settings that it does not take, LimitError for a setting that the driver cannot
     use, and WrongSimulation for an unknown profile, setting or hidden effect of the simulation.
     """
     bench = resolve(bench)
-    if simulation is None and bench.has_simulated:
+    if simulation is None and bench.has_simulated and not (wire is not None and wire.answers):
         try:
             simulation = open_simulation(bench, clock)
         except ValueError as error:
             raise WrongSimulation("simulation", str(error)) from error
-    ports = Ports(clock, None if simulation is None else simulated_links(simulation, clock), bench.adapters)
+    ports = Ports(clock, None if simulation is None else simulated_links(simulation, clock), bench.adapters, wire)
     return Bench(
         None if bench.table is None else driver_of(bench.table).make(bench.table, ports, clock),
         None if bench.chamber is None else driver_of(bench.chamber).make(bench.chamber, ports, clock),
         {gyro.name: driver_of(gyro).make(gyro, ports, clock) for gyro in bench.gyros},
-        _unit_handler(bench, simulation, clock),
+        _unit_handler(bench, simulation, clock, wire),
         simulation,
         {each.name: driver_of(each).make(each, ports, clock) for each in bench.references},
         {gyro.name: gyro.configuration for gyro in bench.gyros},
@@ -85,9 +86,13 @@ def checked_settings(bench: BenchFile) -> BenchFile:
     return resolved
 
 
-def _unit_handler(bench: BenchFile, simulation: Simulation | None, clock: Clock) -> UnitHandler:
+def _unit_handler(bench: BenchFile, simulation: Simulation | None, clock: Clock, wire: Wire | None) -> UnitHandler:
     if simulation is not None:
-        return simulated_unit_handler(simulation, clock)
-    if bench.simulation is not None and bench.simulation.control is not None:
-        return RemoteUnitHandler(bench.simulation.control)
-    return ManualUnitHandler()
+        handler = simulated_unit_handler(simulation, clock)
+    elif bench.simulation is not None and bench.simulation.control is not None:
+        handler = RemoteUnitHandler(bench.simulation.control)
+    else:
+        handler = ManualUnitHandler()
+        if wire is None or not wire.answers:  # what a person does passes no wire
+            return handler
+    return handler if wire is None else wire.unit_handler(handler)

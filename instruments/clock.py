@@ -188,14 +188,17 @@ class WallClock(SystemClock):
 
 
 class VirtualClock:
-    """Time that advances only by `sleep`, at once. Raises ValueError for a start without a time zone."""
+    """Time that advances only by `sleep`, at once. Raises ValueError for a start without a time zone.
+
+    `start` is the instant at which it reads 0, and `now_s` what it reads when it is made.
+    """
 
     #: Every time-out, s of real time. A simulator in this process replies before the call returns, or never: a slow
     #: machine must not look like a slow wire.
     WALL_TIMEOUT_S = 10.0
 
-    def __init__(self, start: datetime = VIRTUAL_START) -> None:
-        self._now_s = 0.0
+    def __init__(self, start: datetime = VIRTUAL_START, *, now_s: float = 0.0) -> None:
+        self._now_s = now_s
         self._start = _aware(start)
 
     def now_s(self) -> float:
@@ -207,6 +210,10 @@ class VirtualClock:
     def sleep(self, duration_s: float) -> None:
         if duration_s > 0:
             self._now_s += duration_s
+
+    def reach(self, t_s: float) -> None:
+        """Advance to `t_s` exactly, which no sum of durations does; nothing happens where that is past."""
+        self._now_s = max(self._now_s, t_s)
 
     def wall_s(self, duration_s: float) -> float:  # noqa: ARG002  virtual time-outs do not depend on their length
         return self.WALL_TIMEOUT_S

@@ -6,7 +6,7 @@ imports no simulator.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Protocol
 
 from pymodbus.client import ModbusSerialClient, ModbusTcpClient
@@ -14,6 +14,7 @@ from pymodbus.client import ModbusSerialClient, ModbusTcpClient
 from instruments.bench_config import is_simulated_address
 from instruments.clock import Clock, wait_s
 from instruments.errors import LinkError
+from instruments.interfaces.unit_handler import UnitHandler
 from instruments.transport.adapters import require_adapter
 from instruments.transport.opened_port import open_port
 from instruments.transport.port_failures import reason, remedy
@@ -51,6 +52,27 @@ class LinkFactory(Protocol):
         ...
 
 
+class Wire(Protocol):
+    """What stands between the drivers of a bench and its links: it records what passes, or answers itself."""
+
+    @property
+    def answers(self) -> bool:
+        """Whether it answers itself: no instrument, real or simulated, is opened."""
+        ...
+
+    def links(self, links: LinkFactory) -> LinkFactory:
+        """Return the links that the drivers use in place of `links`."""
+        ...
+
+    def stream_reader(self, url: str, port: SerialPort, make: Callable[[SerialPort], StreamReader]) -> StreamReader:
+        """Return what empties an open port of these links; `make` returns what empties a port that it is given."""
+        ...
+
+    def unit_handler(self, handler: UnitHandler) -> UnitHandler:
+        """Return the unit handler that is used in place of `handler`."""
+        ...
+
+
 class HardwareLinks:
     """Real ports and hosts. A time-out of the bench clock becomes seconds of real time."""
 
@@ -82,15 +104,27 @@ class Ports:
     """Opens the links of one bench; `simulated` makes the links of `sim://` addresses, where the bench has any.
 
     `adapters`: device -> serial number of the USB adapter that each of its serial ports must be on, at every opening.
+    `wire` stands between the drivers and these links, where there is one.
     """
 
     def __init__(
-        self, clock: Clock, simulated: LinkFactory | None = None, adapters: Mapping[str, str] | None = None
+        self,
+        clock: Clock,
+        simulated: LinkFactory | None = None,
+        adapters: Mapping[str, str] | None = None,
+        wire: Wire | None = None,
     ) -> None:
-        self._clock = clock
+        self._clock, self._wire = clock, wire
         self._adapters = dict(adapters or {})
-        self._hardware = HardwareLinks(clock)
+        self._hardware: LinkFactory = HardwareLinks(clock)
         self._simulated = simulated
+        if wire is not None:
+            self._hardware = wire.links(self._hardware)
+            if wire.answers:
+                self._simulated = self._hardware
+                self._adapters.clear()
+            elif simulated is not None:
+                self._simulated = wire.links(simulated)
 
     def serial(self, url: str, *, device: str, baudrate: int, timeout_s: float, line: Line = EIGHT_N_1) -> SerialPort:
         """Open a serial port, 8 data bits, locked for this process.
@@ -108,7 +142,11 @@ class Ports:
 
     def stream_reader(self, url: str, port: SerialPort) -> StreamReader:
         """Return what empties an open port: a thread for a real one, which does not wait for its reader."""
-        return PolledReader(port, self._clock) if is_simulated_address(url) else ThreadedReader(port, self._clock)
+
+        def make(port: SerialPort) -> StreamReader:
+            return PolledReader(port, self._clock) if is_simulated_address(url) else ThreadedReader(port, self._clock)
+
+        return make(port) if self._wire is None else self._wire.stream_reader(url, port, make)
 
     def port_timeout_s(self, url: str, timeout_s: float, *, device: str) -> float:
         """Return the `timeout` of an open port that stands for `timeout_s` seconds of the bench clock."""

@@ -36,6 +36,7 @@ from labctl.cli.commands import (
     signing_key,
     standards,
     trend,
+    wire_logs,
 )
 from labctl.cli.commands.documents import certificate, certificate_list, datasheet, reproduction, uncertainty
 from labctl.cli.error_reporting import one_clear_line
@@ -70,6 +71,7 @@ COMMANDS: dict[str, Callable[..., None]] = {
     "demo": server.demo,
     "serve": server.serve,
     "stop": server.stop,
+    "replay": wire_logs.replay,
     "simulator": server.simulator,
     "simulate": recordings.simulate,
     "import": recordings.import_,

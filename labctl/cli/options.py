@@ -19,6 +19,14 @@ Database = Annotated[
         help="Database file or URL; default: $LABCTL_DATABASE if set, else a file in the user's data folder.",
     ),
 ]
+WireLog = Annotated[
+    Path | None,
+    typer.Option(
+        "--wire-log",
+        metavar="FILE",
+        help="File for every byte between labctl and the instruments, compressed; `labctl replay FILE` does it again.",
+    ),
+]
 Serial = Annotated[str, typer.Argument(metavar="SERIAL", help="Serial number of the unit.")]
 AcceptWarnings = Annotated[
     bool,

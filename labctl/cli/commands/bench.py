@@ -10,7 +10,7 @@ import typer
 from rich.text import Text
 
 from labctl.cli.error_reporting import one_clear_line
-from labctl.cli.options import Database, Json
+from labctl.cli.options import Database, Json, WireLog
 from labctl.cli.output import console, print_json, stderr
 
 app = typer.Typer(no_args_is_help=True, help="The benches: tables, chambers and gyros.")
@@ -24,6 +24,7 @@ def is_terminal() -> bool:
 @app.command("check")
 def check(
     bench: Annotated[str, typer.Argument(metavar="FILE", help="Bench file, or the name of a shipped bench.")],
+    wire_log: WireLog = None,
     as_json: Json = False,
     database: Database = None,
 ) -> None:
@@ -38,7 +39,7 @@ def check(
     from labctl.services.standards.agreement import with_register
 
     with one_clear_line():
-        answer = check_bench(bench)
+        answer = check_bench(bench, wire_log)
         with open_existing(database) as store:
             answer = answer if store is None else with_register(store, answer, load_bench(bench))
     if as_json:

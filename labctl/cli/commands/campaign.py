@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from labctl.cli.error_reporting import one_clear_line
-from labctl.cli.options import BenchName, CampaignId, Database, Json, SimulatedStart, simulated_start
+from labctl.cli.options import BenchName, CampaignId, Database, Json, SimulatedStart, WireLog, simulated_start
 from labctl.cli.output import console, print_json, table
 from labctl.cli.printing.campaigns import print_campaign, print_plan, print_started
 
@@ -138,6 +138,7 @@ def start(
     hide: Hide = None,
     simulated_from: SimulatedStart = None,
     no_fit: NoFit = False,
+    wire_log: WireLog = None,
     as_json: Json = False,
     database: Database = None,
 ) -> None:
@@ -166,7 +167,7 @@ def start(
             given["fit"] = False
         request = CampaignRequest.model_validate({"recipe": own_text(recipe), "clip": clip, **given})
         start_at = simulated_start(simulated_from)
-        asked = CampaignStart(request, bench=bench, speed=speed, seed=seed, simulated_start=start_at)
+        asked = CampaignStart(request, bench=bench, speed=speed, seed=seed, simulated_start=start_at, wire_log=wire_log)
         with open_commands(database, campaign_terminal(quiet=as_json)) as commands:
             answer = commands.execute(START_CAMPAIGN, asked)
     print_started(answer, as_json=as_json)

@@ -12,8 +12,10 @@ from instruments.checks.findings import DeviceReport
 from instruments.clock import Clock, VirtualClock, WallClock
 from instruments.shared_clock import clock_outside, served_clock
 from instruments.simulation import Simulation, serve_simulation
+from instruments.transport.factory import Wire
 from labctl.errors import BadInput
 from labctl.services.benches.pace import asked_speed, reached_speed
+from labctl.services.benches.wire_log import recording
 from labctl.services.planning.loading import load_bench
 from labctl.services.schemas.benches import (
     BenchCheckResponse,
@@ -23,12 +25,32 @@ from labctl.services.schemas.benches import (
     FindingResponse,
     ShippedBench,
 )
+from labctl.services.schemas.wire_logs import RecordedSession
 
 
-def check_bench(source: str) -> BenchCheckResponse:
-    """Talk to every instrument of a bench and say what answered; nothing moves."""
+def check_bench(source: str, wire_log: Path | None = None) -> BenchCheckResponse:
+    """Talk to every instrument of a bench and say what answered; nothing moves.
+
+    `wire_log` is the file that gets every byte between labctl and the bench.
+    """
     bench = load_bench(source)
-    return checked(bench, source, clock_of(bench))
+    clock = clock_of(bench)
+    with recording(wire_log, bench, clock, RecordedSession(kind="bench check")) as recorded:
+        if recorded is None:
+            return checked(bench, source, clock)
+        reports = check_on_wire(bench, clock, recorded.wire)
+        recorded.result.said = said_of(reports)
+        return response_of(bench, source, reports)
+
+
+def check_on_wire(bench: BenchFile, clock: Clock, wire: Wire) -> list[DeviceReport]:
+    """Return the reports on the instruments of a bench whose wire is recorded, or answers itself."""
+    return check(bench, clock, wire=wire)
+
+
+def said_of(reports: Sequence[DeviceReport]) -> list[str]:
+    """Return every finding of a check as a line, to compare two checks."""
+    return [f"{each.device}: {one.what}: {one.text} ({one.state})" for each in reports for one in each.findings]
 
 
 def checked(bench: BenchFile, source: str, clock: Clock, simulation: Simulation | None = None) -> BenchCheckResponse:

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from contextlib import ExitStack, closing, suppress
+from dataclasses import replace
+from pathlib import Path
 
 from instruments.bench_config import BenchFile
 from instruments.clock import WallClock
+from instruments.transport.wire_log.recorder import WireRecorder
 from labctl.acting_user import actor
 from labctl.config import default_database
 from labctl.errors import Conflict, DiskFull, Stopped, StoreError
@@ -18,6 +21,7 @@ from labctl.services.benches.lease import holding, open_for
 from labctl.services.benches.pace import with_pace_watch
 from labctl.services.benches.standards import overdue_events, standards_of
 from labctl.services.benches.start_confirmation import confirmation_text, start_questions
+from labctl.services.benches.wire_log import recording
 from labctl.services.campaigns.bench_lending import BenchLending, lending_journal
 from labctl.services.campaigns.foreground_stop import answering_stops, let_move, note_carried_out
 from labctl.services.campaigns.preparation import (
@@ -28,9 +32,12 @@ from labctl.services.campaigns.preparation import (
     refuse_unconfirmed,
     seeded,
 )
+from labctl.services.campaigns.readings_digest import readings_digest
+from labctl.services.campaigns.recorded_operator import RecordedOperator
 from labctl.services.campaigns.status import answer_of, describe_interrupted, from_rows
-from labctl.services.planning.loading import bench_for, load_bench, load_recipe
+from labctl.services.planning.loading import bench_for, load_bench, load_recipe, own_text
 from labctl.services.schemas.campaigns import BENCH_CHECKS, CampaignResponse, StartRequest
+from labctl.services.schemas.wire_logs import RecordedSession
 from labctl.services.simulation.hidden_effects import with_hidden_effects
 from labctl.services.standards.agreement import register_events
 from labctl.store import Store
@@ -151,11 +158,13 @@ def run_here(
     attend: Attend | None = None,
     say: Callable[[str], None] | None = None,
     ask_clear: AskClear | None = None,
+    wire_log: Path | None = None,
 ) -> CampaignResponse:
     """Run a campaign in this process, until it is over; `attend` is given the operator that it asks.
 
     `say` is called with the text about a campaign that was left on a simulated bench. `ask_clear` is given the
-    questions about a real bench that is not confirmed to be clear yet, and returns who has confirmed it. Raises
+    questions about a real bench that is not confirmed to be clear yet, and returns who has confirmed it. `wire_log` is
+    the file that gets every byte between labctl and the bench. Raises
     Conflict for a campaign that was left on a real bench, StartNotConfirmed where no person has confirmed that it is
     clear.
     """
@@ -179,10 +188,22 @@ def run_here(
         clear = confirmation_text(bench_file, request)
         let_move(store, bench_file.name, request.confirmed_by or actor().name, WallClock().utc())
         clock = stoppable(clock, control)
-        prepared = prepare(
-            store, request.recipe, bench_file, clock, clip=request.clip, fit=request.fit, bench_clear=clear
-        )
-        return run_attended(store, prepared, control, observe, attend)
+        with recording(wire_log, bench_file, clock, _session(request)) as recorded:
+            wire = None if recorded is None else recorded.wire
+            prepared = prepare(
+                store, request.recipe, bench_file, clock, clip=request.clip, fit=request.fit, bench_clear=clear,
+                wire=wire,
+            )  # fmt: skip
+            answer = run_attended(store, prepared, control, observe, attend, wire)
+            if recorded is not None:
+                recorded.result.state = answer.state.value
+                recorded.result.readings = readings_digest(store, answer.id)
+            return answer
+
+
+def _session(request: StartRequest) -> RecordedSession:
+    """Return what a wire log says of a campaign, so that it can be run again."""
+    return RecordedSession(kind="campaign", recipe=own_text(request.recipe), clip=request.clip, fit=request.fit)
 
 
 def _left_on(store: Store, bench: BenchFile) -> list[str]:
@@ -194,9 +215,14 @@ def _left_on(store: Store, bench: BenchFile) -> list[str]:
 
 
 def run_attended(
-    store: Store, prepared: Prepared, control: Control, observe: Observe | None, attend: Attend | None
+    store: Store,
+    prepared: Prepared,
+    control: Control,
+    observe: Observe | None,
+    attend: Attend | None,
+    wire: WireRecorder | None = None,
 ) -> CampaignResponse:
-    """Run a prepared campaign to its end at a terminal.
+    """Run a prepared campaign to its end at a terminal; `wire` records the answers of a person.
 
     Raises Stopped after a Ctrl-C, StoreError when it cannot be written any more; both say how the bench was left.
     """
@@ -204,6 +230,8 @@ def run_attended(
     note_campaign(store.location, row.id)
     if attend is not None:
         attend(prepared.operator, answers_noted(store, prepared))
+    if wire is not None and not prepared.operator.at_once:
+        prepared = replace(prepared, operator=RecordedOperator(prepared.operator, wire.note))
 
     seen = None if observe is None else lambda progress: observe(answer_of(row, progress))
     engine = _engine(store, prepared, control, seen)

@@ -16,6 +16,7 @@ from instruments.interfaces.gyro import Gyro, GyroIdentity
 from instruments.interfaces.table import RateTable
 from instruments.shared_clock import clock_outside
 from instruments.standards import Standard
+from instruments.transport.factory import Wire
 from labctl.acting_user import actor
 from labctl.errors import BadInput, Conflict
 from labctl.json_types.recordings import RawChannelJson
@@ -154,13 +155,13 @@ def prepare(
     fit: bool = True,
     opened: Bench | None = None,
     bench_clear: str = "",
+    wire: Wire | None = None,
 ) -> Prepared:
     """Open the bench, plan, and write the whole campaign down; the table is at rest when this returns.
 
-    Without `fit` it ends in its recordings, whatever its recipe says. `opened` is the bench where it is open already;
-    `bench_clear` is what a person has confirmed about it. Raises InstrumentError when an instrument does not answer,
-    PlanRefused when the bench cannot do the recipe, Conflict where a unit or its USB adapter is not the one it was,
-    and where a standard of the bench is bad by the register.
+    Without `fit` it ends in its recordings. `opened` is the bench where it is open already; `bench_clear` is what a
+    person has confirmed about it; `wire` records it, or answers in its place. Raises InstrumentError, PlanRefused when
+    the bench cannot do the recipe, Conflict for another unit or USB adapter than before and for a bad standard.
     """
     load_libraries()
     bench_file = with_drivers(bench_file)  # what is written down names the release of each driver
@@ -168,7 +169,7 @@ def prepare(
     refuse_unconfirmed(store, bench_file.name)
     today = clock.utc().date()
     refuse_bad(store, standards_of(bench_file), today, bench_file.name)
-    bench = opened or open_bench(bench_file, clock)
+    bench = opened or open_bench(bench_file, clock, wire=wire)
     try:
         with attending(clock):
             identities = _identities(bench, clock)

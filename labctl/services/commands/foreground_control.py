@@ -67,8 +67,9 @@ class ForegroundControl:
         )  # fmt: skip
         with self._open_terminal() as terminal:
             answer = run_here(
-                self._database, request, terminal.observe, terminal.attend, terminal.say, terminal.ask_clear
-            )
+                self._database, request, terminal.observe, terminal.attend, terminal.say, terminal.ask_clear,
+                wire_log=asked.wire_log,
+            )  # fmt: skip
         return self._with_drafts(answer)
 
     def _with_drafts(self, answer: CampaignResponse) -> CampaignResponse:
@@ -87,7 +88,10 @@ class ForegroundControl:
 
     def schedule(self, context: CommandContext, asked: CampaignStart) -> ScheduledResponse:
         """Enter a campaign into the schedule of a bench; a service that holds this bench and database starts it."""
-        options = {"--speed": asked.speed, "--seed": asked.seed, "--simulated-start": asked.simulated_start}
+        options: dict[str, object] = {
+            "--speed": asked.speed, "--seed": asked.seed, "--simulated-start": asked.simulated_start,
+            "--wire-log": asked.wire_log,
+        }  # fmt: skip
         for option, value in options.items():
             if value is not None:
                 raise BadInput(

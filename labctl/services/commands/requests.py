@@ -104,13 +104,14 @@ class ToStart(Addressed):
 class CampaignStart(Addressed):
     """A campaign to start, now or later, with options of the process that would run it in its foreground."""
 
-    local_only: ClassVar[tuple[str, ...]] = ("bench", "speed", "seed", "simulated_start")
+    local_only: ClassVar[tuple[str, ...]] = ("bench", "speed", "seed", "simulated_start", "wire_log")
 
     body: CampaignRequest
     bench: str | None = None
     speed: float | None = None
     seed: int | None = None
     simulated_start: datetime | None = None  #: aware
+    wire_log: Path | None = None  #: file that gets every byte between labctl and the bench
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,56 @@
+"""Replays of wire logs."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel, Field
+
+from labctl.services.schemas.base import ResponseModel
+
+
+class ReadingsDigest(ResponseModel):
+    """What a session has measured, as far as it is needed to compare two sessions."""
+
+    sha256: str = Field(description="SHA-256 of every column of every complete data set, with the times.")
+    datasets: int = Field(description="Number of complete data sets, counted per unit.")
+    readings: int = Field(description="Number of readings in them.")
+
+
+class RecordedSession(BaseModel):
+    """What a session does, in the header of its wire log: enough to do it again."""
+
+    kind: Literal["campaign", "bench check"]
+    recipe: str = ""  #: of a campaign: a shipped name, or its own TOML text
+    clip: bool = False
+    fit: bool = False
+
+
+class SessionResult(BaseModel):
+    """How a session ended, in the last line of its wire log."""
+
+    state: str | None = None  #: of the campaign
+    readings: ReadingsDigest | None = None
+    said: list[str] = Field(default_factory=list)  #: findings of the check of a bench
+    ended_by: str | None = None  #: the error that ended it
+    left_out: int = 0  #: events that are not in the log
+
+
+class ReplayResponse(ResponseModel):
+    """What a replay of a wire log has come to."""
+
+    file: str
+    ok: bool = Field(
+        description="Whether labctl sent what it sent in the session, and the result is that of the session, as far as "
+        "the log tells."
+    )
+    session: Literal["campaign", "bench check"] = Field(description="What the session did.")
+    labctl: str = Field(description="Release of labctl that wrote the log.")
+    bench: str
+    duration_s: float = Field(description="Time from the begin of the session to the end of the log, s of its clock.")
+    requests: int = Field(description="Number of requests that were the same as in the session.")
+    whole: bool = Field(description="Whether the log has the end of the session.")
+    difference: str = Field(description="Where the replay left the session, as text; empty: nowhere.")
+    recorded: ReadingsDigest | None = Field(description="What the session measured; null: the log does not tell.")
+    found: ReadingsDigest | None = Field(description="What the replay measured; null: this session stores nothing.")
+    remarks: list[str] = Field(description="What else is different, or limits the comparison.")
