@@ -108,11 +108,10 @@ def fitted(runs: Sequence[ClockRun]) -> ClockFit | None:
         return None
     middle_s = float(np.average(t_s, weights=nominal_s))
     spans = bool(np.ptp(t_s) > DRIFT_SPAN * nominal_s.max())
-    offsets = _offsets(runs)
-    columns = [nominal_s, nominal_s * (t_s - middle_s) / S_PER_H, *offsets] if spans else [nominal_s, *offsets]
-    terms = 2 if spans else 1
-    freedom = len(runs) - len(columns)
-    if freedom < 1 or np.linalg.matrix_rank(matrix := np.stack(columns, axis=1)) < len(columns):
+    rates = [nominal_s, nominal_s * (t_s - middle_s) / S_PER_H] if spans else [nominal_s]
+    matrix: NDArray[np.float64] = np.stack([*rates, *_offsets(runs)], axis=1)
+    terms, freedom = len(rates), len(runs) - matrix.shape[1]
+    if freedom < 1 or np.linalg.matrix_rank(matrix) < matrix.shape[1]:
         return None
     values, *_ = np.linalg.lstsq(matrix, late_s, rcond=None)
     scatter_s = math.sqrt(float(np.sum((late_s - matrix @ values) ** 2)) / freedom)

@@ -48,7 +48,7 @@ class Rig:
         self.engine: Any = None
 
     def _mounted(self, what: str, header: Any) -> None:
-        """Have the units in the position of a data set, whoever was asked to turn them."""
+        """Have the units in the position of a data set."""
         if what == "dataset_opened":
             self.sign = Position.of(header.step.position).sign
 

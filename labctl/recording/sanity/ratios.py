@@ -37,11 +37,11 @@ def check_ratios(summary: Summary) -> Iterator[Finding]:
 
 def _of_position(sets: Summary, along: Position) -> Iterator[Finding]:
     rate = along.sign * np.asarray(sets["table_rate_dps"], dtype=np.float64)
-    output = sets.of_axis("mean", along.axis)
+    output = np.asarray(sets.of_axis("mean", along.axis), dtype=np.float64)
     fast = float(np.abs(rate).max(initial=0.0))
     if fast < LEAST_DPS or not np.isfinite(output).all():
         return
-    numbers = np.asarray(sets["dataset"])
+    numbers = np.asarray(sets["dataset"], dtype=np.float64)
     slow = np.abs(rate) <= LEAST_SHARE * fast
     if slow.any() and (wrapped := _wrapped(along, numbers, rate, output, float(np.median((output - rate)[slow])))):
         yield wrapped

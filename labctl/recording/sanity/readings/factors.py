@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 
@@ -102,8 +103,8 @@ def _by_factor(values: Array, row: int, factor: float) -> Change | None:
     if abs(ratio - np.log(abs(factor))) > AGREES * u_noise:
         return None
     expected = factor * levels[0]
-    u_level = float(np.hypot(np.hypot(factor * u[0], u[1]), LEVEL_SHARE * expected))
-    size = abs(levels[1] - levels[0]) / float(np.hypot(*u))
+    u_level = math.hypot(factor * u[0], u[1], LEVEL_SHARE * expected)
+    size = abs(levels[1] - levels[0]) / math.hypot(*u)
     if abs(levels[1] - expected) > AGREES * u_level or size < LEVEL_CHANGES:
         return None
     if factor == -1.0:
