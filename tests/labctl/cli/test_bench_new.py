@@ -27,7 +27,6 @@ TEMPLATE = "!1sp1,{divisor}"
 @pytest.fixture
 def lab(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Lab:
     monkeypatch.setattr("labctl.services.benches.new_bench.SystemClock", lambda: ScaledClock(SPEED))
-    monkeypatch.setattr("labctl.services.benches.check.SystemClock", lambda: ScaledClock(SPEED))
     return Lab(tmp_path)
 
 

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from labctl.errors import BadInput
 from labctl.recording import Recording, RecordingInfo, read_recording, write_recording
 from labctl.recording.column_map.movement import movement
 from labctl.recording.sanity import inspect_recording
@@ -71,11 +70,6 @@ def test_readings_are_left_out_by_choice_and_the_recording_says_so(tmp_path: Pat
 def test_nothing_is_left_out_where_nothing_was_found() -> None:
     clean = at_rest()
     assert without(clean, ["all"], "a.csv") is clean
-
-
-def test_a_kind_that_cannot_be_left_out_is_refused() -> None:
-    with pytest.raises(BadInput, match="--leave-out copied: readings of this kind cannot be left out; choose from"):
-        without(at_rest(), ["copied"], "a.csv")
 
 
 def test_every_reading_is_in_the_picture() -> None:

@@ -47,7 +47,7 @@ class RealBench:
         for module in (confirmation, preparation):
             monkeypatch.setattr(module, "open_bench", self._open)
 
-    def _open(self, bench: BenchFile, clock: Any) -> Any:
+    def _open(self, bench: BenchFile, clock: Any, **_wire: Any) -> Any:
         self.opened += 1
         return open_bench(bench, clock, self.world)
 
@@ -236,7 +236,7 @@ def test_a_service_tries_when_it_starts_in_the_background_and_before_it_ends(loc
     service = LabService(store, SystemClock(), runner)
     tried = threading.Semaphore(0)
 
-    def opening(bench: BenchFile, clock: Any) -> Any:
+    def opening(bench: BenchFile, clock: Any, **_wire: Any) -> Any:
         tried.release()
         return open_bench(bench, clock, real.world)
 

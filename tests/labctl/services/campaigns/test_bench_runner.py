@@ -106,7 +106,7 @@ def moves(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     for module in (preparation, recovery, resume):
         real = module.open_bench
 
-        def opening(bench: Any, clock: Any, real: Any = real) -> Any:
+        def opening(bench: Any, clock: Any, real: Any = real, **_wire: Any) -> Any:
             opened.append(bench.name)
             return real(bench, clock)
 

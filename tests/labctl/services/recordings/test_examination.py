@@ -8,9 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from labctl.errors import BadInput
 from labctl.recording import read_recording
 from labctl.services.recordings.examination import inspection_of_file
 from labctl.services.recordings.importers import as_interchange
+from labctl.services.recordings.time_order import refuse_unknown
 from tests.helpers.forked_commands import run_labctl
 
 
@@ -68,3 +70,8 @@ def test_the_commands_say_it(log: Path, tmp_path: Path) -> None:
     answer = json.loads(again.stdout)
     assert answer["warnings"] == []
     assert [each["what"] for each in answer["left_out"]] == ["time_back", "thermometer", "spikes"]
+
+
+def test_a_kind_that_cannot_be_left_out_is_refused() -> None:
+    with pytest.raises(BadInput, match="--leave-out copied: readings of this kind cannot be left out; choose from"):
+        refuse_unknown(["spikes", "copied"])
