@@ -132,7 +132,9 @@ class Engine:
             if isinstance(self.plan.steps[index], Mount):
                 self._executor.skip_mounting(index)
         self._context.added_runs = restart.added_runs
-        self._context.clock_runs = list(restart.clock_runs)
+        self._context.clock_runs = [
+            run for run in restart.clock_runs if run.used
+        ]  # others disagreed, or were interrupted
         self._context.clock_session = 1 + max((run.session for run in restart.clock_runs), default=0)
         self._recorder.change_state(CampaignState.RUNNING, f"resumed at step {start_at + 1}")
         resume_campaign(self._context, self.plan, start_at, restart, self._executor.carry_out)

@@ -148,16 +148,17 @@ def check_home(context: ExecutionContext, step: CheckHome) -> dict[str, float]:
     table = context.bench.table
     if not isinstance(table, OpenLoopTable):
         return {}
-    stalled_s = context.monitor.stalls.total_clock_s()
+    stalls = context.monitor.stalls
+    stalled_s = stalls.total_s()
     found = table.check_home(lambda wait_s: _watched_wait(context, wait_s))
-    stalled_s = context.monitor.stalls.total_clock_s() - stalled_s
+    stalled_s = stalls.total_s() - stalled_s
     if found is not None and found.learning and stalled_s:
         context.recorder.event(warning("home_unchecked", f"home is checked again: {not_run(stalled_s)} meanwhile"))
         found = table.check_home(lambda wait_s: _watched_wait(context, wait_s))
     since, context.unchecked = context.unchecked, []
     if found is None:
         return {}
-    if found.is_missing and stalled_s / found.step_s < found.missed_steps - found.limit_steps:
+    if found.is_missing and stalls.speed * stalled_s / found.step_s < found.missed_steps - found.limit_steps:
         reason = _missing_text(table.name, found, step.temperature_c)
         for number in since:
             context.recorder.journal.dataset_closed(number, DataSetState.PARTIAL, reason)

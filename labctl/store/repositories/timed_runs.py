@@ -22,8 +22,9 @@ def timed_runs(connection: sa.Connection, campaign: int) -> tuple[ClockRun, ...]
 def write_step_clock(
     connection: sa.Connection, campaign: int, measured: Mapping[str, object], factor: Callable[[float], float]
 ) -> None:
-    """Let all runs so far count: correct the rates of the data sets, and state their uncertainty in each recording.
+    """Let the runs of this session count: correct the rates of the data sets, and state their uncertainty.
 
+    Runs of an earlier session that never counted stay so: they disagreed, or the session ended before they were used.
     `measured` replaces what the head of a recording says of that standard; `factor` is by the campaign time of a gate.
     """
     r, t = tables.recordings, tables.timed_runs
@@ -34,7 +35,8 @@ def write_step_clock(
         known = info.get("standards", ())
         standards = [{**each, **measured} if each.get("name") == MEASURED_STEP_CLOCK else each for each in known]
         connection.execute(sa.update(r).where(r.c.id == key).values(info={**info, "standards": standards}))
-    connection.execute(sa.update(t).where(t.c.campaign_id == campaign).values(used=True))
+    session = sa.select(sa.func.max(t.c.session)).where(t.c.campaign_id == campaign).scalar_subquery()
+    connection.execute(sa.update(t).where(t.c.campaign_id == campaign, t.c.session == session).values(used=True))
 
 
 def _correct_rates(connection: sa.Connection, recordings: list[int], factor: Callable[[float], float]) -> None:
