@@ -83,7 +83,11 @@ def test_a_log_that_was_cut_short_is_replayed_to_its_end(tmp_path: Path) -> None
     assert answer.ok
 
 
-@pytest.mark.parametrize("content", [b"", b"no gzip", gzip.compress(b"[]\n"), gzip.compress(b'{"format": "x/1"}\n')])
+@pytest.mark.parametrize(
+    "content",
+    [b"", b"no gzip", gzip.compress(b"[]\n"), gzip.compress(b'{"format": "x/1"}\n')],
+    ids=["empty", "no gzip", "a list", "another format"],  # a compressed file holds the time at which it was made
+)
 def test_a_file_that_is_no_wire_log_is_refused(tmp_path: Path, content: bytes) -> None:
     file = tmp_path / "file"
     file.write_bytes(content)
