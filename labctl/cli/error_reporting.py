@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import typer
 from pydantic import ValidationError
 
-from labctl.cli.interrupts import INTERRUPTED, ignore_signals, signals_restored
+from labctl.cli.interrupts import INTERRUPTED, signals_restored
 from labctl.cli.output import stderr
+from procedures.execution.signals import signals_were_obeyed
 
 if TYPE_CHECKING:
     from labctl.errors import BadFile
@@ -35,7 +36,7 @@ def _errors_as_lines() -> Iterator[None]:
     try:
         yield
     except Stopped as error:
-        ignore_signals()
+        signals_were_obeyed()
         raise _exit(str(error), error.exit_status) from error
     except BadFile as error:
         raise _exit_with_all(error) from error
@@ -56,7 +57,7 @@ def _errors_as_lines() -> Iterator[None]:
             2,
         ) from error
     except KeyboardInterrupt as error:
-        ignore_signals()
+        signals_were_obeyed()
         # a further interrupt, while the work that the first one stopped was being closed, changes nothing
         stopped: BaseException | None = error
         while stopped is not None and not isinstance(stopped, Stopped):

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from types import FrameType
 
-from procedures.execution.signals import ENDING, is_main_thread, restore, signal_handlers
+from procedures.execution.signals import ENDING, restore, signal_handlers, signals_were_obeyed
 
 #: Exit status of an interrupted command: 128 + SIGINT.
 INTERRUPTED = 130
@@ -47,13 +47,6 @@ def signals_restored() -> Iterator[None]:
             restore(before)
 
 
-def ignore_signals() -> None:
-    """Ignore the ending signals from here to the end of `signals_restored`, or of the process: they were obeyed."""
-    if is_main_thread():
-        for number in ENDING:
-            signal.signal(number, signal.SIG_IGN)
-
-
 @contextmanager
 def ending_is_an_interrupt() -> Iterator[None]:
     """Let a request to end (SIGTERM) and a lost terminal (SIGHUP) do what Ctrl-C does: the bench is left safe.
@@ -72,4 +65,4 @@ def ending_is_an_interrupt() -> Iterator[None]:
             yield
         finally:
             if interrupted:
-                ignore_signals()  # a handler that was replaced is not restored at the end of the scope
+                signals_were_obeyed()  # a handler that was replaced is not restored at the end of the scope

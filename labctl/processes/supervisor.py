@@ -293,8 +293,7 @@ class Supervisor:
         if self._place is None or self._end_latched:
             return
         self._end_latched = True
-        user, latch = os_user(), self._place.latch
-        stop = StopRequest.new(user, "signal", f"the service was asked to end ({user})", holds=False)
+        stop, latch = StopRequest.of_service_end(os_user()), self._place.latch
 
         def write() -> None:
             with contextlib.suppress(OSError):

@@ -90,9 +90,7 @@ def _stop_for(settings: WebSettings) -> None:
     bench = settings.request.bench_name
     if bench is None:
         return
-    user = os_user()
-    reason = f"the service was asked to end, and its supervisor stands still ({user})"
-    stop = StopRequest.new(user, "signal", reason, holds=False)
+    stop = StopRequest.of_service_end(os_user())
     place = place_of(settings.request.location, load_bench(bench).name)
 
     def say(text: str) -> None:

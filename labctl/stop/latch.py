@@ -22,6 +22,8 @@ from zlib import crc32
 from instruments.clock import WallClock
 
 NAME = "stops.jsonl"
+#: Why a campaign ends with its service, whichever process ends it.
+SERVICE_STOPS = "the service stops"
 FILE, FOLDER = 0o600, 0o700
 #: The first line while the mark is not set, and the byte that sets it.
 UNMARKED, MARK = b" \n", b"!"
@@ -47,6 +49,11 @@ class StopRequest:
         """Return a request of this moment."""
         at = WallClock().utc().isoformat(timespec="milliseconds")
         return cls(stop_id or uuid4().hex[:16], at, _plain(by[:200]), via, _plain(reason[:500]), campaign, holds)
+
+    @classmethod
+    def of_service_end(cls, by: str) -> StopRequest:
+        """Return the stop of whatever runs on the bench of a service that was asked to end; holds nothing."""
+        return cls.new(by, "signal", SERVICE_STOPS, holds=False)
 
 
 @dataclass(frozen=True)

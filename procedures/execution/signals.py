@@ -34,8 +34,8 @@ def signal_handlers(handlers: Mapping[signal.Signals, Handler]) -> Iterator[None
         yield
     finally:
         for number, earlier in before.items():
-            if earlier is not None and (found := signal.signal(number, earlier)) is not handlers[number]:
-                signal.signal(number, found)
+            if earlier is not None and signal.getsignal(number) is handlers[number]:
+                signal.signal(number, earlier)
 
 
 def restore(handlers: Mapping[signal.Signals, Handler]) -> None:
@@ -45,6 +45,13 @@ def restore(handlers: Mapping[signal.Signals, Handler]) -> None:
     for number, handler in handlers.items():
         if handler is not None:
             signal.signal(number, handler)
+
+
+def signals_were_obeyed() -> None:
+    """Ignore the ending signals from here on, until a scope further out restores its handlers: one was obeyed."""
+    if is_main_thread():
+        for number in ENDING:
+            signal.signal(number, signal.SIG_IGN)
 
 
 def is_main_thread() -> bool:

@@ -157,7 +157,7 @@ def test_sigterm_with_a_frozen_bench_process_leaves_the_table_at_rest_and_says_s
     quiet = len(simulator.heard)
     with running(service.database, "--bench", str(simulator.bench)) as heir:
         found = ended(heir.url, campaign)
-        assert (found["state"], "the service was asked to end" in found["reason"]) == ("aborted", True)
+        assert (found["state"], "the service stops" in found["reason"]) == ("aborted", True)
         assert heir.http.get("/api/benches").json()[0]["stop"] is None  # the end of a service holds nothing
         assert starts_of(simulator, quiet) == []
 

@@ -36,7 +36,7 @@ from labctl.services.schemas.campaigns import (
 )
 from labctl.services.simulation.hidden_effects import with_hidden_effects
 from labctl.services.standards.agreement import with_register
-from labctl.stop.latch import StopRequest
+from labctl.stop.latch import SERVICE_STOPS, StopRequest
 from labctl.store import Store
 from procedures.contracts.campaign_state import ENDED, UNFINISHED, CampaignState
 from procedures.contracts.control import Control
@@ -50,7 +50,6 @@ log = get_logger()
 
 #: How long an abort waits for the safe state before it returns how far the campaign is.
 SAFE_WITHIN_S = 120.0
-STOPS = "the service stops"
 
 
 class BenchRunner:
@@ -176,7 +175,9 @@ class BenchRunner:
 
     def _refuse_unless_free(self) -> None:
         if self._stops:
-            raise BenchBusy(f"bench {self._bench.name}: {STOPS} and starts no campaign; start the service again first")
+            raise BenchBusy(
+                f"bench {self._bench.name}: {SERVICE_STOPS} and starts no campaign; start the service again first"
+            )
         if self._job is not None:
             number = self._job.row.id
             raise BenchBusy(f"bench {self._bench.name} runs campaign {number} now; wait for its end, or abort it")
@@ -190,7 +191,7 @@ class BenchRunner:
         self._job = job
         self.used, self.stops.is_safe = True, False
         if self._stops:  # while the bench was being opened
-            control.abort(STOPS)
+            control.abort(SERVICE_STOPS)
         if stops := self.stop_latch.state.open:
             control.abort(stops[-1].reason)
         job.start(lambda: self._run(job, prepared))
@@ -375,7 +376,7 @@ class BenchRunner:
         """Begin nothing more, and let what runs go to its end in the safe state; returns at once."""
         self._stops = True
         if (job := self._job) is not None:
-            job.control.abort(STOPS)
+            job.control.abort(SERVICE_STOPS)
 
     def close(self) -> None:
         """End what runs, in the safe state, and let the bench go.

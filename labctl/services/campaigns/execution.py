@@ -46,7 +46,7 @@ from procedures.contracts.campaign_state import ENDED
 from procedures.contracts.control import Control
 from procedures.contracts.operator import Operator
 from procedures.execution.engine import Engine
-from procedures.execution.signals import ignore_signals
+from procedures.execution.signals import ignore_signals, signals_were_obeyed
 from procedures.execution.stoppable_clock import stoppable
 from procedures.monitoring.progress import Progress
 
@@ -108,6 +108,7 @@ def _drive(store: Store, prepared: Prepared, engine: Engine) -> CampaignResponse
         try:
             engine.run(prepared.start_at, prepared.restart, lambda: until_reported.enter_context(ignore_signals()))
         except KeyboardInterrupt as interrupt:
+            signals_were_obeyed()  # a later one would tear the database off while it is closed
             raise Stopped(_stopped(store, prepared, engine)) from interrupt
         finally:
             with closing(prepared.bench):

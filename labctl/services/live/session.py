@@ -55,7 +55,9 @@ def run_live(
     finally:
         source.stop()
         spool.close()
-    return Ending(reason, text, assessor.last(calibration))
+    last = assessor.last(calibration)
+    show(last)
+    return Ending(reason, text, last)
 
 
 def _run(
@@ -75,8 +77,7 @@ def _run(
         show(state)
         source.ask(state.request)
         # the state may be older than the readings: what counts is the fit to all of them, as they are stored
-        if state.done and (last := assessor.last(calibration)).done:
-            show(last)
+        if state.done and assessor.last(calibration).done:
             return
 
 
