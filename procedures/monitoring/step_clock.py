@@ -14,7 +14,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import stdtrit
 
 from instruments.interfaces.table import StepClock
 from procedures.contracts.journal import ClockRun
@@ -94,9 +93,11 @@ class MeasuredClock:
         return math.hypot(self.expanded_ppm, 3.0 * self.nominal.u_ppm)
 
 
-def coverage_factor(freedom: int) -> float:
-    """Return the factor of an expanded uncertainty at 95 % (GUM G.3.2, Student's t)."""
-    return float(stdtrit(freedom, 0.5 + CONFIDENCE / 2))
+def coverage_factor(freedom: int, confidence: float = CONFIDENCE) -> float:
+    """Return the factor of an expanded uncertainty, at 95 % by default (GUM G.3.2, Student's t)."""
+    from scipy.special import stdtrit  # noqa: PLC0415  half of the start of a process that times no run
+
+    return float(stdtrit(freedom, 0.5 + confidence / 2))
 
 
 def fitted(runs: Sequence[ClockRun]) -> ClockFit | None:
@@ -152,4 +153,4 @@ def change_ppm(runs: Sequence[ClockRun], session: int) -> tuple[float, float] | 
     change = 1e6 * (now.ratio(now.middle_s) - before.ratio(before.middle_s))
     u_ppm = math.hypot(now.u_ppm(now.middle_s), before.u_ppm(before.middle_s))
     freedom = min(now.freedom, before.freedom)
-    return change, u_ppm * float(stdtrit(freedom, 0.5 + CERTAIN / 2))
+    return change, u_ppm * coverage_factor(freedom, CERTAIN)

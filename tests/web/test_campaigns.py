@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from labctl.services.planning.loading import describe_plan
+from labctl.services.planning.plan_answer import describe_plan
 from tests.helpers.browser import NARROW, Faults, Service
 
 if TYPE_CHECKING:

@@ -109,7 +109,7 @@ def plan(
 ) -> None:
     """Show the steps of a campaign and how long it takes. Nothing moves."""
     from instruments.clock import SystemClock
-    from labctl.services.planning.loading import describe_plan
+    from labctl.services.planning.plan_answer import describe_plan
     from labctl.services.schedule.planned_start import planned_start
     from labctl.services.simulation.visibility import visibility as look
 

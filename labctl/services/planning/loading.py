@@ -1,13 +1,9 @@
-"""From a recipe and a bench to a plan; nothing is opened and nothing moves."""
+"""Recipes and benches by name, path or text, and the plan of one on the other; nothing is opened."""
 
 from __future__ import annotations
 
-import math
 import tomllib
-from collections.abc import Callable
-from datetime import datetime
 from pathlib import Path
-from zoneinfo import ZoneInfo
 
 from pydantic import JsonValue, ValidationError
 
@@ -20,12 +16,8 @@ from instruments.interfaces.table import TableLimits
 from instruments.positions import Position
 from instruments.toml_documents import read_toml_text, shown
 from labctl.errors import BadBench
-from labctl.services.planning.attendance import attendance, visits_s
 from labctl.services.planning.fit_rules import check_fit
-from labctl.services.planning.mountings import misalignment_outlook
-from labctl.services.schemas.plans import PlanResponse, Visibility
 from procedures.contracts.errors import PlanRefused
-from procedures.contracts.steps import Acquire
 from procedures.planning.limits import BenchLimits, missing_instruments
 from procedures.planning.plan import Plan, make_plan
 from procedures.recipe.recipe import Recipe, parse_recipe, read_recipe, shipped_recipes
@@ -35,10 +27,6 @@ USUAL_RESOLUTION_C = 0.1
 #: A key of a bench file that is not known is shown up to here.
 LONGEST_PLACE = 80
 
-
-Look = Callable[[Plan, BenchFile], list[Visibility]]
-#: When a plan would begin, and the time zone of the people at the bench.
-LocalStart = tuple[datetime, ZoneInfo]
 #: End of the name of a shipped bench that simulates the unit of a paper.
 OF_A_PAPER = "-paper-sim"
 
@@ -158,31 +146,3 @@ def plan_for(recipe_source: str, bench_source: str | None, *, clip: bool) -> tup
     check_fit(recipe)
     bench = load_bench(bench_source or bench_for(recipe))
     return make_plan(recipe, limits_of(bench), clip=clip), bench
-
-
-def describe_plan(
-    recipe: str, bench: str | None, *, clip: bool, look: Look | None = None, start: LocalStart | None = None
-) -> PlanResponse:
-    """Say what a campaign would do and how long it takes, as `plan_answer` does."""
-    plan, bench_file = plan_for(recipe, bench, clip=clip)
-    return plan_answer(plan, bench_file, look, start)
-
-
-def plan_answer(
-    plan: Plan, bench_file: BenchFile, look: Look | None = None, start: LocalStart | None = None
-) -> PlanResponse:
-    """Return a plan's figures; `look` also says what it could find, `start` when it needs a person."""
-    return PlanResponse(
-        recipe=plan.recipe.name,
-        bench=bench_file.name,
-        steps=len(plan.steps),
-        datasets=plan.datasets,
-        expected_s=plan.expected_s,
-        verification_datasets=sum(isinstance(step, Acquire) for step in plan.verification_steps),
-        verification_s=math.fsum(step.expected_s for step in plan.verification_steps),
-        clipped=list(plan.clipped),
-        schedule_hash=plan.schedule_hash,
-        misalignment=misalignment_outlook(plan, bench_file, limits_of(bench_file)),
-        visibility=look(plan, bench_file) if look else None,
-        attendance=attendance(visits_s(plan, bench_file), *start) if start else None,
-    )

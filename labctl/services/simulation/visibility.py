@@ -8,7 +8,7 @@ from instruments.bench_config import BenchFile
 from labctl.fitting.criticism import Schedule, effect_visibilities, schedule_of
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.services.cache import UNNAMED, compute
-from labctl.services.planning.loading import LocalStart
+from labctl.services.planning.plan_answer import LocalStart
 from labctl.services.planning.planner import plan_steps
 from labctl.services.schemas.plans import PlannedResponse, PlanRequest, Visibility
 from labctl.services.simulation.walks import walked
