@@ -62,8 +62,8 @@ def service(cluster: Cluster, simulator: Simulator) -> Iterator[ServiceProcess]:
 def abort_of(service: ServiceProcess, campaign: int) -> httpx.Response:
     asked = {"reason": "a hand in the bench", "by": "Ada"}
     answer = service.http.post(f"/api/campaigns/{campaign}/abort", json=asked)
-    # a busy computer may say first that the table is still being stopped
-    assert answer.status_code == 200 or "NOT STOPPED" in answer.json()["detail"], answer.text
+    # 503: it is said how the table is, and that this is not recorded; what counts is what the table hears
+    assert answer.status_code in {200, 503}, answer.text
     return answer
 
 
