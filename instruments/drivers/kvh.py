@@ -14,6 +14,7 @@ from instruments.drivers.driver import GyroDriver, Trial
 from instruments.errors import LimitError, NoReply
 from instruments.interfaces.gyro import Channel, GyroIdentity, GyroLimits, Readings
 from instruments.interfaces.self_checks import StreamPeriod
+from instruments.protocols.byte_lines import split_lines
 from instruments.protocols.kvh_lines import (
     C_PER_COUNT,
     DPS_PER_COUNT,
@@ -171,26 +172,25 @@ class KvhGyro:
         return NoReply(self.name, f"no complete line on {self.settings.port} for {silence_s:.1f} s: {advice}")
 
     def _decode(self, data: bytes) -> Readings:
-        pieces = (self._unfinished + data).split(b"\n")
-        self._unfinished = pieces.pop()[-MAX_LINE_BYTES:]
+        pieces, behind, self._unfinished = split_lines(self._unfinished + data, MAX_LINE_BYTES)
         if pieces and not self._in_line:
-            pieces.pop(0)  # the first line after opening is usually cut
+            pieces, behind = pieces[1:], behind[1:]  # the first line after opening is usually cut
             self._in_line = True
-        stripped = [piece.strip(b"\r") for piece in pieces]
-        lines = [self._parse(piece) for piece in stripped if piece]
+        lines = [self._parse(piece) if piece else None for piece in pieces]
         good = [line for line in lines if line is not None]
-        damaged = len(lines) - len(good)
+        damaged = sum(map(bool, pieces)) - len(good)
         codes = np.asarray([self._counts(line) for line in good], dtype=np.int64).reshape(-1, len(self.channels))
         raw = {channel.name: codes[:, i] for i, channel in enumerate(self.channels)}
         if not good:
-            return Readings(np.zeros(0), raw, np.zeros(0, dtype=bool), 0, damaged)
+            return Readings(np.zeros(0), raw, np.zeros(0, dtype=bool), 0, damaged, arrival_s=np.zeros(0))
         came = self._stream.last
         advance = np.ones(len(good), dtype=np.int64)
         advance[0] += damaged  # a damaged line has taken its sampling period too
         times, lost = self._time.times(advance, came.now_s, newest_s=came.newest_s, width_s=came.width_s)
         refuse_other_rate(self.name, self.settings.port, self._time.line)
         valid = np.asarray([line.flag and abs(line.rate) <= self._limit_counts for line in good])
-        return Readings(times, raw, valid, lost, damaged)
+        arrival_s = self._stream.arrival_s(behind[[line is not None for line in lines]])
+        return Readings(times, raw, valid, lost, damaged, arrival_s=arrival_s)
 
     def _parse(self, piece: bytes) -> Line | None:
         line = parse_line(piece.decode("latin-1"), self._pattern, self._length)

@@ -35,6 +35,7 @@ from instruments.protocols.stim300.frames import (
 )
 from instruments.protocols.stim300.settings import Stim300Settings
 from instruments.transport.adapters import require_adapter
+from instruments.transport.device_time import DeviceTime
 from instruments.transport.factory import Ports
 from instruments.transport.sample_counter import SampleCounter
 from instruments.transport.sample_timing import FRESH_PERIODS, StreamTime, refuse_other_rate
@@ -81,6 +82,7 @@ class Stim300:
             self.name, settings.port, step=round(COUNTS_PER_S / self.sample_rate_hz), wrap=COUNTER_WRAP
         )
         self._time = StreamTime(1.0 / self.sample_rate_hz, 0.0, OF_A_CRYSTAL)
+        self._device_time = DeviceTime(1.0 / COUNTS_PER_S, COUNTER_WRAP)
         self._last_frame_s = 0.0
         self._set: Configuration | None = None  # as the unit says
         self._serial: str | None = None
@@ -119,6 +121,7 @@ class Stim300:
         self._discard()
         self._last_frame_s = self._clock.now_s()
         self._time = StreamTime(1.0 / self.sample_rate_hz, self._last_frame_s, OF_A_CRYSTAL)
+        self._device_time = DeviceTime(1.0 / COUNTS_PER_S, COUNTER_WRAP)
 
     def read(self, duration_s: float) -> Readings:
         """Get every reading of the next `duration_s` seconds; fewer where the stream has gaps.
@@ -253,16 +256,16 @@ class Stim300:
         self._unfinished = found.rest
         for special in found.specials:
             self._hear(special)
-        frames, layout = found.frames, self.layout
+        frames, layout, behind = found.frames, self.layout, found.behind
         damaged = found.damaged
         if len(frames):
             new = self._counter.is_new(frames[:, layout.counter].astype(np.int64), frames)
             if not new.all():
-                frames, damaged = frames[new], damaged + len(new) - int(new.sum())
+                frames, behind, damaged = frames[new], behind[new], damaged + len(new) - int(new.sum())
         if len(frames) == 0:
             return Readings(
                 np.zeros(0), {c.name: np.zeros(0, dtype=np.int64) for c in self.channels}, np.zeros(0, bool), 0,
-                damaged,
+                damaged, np.zeros(0), np.zeros(0),
             )  # fmt: skip
         rates = int24(frames, 1).astype(np.int64)
         status = frames[:, layout.status].astype(np.int64)
@@ -274,8 +277,10 @@ class Stim300:
             raw |= {f"temperature_{axis}_c": warm[:, AXES.index(axis)] for axis in self.axes}
             valid &= (frames[:, layout.temperature_status] & BAD_STATUS) == 0
         raw["status"] = status
-        times, lost = self._times(frames[:, layout.counter].astype(np.int64))
-        return Readings(times, raw, valid, lost, damaged)
+        counter = frames[:, layout.counter].astype(np.int64)
+        times, lost = self._times(counter)
+        arrival_s = self._stream.arrival_s(behind)
+        return Readings(times, raw, valid, lost, damaged, self._device_time.of(counter, times), arrival_s)
 
     def _times(self, counter: NDArray[np.int64]) -> tuple[NDArray[np.float64], int]:
         """Return the clock times of frames, (n,) s, and the number of frames missing by counter and by clock."""

@@ -11,9 +11,10 @@ from instruments.errors import NoReply
 from instruments.interfaces.gyro import Channel, GyroIdentity, GyroLimits, Readings
 from instruments.protocols.stream_formats.frames import FrameDecoder
 from instruments.protocols.stream_formats.lines import LineDecoder
-from instruments.protocols.stream_formats.readings import Decoded, Decoder, scale_of
+from instruments.protocols.stream_formats.readings import Decoded, Decoder, StampTicks, scale_of, stamp_ticks
 from instruments.protocols.stream_formats.settings import StreamSettings
 from instruments.transport.adapters import require_adapter
+from instruments.transport.device_time import DeviceTime
 from instruments.transport.factory import Ports
 from instruments.transport.sample_counter import SampleCounter
 from instruments.transport.sample_timing import FRESH_PERIODS, StreamTime, refuse_other_rate
@@ -46,7 +47,9 @@ class StreamFormatGyro:
             line=line_of(settings.options),
         )  # fmt: skip
         self._counter = self._new_counter()
+        self._stamp: int | None = None  #: time stamp of the newest reading
         self._time = StreamTime(1.0 / self.sample_rate_hz, 0.0)
+        self._device_time = self._new_device_time()
         self._last_s = 0.0
 
     @property
@@ -78,6 +81,7 @@ class StreamFormatGyro:
         for text in self._format.start:
             self._stream.write(text.encode("latin-1"))
         self._counter = self._new_counter()
+        self._device_time = self._new_device_time()
         self._discard()
         self._last_s = self._clock.now_s()
         self._time = StreamTime(1.0 / self.sample_rate_hz, self._last_s)
@@ -123,9 +127,18 @@ class StreamFormatGyro:
             return None
         return SampleCounter(self.name, self.settings.port, step=given.step, wrap=given.wrap)
 
+    def _new_device_time(self) -> DeviceTime | None:
+        """Return the unit's own time: by its time stamps, or by its counter; None without either."""
+        if (ticks := stamp_ticks(self._format)) is not None:
+            return DeviceTime(ticks.tick_s, ticks.wrap)
+        if (given := self._format.counter) is not None:
+            return DeviceTime(1.0 / (self.sample_rate_hz * given.step), given.wrap)
+        return None
+
     def _discard(self) -> None:
         self._stream.discard_input()
         self._decoder.drop()
+        self._stamp = None
         if self._counter is not None:
             self._counter.drop()
         self._time.drop()
@@ -145,7 +158,8 @@ class StreamFormatGyro:
         raw = {each.name: found.values[each.name][kept] for each in self._fields}
         valid = found.valid[kept]
         if not len(valid):
-            return Readings(np.zeros(0), raw, valid, 0, damaged)
+            device_s = None if self._device_time is None else np.zeros(0)
+            return Readings(np.zeros(0), raw, valid, 0, damaged, device_s, np.zeros(0))
         advance = self._advance(found, kept)
         came = self._stream.last
         turn = 0 if self._counter is None else self._counter.readings_per_turn
@@ -153,16 +167,38 @@ class StreamFormatGyro:
             advance, came.now_s, turn, newest_s=came.newest_s, width_s=came.width_s
         )  # fmt: skip
         refuse_other_rate(self.name, self.settings.port, self._time.line)
-        lost = uncounted if self._counter is None else int(advance.sum()) - len(advance) + uncounted
-        return Readings(times, raw, valid, lost, damaged)
+        counts = self._counter is not None or self._format.time is not None
+        lost = int(advance.sum()) - len(advance) + uncounted if counts else uncounted
+        device_s = self._device_s(found, kept, times)
+        return Readings(times, raw, valid, lost, damaged, device_s, self._stream.arrival_s(found.behind[kept]))
+
+    def _device_s(
+        self, found: Decoded, kept: NDArray[np.bool_], t_s: NDArray[np.float64]
+    ) -> NDArray[np.float64] | None:
+        """Return the times (n,) of readings by the unit's own clock, s; None where it tells none."""
+        told = self._format.time or self._format.counter
+        if self._device_time is None or told is None:
+            return None
+        return self._device_time.of(found.values[told.field][kept], t_s)
 
     def _advance(self, found: Decoded, kept: NDArray[np.bool_]) -> NDArray[np.int64]:
         """Return how many periods each reading, (n,), is from the one before."""
         if self._counter is not None and self._format.counter is not None:
             return self._counter.advance(found.values[self._format.counter.field][kept])
+        if (ticks := stamp_ticks(self._format)) is not None:
+            return self._advance_by_time(found.values[ticks.field], ticks)
         advance = np.ones(len(found), dtype=np.int64)
         advance[0] += found.damaged  # a damaged message has taken its sampling period too
         return advance
+
+    def _advance_by_time(self, stamps: NDArray[np.int64], ticks: StampTicks) -> NDArray[np.int64]:
+        """Return how many periods each reading, (n,), is from the one before by its time stamp, at least 1."""
+        period = 1.0 / (self.sample_rate_hz * ticks.tick_s)
+        moved = np.diff(stamps, prepend=stamps[0] - round(period) if self._stamp is None else self._stamp)
+        if ticks.wrap is not None:
+            moved %= ticks.wrap
+        self._stamp = int(stamps[-1])
+        return np.maximum(np.rint(moved / period), 1.0).astype(np.int64)
 
 
 DRIVER = GyroDriver(

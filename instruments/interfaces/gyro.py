@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -33,13 +33,28 @@ class Readings:
     valid: NDArray[np.bool_]  #: (n,) False where the instrument marked the reading as bad
     lost: int = 0  #: readings missing by the counter of the device or by the clock
     damaged: int = 0  #: frames or lines that arrived malformed (CRC, framing)
+    #: (n,) time by the device's own clock, from its counter or time stamp, in its seconds from its own zero; None: the
+    #: device has none. A gyro gives it for all of its readings or for none, and so `arrival_s`.
+    device_s: NDArray[np.float64] | None = None
+    arrival_s: NDArray[np.float64] | None = None  #: (n,) clock time at which the last byte of each had arrived
 
     def __len__(self) -> int:
         return len(self.t_s)
 
     def newest(self) -> Readings:
         """Return the last reading alone, n = 1, without the counts of lost and damaged ones."""
-        return Readings(self.t_s[-1:], {name: values[-1:] for name, values in self.raw.items()}, self.valid[-1:])
+        return replace(self.only(slice(-1, None)), lost=0, damaged=0)
+
+    def only(self, which: slice | NDArray[np.bool_]) -> Readings:
+        """Return some of the readings, by a slice or a mask (n,), with the counts of lost and damaged ones."""
+        return replace(
+            self,
+            t_s=self.t_s[which],
+            raw={name: values[which] for name, values in self.raw.items()},
+            valid=self.valid[which],
+            device_s=None if self.device_s is None else self.device_s[which],
+            arrival_s=None if self.arrival_s is None else self.arrival_s[which],
+        )
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import NoReturn
 
+import numpy as np
+from numpy.typing import NDArray
+
 from instruments.clock import Clock, sleep_until
 from instruments.errors import LinkError
 from instruments.protocols.serial_options import SerialOptions
@@ -43,6 +46,7 @@ class SerialStream:
         self._port: SerialPort | None = None
         self._reader: StreamReader | None = None
         self.last = Received(b"", clock.now_s())  #: what was read last: its time is that of the bytes returned last
+        self._pieces: list[tuple[int, float]] = []  #: of what `read_for` or `read_available` returned last
         self.unused = 0  #: bytes that came since the last reading; the driver sets it to 0
 
     @property
@@ -86,13 +90,33 @@ class SerialStream:
 
     def read_available(self) -> bytes:
         """Return the bytes that have arrived, without waiting; raises LinkError."""
+        self._pieces.clear()
+        return self._read()
+
+    def arrival_s(self, behind: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Return when the bytes that were read last arrived, clock time (n,).
+
+        `behind` (n,) is how many bytes arrived after each. Bytes that arrived together have one time, that of the last.
+        """
+        if not self._pieces:
+            return np.full(len(behind), self.last.now_s)
+        sizes, times = np.array(self._pieces[::-1], dtype=np.float64).T
+        piece = np.searchsorted(np.cumsum(sizes), behind, side="right")
+        return np.asarray(times[np.minimum(piece, len(times) - 1)], dtype=np.float64)
+
+    def _read(self) -> bytes:
+        """Return the bytes that have arrived, and note their times; raises LinkError."""
         reader = self._reading()
         try:
             self.last = reader.take()
         except BROKEN as error:
             self._fail(error)
-        self.unused += len(self.last.data)
-        return self.last.data
+        last = self.last
+        self.unused += len(last.data)
+        if last.data:
+            came_s = last.now_s if last.newest_s is None else last.newest_s
+            self._pieces += last.pieces or [(len(last.data), came_s)]
+        return last.data
 
     def advice(self, sent_as: str) -> str:
         """Return what came where a reading should have, and what to check; `sent_as` names what readings depend on."""
@@ -107,9 +131,10 @@ class SerialStream:
         """
         end_s = self._clock.now_s() + duration_s
         data = b""
+        self._pieces.clear()
         while True:
             sleep_until(self._clock, min(self._clock.now_s() + every_s, end_s))
-            data += self.read_available()
+            data += self._read()
             if self._clock.now_s() >= end_s - TINY_S:
                 return data
 

@@ -16,6 +16,8 @@ from instruments.transport.serial import BROKEN, SerialPort, StampingPort
 ADAPTER_HOLDS_S = 0.016
 #: Bytes that the thread keeps for a reader that does not come; the oldest go first.
 KEPT_BYTES = 1 << 22
+#: Times of arrival that are kept of these: the older bytes count as arrived with the oldest piece.
+KEPT_PIECES = 1 << 16
 JOIN_S = 2.0
 
 
@@ -26,6 +28,8 @@ class Received(NamedTuple):
     now_s: float  #: clock time at which the newest byte was there
     newest_s: float | None = None  #: where that is known better: the newest came within `width_s` before this
     width_s: float | None = None  #: None: since the reading before
+    #: Where the bytes arrived in pieces: the number of bytes of each, and when it was there. Empty: all at once.
+    pieces: tuple[tuple[int, float], ...] = ()
 
 
 class StreamReader(Protocol):
@@ -82,6 +86,7 @@ class ThreadedReader:
         self._port, self._clock = port, clock
         self._lock = threading.Lock()
         self._unread = bytearray()
+        self._pieces: list[tuple[int, float]] = []  #: of the unread bytes
         self._came_s = clock.now_s()
         self._broken: Exception | None = None
         self._closing = threading.Event()
@@ -94,10 +99,11 @@ class ThreadedReader:
             self._empty()
             if self._broken is not None:
                 raise self._broken
-            data, came_s = bytes(self._unread), self._came_s
+            data, came_s, pieces = bytes(self._unread), self._came_s, tuple(self._pieces)
             self._unread.clear()
+            self._pieces.clear()
         width_s = ADAPTER_HOLDS_S / self._clock.wall_s(1.0)
-        return Received(data, came_s, came_s, width_s)
+        return Received(data, came_s, came_s, width_s, pieces)
 
     def discard(self) -> None:
         """Drop everything that has come; raises an error of `BROKEN`."""
@@ -106,6 +112,7 @@ class ThreadedReader:
                 raise self._broken
             self._port.reset_input_buffer()
             self._unread.clear()
+            self._pieces.clear()
 
     def close(self) -> None:
         """End the thread; safe to call twice."""
@@ -134,4 +141,7 @@ class ThreadedReader:
         if data:
             self._unread += data
             self._came_s = self._clock.now_s()
-            del self._unread[:-KEPT_BYTES]
+            self._pieces.append((len(data), self._came_s))
+            if len(self._unread) > KEPT_BYTES:
+                del self._unread[:-KEPT_BYTES]
+                del self._pieces[:-KEPT_PIECES]

@@ -30,6 +30,10 @@ RECORDING, WITHIN_S, OWN_DATASET = "recording", "recording_t_s", "recording_data
 #: Column of the data sets that no fit takes in.
 VERIFICATION = "verification"
 
+#: Times of a reading beside `t_s`, which is computed from them: no quantity that is measured.
+DEVICE_S, ARRIVAL_S = "device_s", "arrival_s"
+READING_TIMES = frozenset({DEVICE_S, ARRIVAL_S})
+
 _BOTH = frozenset({"samples", "points"})
 _ON_TABLE: frozenset[Motion] = frozenset({"rates", "profile"})
 _IN_POSES: frozenset[Motion] = frozenset({"poses"})
@@ -37,6 +41,8 @@ _IN_POSES: frozenset[Motion] = frozenset({"poses"})
 COLUMNS = (
     Column("dataset", "integer", "", "number of the data set", _BOTH),
     Column("t_s", "number", "s", "time since started_at", frozenset({"samples"})),
+    Column(DEVICE_S, "number", "s", "time by the unit's own clock, from its own zero"),
+    Column(ARRIVAL_S, "number", "s", "time since started_at at which the reading had arrived"),
     Column("position", "text", "", "body axis along the table axis, with its sign"),
     Column("run", "integer", "", "powered session"),
     Column("mounting", "integer", "", "number of the mounting: increases each time the unit is mounted again"),

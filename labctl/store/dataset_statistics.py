@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.recording.columns import VERIFICATION
+from labctl.recording.columns import READING_TIMES, VERIFICATION
 from labctl.recording.spread import LEAST_FOR_SPECTRUM, white_std
 
 #: Columns that are no measured channel, so have no mean of their own.
@@ -24,6 +24,7 @@ NOT_CHANNELS = frozenset(
         "power_s",
         "valid",
         VERIFICATION,
+        *READING_TIMES,
     }
 )
 

@@ -273,10 +273,8 @@ def cut(readings: Readings, gate: tuple[float, float], time: CampaignTime) -> Re
     """Return the readings inside the gate [from, until) with their times in campaign time; both in clock seconds."""
     t_s = readings.t_s
     if len(t_s) and gate[0] <= t_s[0] and t_s[-1] < gate[1]:
-        return Readings(time.of(t_s), readings.raw, readings.valid, readings.lost, readings.damaged)
-    inside = (t_s >= gate[0]) & (t_s < gate[1])
-    raw = {channel: values[inside] for channel, values in readings.raw.items()}
-    return Readings(time.of(t_s[inside]), raw, readings.valid[inside], readings.lost, readings.damaged)
+        return time.of_readings(readings)
+    return time.of_readings(readings.only((t_s >= gate[0]) & (t_s < gate[1])))
 
 
 def _demand_readings(counts: dict[str, ReadingCounts]) -> None:

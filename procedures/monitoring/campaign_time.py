@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from instruments.clock import Clock
+from instruments.interfaces.gyro import Readings
 
 TimeT = TypeVar("TimeT", float, NDArray[np.float64])
 
@@ -36,3 +38,8 @@ class CampaignTime:
     def of(self, clock_s: TimeT) -> TimeT:
         """Return the campaign time in s of a clock time, or of an array of them."""
         return clock_s - self._zero_s
+
+    def of_readings(self, readings: Readings) -> Readings:
+        """Return readings with their times, and those of their arrival, in campaign time."""
+        arrival_s = None if readings.arrival_s is None else self.of(readings.arrival_s)
+        return replace(readings, t_s=self.of(readings.t_s), arrival_s=arrival_s)

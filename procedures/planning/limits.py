@@ -26,15 +26,16 @@ class BenchLimits:
     chamber: ChamberLimits | None
     gyros: Mapping[str, GyroLimits]
     achievable_dps: Callable[[float], float] | None = None  #: the rate a table would really run (step quantisation)
+    needs_person: bool = True  #: whether a person turns the units; a unit handler takes no time that a plan counts
 
     @classmethod
-    def of(cls, bench: Bench) -> BenchLimits:
-        """Return the limits of an opened bench."""
+    def of(cls, bench: Bench, *, needs_person: bool = True) -> BenchLimits:
+        """Return the limits of an opened bench; `needs_person` as its file says (`BenchFile.needs_person`)."""
         units = {name: gyro.limits for name, gyro in bench.gyros.items()}
         chamber = None if bench.chamber is None else bench.chamber.limits
         if bench.table is None:
-            return cls(None, chamber, units)
-        return cls(bench.table.limits, chamber, units, bench.table.achievable_dps)
+            return cls(None, chamber, units, needs_person=needs_person)
+        return cls(bench.table.limits, chamber, units, bench.table.achievable_dps, needs_person)
 
     @property
     def max_acceleration_dps2(self) -> float:

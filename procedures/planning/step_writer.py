@@ -30,13 +30,13 @@ CHAMBER_SETTLING_S = 300.0  #: from the end of the ramp until the air is in the 
 HOMING_S = 30.0
 CHECK_S = 10.0  #: back to home by counted steps, and the homing
 CLOCK_SHORT_S = 10.0  #: steady part of the shorter run that measures the step clock
-MOUNTING_S = 600.0  #: a person walks up, turns the units and confirms
+MOUNTING_S = 600.0  #: a person walks up, turns the units and confirms; a unit handler takes no time
 
 
 def write_steps(recipe: Recipe, limits: BenchLimits) -> tuple[Step, ...]:
     """Return the steps of a recipe that fits its bench, in order."""
     if recipe.turns is not None:
-        return tuple(turn_steps(recipe, recipe.turns))
+        return tuple(turn_steps(recipe, recipe.turns, needs_person=limits.needs_person))
     writer = _StepWriter(recipe, limits)
     writer.write()
     return tuple(writer.steps)
@@ -101,7 +101,9 @@ class _StepWriter:
 
     def measure_clock_again(self) -> None:
         """Time it again where the last time was long ago."""
-        if math.fsum(step.expected_s for step in self.steps[self.timed_at :]) >= BLOCK_EVERY_S:
+        since = self.steps[self.timed_at :]
+        # as if a person mounted the units: what is done does not depend on who does
+        if math.fsum(MOUNTING_S if isinstance(step, Mount) else step.expected_s for step in since) >= BLOCK_EVERY_S:
             self.measure_clock(LATER_RUNS)
 
     def check_home(self, level: Level) -> None:
@@ -121,7 +123,8 @@ class _StepWriter:
         self.position = block.position
         self.mounting += 1
         next_run = self.run + 1 if repower else self.run
-        mount = Mount(position=block.position, mounting=self.mounting, run=next_run, expected_s=MOUNTING_S)
+        expected_s = MOUNTING_S if self.limits.needs_person else 0.0
+        mount = Mount(position=block.position, mounting=self.mounting, run=next_run, expected_s=expected_s)
         self.steps.append(mount)
         if repower:
             self.power_on()

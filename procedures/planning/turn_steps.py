@@ -14,15 +14,19 @@ PLACING_S, READING_S, HAND_DPS = 30.0, 10.0, 90.0
 DATA_SETS_OF_TURN = 3
 
 
-def turn_steps(recipe: Recipe, rules: TurnRules) -> Iterator[Step]:
-    """Yield the steps in order, with the time that each is expected to take."""
+def turn_steps(recipe: Recipe, rules: TurnRules, *, needs_person: bool = True) -> Iterator[Step]:
+    """Yield the steps in order, with the time that each is expected to take.
+
+    `needs_person`: a person places the units, which takes time.
+    """
+    placing_s = PLACING_S if needs_person else 0.0
     run, turn = 0, 0
     for mounting, position in enumerate(recipe.positions, start=1):
         again = run == 0 or recipe.mounting.repower_each
         if run and again:
             yield PowerOff(run=run)
         run += int(again)
-        yield Mount(position=position, mounting=mounting, run=run, expected_s=PLACING_S)
+        yield Mount(position=position, mounting=mounting, run=run, expected_s=placing_s)
         if again:
             yield PowerOn(run=run, wait_s=recipe.warm_up_s, expected_s=recipe.warm_up_s)
         for turn_deg in rules.turns_deg * rules.repeats:

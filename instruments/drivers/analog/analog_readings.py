@@ -85,7 +85,8 @@ class AnalogReadings:
         groups, sums, valid = self._means.add(numbers, codes, good)
         if not len(groups):
             none = np.zeros(0, dtype=np.int64)
-            return Readings(np.zeros(0), dict.fromkeys(self._names, none), np.zeros(0, dtype=bool), 0, damaged)
+            no_time, no_flag = np.zeros(0), np.zeros(0, dtype=bool)
+            return Readings(no_time, dict.fromkeys(self._names, none), no_flag, 0, damaged, no_time)
         advance = np.diff(groups, prepend=groups[0] - 1 if self._newest is None else self._newest)
         self._newest = int(groups[-1])
         ahead_s = (int(numbers[-1]) - (self._newest + 1) * self._options.average + 1) / self._scans_per_s
@@ -96,4 +97,5 @@ class AnalogReadings:
         )
         refuse_other_rate(self.name, self._address, self._time.line)
         raw = {name: sums[:, n] for n, name in enumerate(self._names)}
-        return Readings(times, raw, valid, int(advance.sum() - len(advance)) + uncounted, damaged)
+        device_s = ((groups + 1) * self._options.average - 1) / self._scans_per_s  # of the last scan of each reading
+        return Readings(times, raw, valid, int(advance.sum() - len(advance)) + uncounted, damaged, device_s)

@@ -19,7 +19,7 @@ from instruments.toml_documents import read_toml
 FORMAT = "labctl-stream/1"
 Name = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]{0,40}$")]
 ByteOrder = Literal["big", "little"]
-FieldType = Literal["u8", "i8", "u16", "i16", "u24", "i24", "u32", "i32", "f32", "f64"]
+FieldType = Literal["u8", "i8", "u16", "i16", "u24", "i24", "u32", "i32", "u64", "f32", "f64"]
 #: A decimal number is counted in steps of this, in the field's unit, unless the format gives another resolution.
 DECIMAL_STEP = 1e-6
 #: So is a binary floating-point number: a power of two, so that a float of 24 bits at or above 2**-17 stays exact.
@@ -127,6 +127,14 @@ class Counter(Strict):
     wrap: int = Field(gt=1)  #: it begins again at 0 after this minus 1
 
 
+class TimeStamp(Strict):
+    """The field that holds the time by the device's own clock."""
+
+    field: str
+    tick_s: float = Field(gt=0)  #: s of one unit of the number in the message
+    wrap: int | None = Field(default=None, gt=1)  #: the number begins again at 0 after this minus 1
+
+
 class LineLayout(Strict):
     """Lines of decimal numbers."""
 
@@ -200,6 +208,7 @@ class StreamFormat(Strict):
     line: LineLayout | None = None
     frame: FrameLayout | None = None
     counter: Counter | None = None
+    time: TimeStamp | None = None
 
     @property
     def fields(self) -> tuple[StreamField, ...]:
@@ -229,6 +238,8 @@ class StreamFormat(Strict):
             raise ValueError(f"field {silent[0]} has no unit; add one like unit = 'rad/s'")
         if self.counter is not None and self.counter.field not in names:
             raise ValueError(f"counter: no field is named {self.counter.field!r}; choose one of {', '.join(names)}")
+        if self.time is not None and self.time.field not in names:
+            raise ValueError(f"time: no field is named {self.time.field!r}; choose one of {', '.join(names)}")
         return self
 
 

@@ -16,7 +16,7 @@ from instruments.protocols.stream_formats.document import (
 )
 from instruments.protocols.stream_formats.readings import step_of
 
-_CODES = {"u8": "B", "i8": "b", "u16": "H", "i16": "h", "u32": "I", "i32": "i", "f32": "f", "f64": "d"}
+_CODES = {"u8": "B", "i8": "b", "u16": "H", "i16": "h", "u32": "I", "i32": "i", "u64": "Q", "f32": "f", "f64": "d"}
 
 
 def message(format_: StreamFormat, numbers: Mapping[str, int]) -> bytes:

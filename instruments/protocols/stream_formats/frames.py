@@ -5,6 +5,8 @@ Frames of one length nearly always follow each other, so that they are checked a
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -41,11 +43,14 @@ class FrameScanner:
         """Forget the unfinished frame; bytes before the next intact one are no damage."""
         self._unfinished, self._in_step, self._skipped = b"", False, 0
 
-    def feed(self, new: bytes) -> tuple[list[Bytes], int]:
-        """Return the intact frames in blocks (n, length) of equal length, and the damage in numbers of frames."""
+    def feed(self, new: bytes) -> tuple[list[tuple[Bytes, Whole]], int]:
+        """Return the intact frames in blocks (n, length) of equal length, and the damage in numbers of frames.
+
+        Beside each block is how many bytes arrived after each of its frames (n,).
+        """
         data = self._unfinished + new
         raw = np.frombuffer(data, dtype=np.uint8)
-        blocks: list[Bytes] = []
+        blocks: list[tuple[Bytes, Whole]] = []
         at = between = 0
         while True:
             start = data.find(self._sync, at)
@@ -64,7 +69,8 @@ class FrameScanner:
                 at += 1
                 continue
             between, self._skipped = between + self._skipped * self._in_step, 0
-            blocks.append(raw[at : at + good * length].reshape(good, length))
+            frames = raw[at : at + good * length].reshape(good, length)
+            blocks.append((frames, len(data) - at - length * np.arange(1, good + 1)))
             self._typical, self._in_step = length, True
             at += good * length
         if self._skipped >= 2 * self._typical:  # nothing fits any more: say so without waiting for a whole frame
@@ -122,6 +128,14 @@ def raw_numbers(frames: Bytes, offset: int, field: BytesField, order: str) -> tu
     return values.astype(np.int64), np.ones(len(frames), dtype=bool)
 
 
+class _Part(NamedTuple):
+    """Readings of frames of one structure: field -> (n,); which are numbers (n,); bytes after each frame (n,)."""
+
+    values: dict[str, Whole]
+    good: Mask
+    behind: Whole
+
+
 class FrameDecoder:
     """Decodes the frames of a format."""
 
@@ -138,21 +152,22 @@ class FrameDecoder:
     def feed(self, data: bytes) -> Decoded:
         """Return the readings of every frame that is whole now."""
         blocks, damaged = self._scanner.feed(data)
-        parts = [part for block in blocks for part in self._decoded(block)]
+        parts = [part for frames, behind in blocks for part in self._decoded(frames, behind)]
         names = [field.name for field in self._layout.fields]
         empty = np.zeros(0, dtype=np.int64)
-        values = {name: np.concatenate([empty, *(numbers[name] for numbers, _ in parts)]) for name in names}
-        good = np.concatenate([np.zeros(0, dtype=bool), *(fits for _, fits in parts)])
-        return Decoded(values, flags(self._format, values, good), damaged)
+        values = {name: np.concatenate([empty, *(part.values[name] for part in parts)]) for name in names}
+        good = np.concatenate([np.zeros(0, dtype=bool), *(part.good for part in parts)])
+        behind = np.concatenate([empty, *(part.behind for part in parts)])
+        return Decoded(values, flags(self._format, values, good), behind, damaged)
 
-    def _decoded(self, frames: Bytes) -> list[tuple[dict[str, Whole], Mask]]:
+    def _decoded(self, frames: Bytes, behind: Whole) -> list[_Part]:
         """Return the numbers of consecutive frames of one length, in parts of equal structure; others are dropped."""
         parts = []
         while len(frames):
             n, items = self._alike(frames)
-            if (part := self._part(frames[:n], items)) is not None:
+            if (part := self._part(frames[:n], behind[:n], items)) is not None:
                 parts.append(part)
-            frames = frames[n:]
+            frames, behind = frames[n:], behind[n:]
         return parts
 
     def _alike(self, frames: Bytes) -> tuple[int, dict[int, int]]:
@@ -172,8 +187,8 @@ class FrameDecoder:
             at = data + int.from_bytes(first[at + id_size : data], self._layout.byte_order)
         return (len(frames) if same.all() else int(np.argmin(same))), offsets
 
-    def _part(self, frames: Bytes, items: dict[int, int]) -> tuple[dict[str, Whole], Mask] | None:
-        """Return the numbers of frames of one structure, and which readings are numbers; None for other messages."""
+    def _part(self, frames: Bytes, behind: Whole, items: dict[int, int]) -> _Part | None:
+        """Return the readings of frames of one structure; None for other messages."""
         values: dict[str, Whole] = {}
         good = np.ones(len(frames), dtype=bool)
         is_reading = np.ones(len(frames), dtype=bool)
@@ -191,4 +206,5 @@ class FrameDecoder:
             values[field.name] = numbers
             if field.hold:
                 self._held[field.name] = int(numbers[-1])
-        return {name: each[is_reading] for name, each in values.items()}, good[is_reading]
+        kept = {name: each[is_reading] for name, each in values.items()}
+        return _Part(kept, good[is_reading], behind[is_reading])

@@ -6,6 +6,7 @@ from enum import Enum
 
 import numpy as np
 
+from instruments.protocols.byte_lines import split_lines
 from instruments.protocols.stream_formats.checksums import algorithm
 from instruments.protocols.stream_formats.document import LineLayout, StreamFormat
 from instruments.protocols.stream_formats.readings import Decoded, flags, step_of, whole_numbers
@@ -36,13 +37,11 @@ class LineDecoder:
 
     def feed(self, data: bytes) -> Decoded:
         """Return the readings of every line that is whole now."""
-        pieces = (self._unfinished + data).split(b"\n")
-        self._unfinished = pieces.pop()[-LONGEST_LINE:]
+        pieces, behind, self._unfinished = split_lines(self._unfinished + data, LONGEST_LINE)
         if pieces and not self._in_line:
-            del pieces[0]
+            pieces, behind = pieces[1:], behind[1:]
             self._in_line = True
-        stripped = [piece.strip(b"\r") for piece in pieces]
-        found = [self._numbers(piece) for piece in stripped if piece]
+        found = [self._numbers(piece) if piece else _Not.OTHER_MESSAGE for piece in pieces]
         rows = [each for each in found if isinstance(each, list)]
         numbers = np.asarray(rows, dtype=np.float64).reshape(-1, len(self._columns)).T
         good = np.ones(len(rows), dtype=bool)
@@ -50,7 +49,8 @@ class LineDecoder:
         for field, column, step in zip(self._layout.fields, numbers, self._steps, strict=True):
             values[field.name], fits = whole_numbers(column, step)
             good &= fits
-        return Decoded(values, flags(self._format, values, good), found.count(_Not.DAMAGED))
+        after = behind[[isinstance(each, list) for each in found]]
+        return Decoded(values, flags(self._format, values, good), after, found.count(_Not.DAMAGED))
 
     def _numbers(self, line: bytes) -> list[float] | _Not:
         """Return the numbers of the fields of one line, or why it has none."""

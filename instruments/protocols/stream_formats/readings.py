@@ -31,12 +31,24 @@ class Scale(NamedTuple):
     offset: float
 
 
+class StampTicks(NamedTuple):
+    """Time stamps as whole numbers: one is `tick_s` s, and they begin again at 0 after `wrap` - 1 (None: never)."""
+
+    field: str
+    tick_s: float
+    wrap: int | None
+
+
 @dataclass(frozen=True)
 class Decoded:
-    """Messages of a stream, n readings: field name -> (n,) whole numbers; which are valid (n,); damaged messages."""
+    """Messages of a stream, n readings: field name -> (n,) whole numbers; which are valid (n,); damaged messages.
+
+    `behind` (n,) is how many bytes arrived after each message.
+    """
 
     values: Mapping[str, Whole]
     valid: NDArray[np.bool_]
+    behind: Whole
     damaged: int = 0
 
     def __len__(self) -> int:
@@ -67,6 +79,14 @@ def scale_of(field: StreamField, rate_hz: float) -> Scale:
     conversion = UNITS[field.unit or ""]
     per_s = rate_hz if conversion.is_per_sample else 1.0
     return Scale(conversion.unit, step_of(field) * field.scale * conversion.factor * per_s, conversion.offset)
+
+
+def stamp_ticks(format_: StreamFormat) -> StampTicks | None:
+    """Return what the whole numbers of a format's time stamps are; None for a format without time stamps."""
+    if (told := format_.time) is None:
+        return None
+    step = next(step_of(field) for field in format_.fields if field.name == told.field)
+    return StampTicks(told.field, told.tick_s * step, None if told.wrap is None else round(told.wrap / step))
 
 
 def whole_numbers(values: NDArray[np.float64], step: float) -> tuple[Whole, NDArray[np.bool_]]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from instruments.bench_config import part_of
 from instruments.protocols.stream_formats.document import StreamField
 from instruments.protocols.stream_formats.encoding import message
-from instruments.protocols.stream_formats.readings import scale_of
+from instruments.protocols.stream_formats.readings import scale_of, stamp_ticks
 from instruments.protocols.stream_formats.settings import StreamSettings
 from instruments.simulators.setup import InstrumentSetup
 
@@ -92,6 +92,9 @@ class SimulatedStream:
         counter = self._format.counter
         if counter is not None and counter.field == field.name:
             return index * counter.step % counter.wrap
+        if (stamp := stamp_ticks(self._format)) is not None and stamp.field == field.name:
+            ticks = np.rint(index / (self._rate_hz * stamp.tick_s)).astype(np.int64)
+            return ticks if stamp.wrap is None else ticks % stamp.wrap
         if field.unit is not None and field.name in self._values:
             scale = scale_of(field, self._nominal_hz)
             return np.rint((self._values[field.name] - scale.offset) / scale.scale).astype(np.int64)

@@ -173,7 +173,7 @@ def prepare(
     try:
         with attending(clock):
             identities = _identities(bench, clock)
-        plan = make_plan(recipe, BenchLimits.of(bench), clip=clip)
+        plan = make_plan(recipe, BenchLimits.of(bench, needs_person=bench_file.needs_person), clip=clip)
         bench_file = _with_reported(store, bench_file, identities)
         standards = as_used(store, standards_of(bench_file), today)
         units = _units(bench, identities, bench_file, clock, recipe, standards)

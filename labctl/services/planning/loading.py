@@ -103,6 +103,7 @@ def limits_of(bench: BenchFile) -> BenchLimits:
         if chamber is None
         else ChamberLimits(chamber.min_c, chamber.max_c, USUAL_RESOLUTION_C, chamber.ramp_c_per_min),
         {gyro.name: GyroLimits(gyro.max_rate_dps, gyro.min_c, gyro.max_c) for gyro in bench.gyros},
+        needs_person=bench.needs_person,
     )
 
 

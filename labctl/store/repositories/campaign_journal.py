@@ -17,6 +17,7 @@ import sqlalchemy as sa
 from numpy.typing import NDArray
 
 from instruments.interfaces.gyro import Readings
+from labctl.recording.columns import ARRIVAL_S, DEVICE_S
 from labctl.store import sample_codec
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import outlasting
@@ -24,6 +25,7 @@ from labctl.store.dataset_statistics import means_rows
 from labctl.store.repositories import benches
 from labctl.store.repositories.audit import append
 from labctl.store.repositories.sample_blocks import (
+    STORED_TIMES,
     DataSetHead,
     angle_values,
     blocks_of,
@@ -352,6 +354,10 @@ def _columns(readings: Readings, chamber_c: float | None) -> dict[str, NDArray[n
         **readings.raw,
         "valid": readings.valid.astype(np.int64),
     }
+    for name, times_s in ((DEVICE_S, readings.device_s), (ARRIVAL_S, readings.arrival_s)):
+        if times_s is not None:
+            stored, per_s = STORED_TIMES[name]
+            columns[stored] = np.rint(times_s * per_s).astype(np.int64)
     if chamber_c is not None:
         columns["chamber_mc"] = np.full(len(readings), round(chamber_c * 1e3), dtype=np.int64)
     return columns

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from labctl.errors import LabctlError, NotFound
 from labctl.json_types import JsonObject
 from labctl.recording import Recording, RecordingInfo, refuse_too_many_data_sets
-from labctl.recording.columns import VERIFICATION
+from labctl.recording.columns import READING_TIMES, VERIFICATION
 from labctl.store.connection.database import Database
 from labctl.store.import_parts import WHOLE_TABLE, import_parts
 from labctl.store.records import DataSetRow, MeanRow, RecordingRow
@@ -147,20 +147,31 @@ class Recordings:
             columns = points_columns(connection, recording)
         return Recording(info.model_copy(update={"kind": "points"}), columns, environment)
 
-    def samples(self, recording: int) -> Recording:
-        """Return every reading of the complete data sets; points and coefficients return as they were imported."""
+    def samples(self, recording: int, *, times: bool = False) -> Recording:
+        """Return every reading of the complete data sets; points and coefficients return as they were imported.
+
+        With `times` also the times of the unit's own clock and of arrival, where they are stored.
+        """
         head = self.get(recording)
         if head.kind != "samples":
             return self.points(recording)
         info = RecordingInfo.model_validate(head.info)
-        parts = [columns for _, columns in self.iter_datasets(recording)]
+        parts = [columns for _, columns in self.iter_datasets(recording, times=times)]
         names = dict.fromkeys(name for part in parts for name in part)
+        for name in READING_TIMES & names.keys():  # a campaign of before they were stored may end with them
+            if any(name not in part for part in parts):
+                del names[name]
         columns = {name: np.concatenate([part[name] for part in parts]) for name in names}
         with self._database.reading() as connection:
             return Recording(info, columns, _environment(connection, recording))
 
-    def iter_datasets(self, recording: int) -> Iterator[tuple[int, dict[str, NDArray[np.generic]]]]:
-        """Yield (number, columns of readings) of each complete data set, in the order of measurement."""
+    def iter_datasets(
+        self, recording: int, *, times: bool = False
+    ) -> Iterator[tuple[int, dict[str, NDArray[np.generic]]]]:
+        """Yield (number, columns of readings) of each complete data set, in the order of measurement.
+
+        `times` as in `samples`.
+        """
         d = tables.data_sets.c
         with self._database.reading() as connection:
             heads = connection.execute(
@@ -176,7 +187,7 @@ class Recordings:
                 blocks = blocks_of_sets(connection, recording, [int(head["number"]) for head in together])
             for head in together:
                 number = int(head["number"])
-                columns = in_units(blocks.pop(number, []), cast(DataSetHead, head), channels)
+                columns = in_units(blocks.pop(number, []), cast(DataSetHead, head), channels, times=times)
                 if is_marked and VERIFICATION not in columns:
                     columns[VERIFICATION] = np.zeros(len(columns["dataset"]), dtype=np.int64)
                 yield number, columns

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from typing_extensions import TypedDict
 
 from labctl.json_types.recordings import RawChannelJson
-from labctl.recording.columns import VERIFICATION
+from labctl.recording.columns import ARRIVAL_S, DEVICE_S, READING_TIMES, VERIFICATION
 from labctl.store import sample_codec
 from labctl.store.import_parts import block_row
 from labctl.store.manifests.digests import block_digests
@@ -24,6 +24,9 @@ def _blocks_query() -> sa.Select[int, int, int, int, bytes]:
     return sa.select(b.number, b.n, b.codec, b.crc32, b.data).where(*ours).order_by(b.number, b.seq)
 
 
+#: Times of readings beside `t_s`: column -> name in a block, and how many of its whole numbers are 1 s. A time of
+#: arrival is not known better than to some ms, and each further digit costs 0.4 bytes per reading.
+STORED_TIMES = {DEVICE_S: ("device_ns", 1e9), ARRIVAL_S: ("arrival_100us", 1e4)}
 #: Built once: it is run for all data sets of a recording, some at a time.
 _BLOCKS = _blocks_query()
 _ADD_BLOCK = sa.insert(tables.sample_blocks)
@@ -113,10 +116,26 @@ def readings_in_units(
 
 
 def in_units(
-    blocks: list[dict[str, NDArray[np.generic]]], head: DataSetHead, channels: list[RawChannelJson]
+    blocks: list[dict[str, NDArray[np.generic]]],
+    head: DataSetHead,
+    channels: list[RawChannelJson],
+    *,
+    times: bool = False,
 ) -> dict[str, NDArray[np.generic]]:
-    """Return the readings of one data set from its unpacked blocks."""
-    return scaled(join_blocks(blocks), channels, head) if channels else join_blocks(blocks)
+    """Return the readings of one data set from its unpacked blocks.
+
+    With `times` also those of the unit's own clock and of arrival, where they are stored: `t_s` is computed from them,
+    and no quantity depends on them.
+    """
+    raw = join_blocks(blocks)
+    if not channels:
+        return raw if times else {name: values for name, values in raw.items() if name not in READING_TIMES}
+    columns = scaled(raw, channels, head)
+    if not times:
+        return columns
+    beside = {name: _floats(raw[stored]) / per_s for name, (stored, per_s) in STORED_TIMES.items() if stored in raw}
+    before = {name: columns[name] for name in ("dataset", "t_s")}
+    return {**before, **beside, **columns}
 
 
 def scaled(

@@ -133,7 +133,7 @@ class TurnReadings:
             for name, readings in blocks.items():
                 self._courses[part][name].add(readings)
                 if len(readings) or readings.lost or readings.damaged:
-                    in_time = replace(readings, t_s=recorder.time.of(readings.t_s))
+                    in_time = recorder.time.of_readings(readings)
                     beside = self._context.monitor.references.beside(in_time)
                     recorder.journal.readings(self._numbers[part], name, beside, self._context.monitor.air_c)
 

@@ -365,3 +365,17 @@ def test_what_needs_a_table_or_a_chamber_says_which_is_missing(limits: BenchLimi
 def test_turns_without_end_are_refused(limits: BenchLimits) -> None:
     with pytest.raises(PlanRefused, match="about 120000 data sets"):
         make_plan(by_hand(turns={"turns_deg": [360], "repeats": 20_000}), limits)
+
+
+@pytest.mark.parametrize("name", ["by-hand", "short", "informative"])
+def test_only_a_person_takes_time_to_mount_the_units(name: str, limits: BenchLimits) -> None:
+    assert limits.table is not None
+    timed = replace(limits, table=replace(limits.table, clock_run_s=60.0))
+    by_person, by_handler = (
+        make_plan(read_recipe(name), replace(timed, needs_person=needed)) for needed in (True, False)
+    )
+    mounts = [step for step in by_person.steps if isinstance(step, Mount)]
+    assert all(step.expected_s > 0 for step in mounts)
+    saved_s = math.fsum(step.expected_s for step in mounts)
+    assert by_person.expected_s - by_handler.expected_s == pytest.approx(saved_s)
+    assert by_handler.schedule_hash == by_person.schedule_hash

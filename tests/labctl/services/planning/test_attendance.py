@@ -13,6 +13,7 @@ from labctl.services.planning.loading import limits_of, load_bench, load_recipe
 from labctl.services.schedule.planned_start import planned_start
 from procedures.contracts.steps import Mount, PowerOff, PowerOn
 from procedures.planning.plan import Plan, make_plan
+from procedures.planning.step_writer import MOUNTING_S
 
 BERLIN = ZoneInfo("Europe/Berlin")
 HOUR_S = 3600.0
@@ -47,6 +48,12 @@ def test_every_prompt_of_a_real_bench_is_a_visit_and_those_close_together_are_on
 def test_a_bench_with_a_unit_handler_needs_nobody() -> None:
     assert visits_s(plan("short"), BENCH) == []
     assert attendance([], datetime(2026, 3, 24, 20, tzinfo=UTC), BERLIN) is None
+
+
+def test_a_plan_counts_the_time_of_a_person_where_one_is_needed() -> None:
+    by_person = make_plan(load_recipe("short"), limits_of(real(BENCH)), clip=True)
+    mounts = sum(isinstance(step, Mount) for step in by_person.steps)
+    assert by_person.expected_s - plan("short").expected_s == pytest.approx(mounts * MOUNTING_S)
 
 
 def test_times_are_of_the_bench_and_those_at_night_are_warned_of() -> None:
