@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from instruments.errors import LimitError
+from instruments.interfaces.rate_course import RateCourse
 
 #: What a reference rate is known from: the table's own step clock, the rate that a servo was asked for, or its encoder.
 Reference = Literal["computed", "demanded", "measured"]
@@ -30,6 +31,7 @@ class TableLimits:
     clock_limit_ppm: float = 1000.0  #: expanded uncertainty of the measured step clock from which a plan is not run
     checks_home: bool = False  #: whether missed steps are looked for at the home switch
     reference: Reference = "computed"  #: what the rate of a data set is known from
+    follows_courses: bool = False  #: whether it follows a rate that changes
 
     def require_rate(self, device: str, rate_dps: float) -> None:
         """Raise LimitError for a rate beyond the table's, deg/s; `device` is the name that the error gives."""
@@ -207,4 +209,43 @@ class EncoderTable(Protocol):
 
     def read_angle(self) -> AngleReading:
         """Get the angle and when it was read; raises NoReply, MalformedReply or LinkError."""
+        ...
+
+
+@dataclass(frozen=True)
+class CourseRun:
+    """A course of the rate that a table follows, as it was commanded."""
+
+    course: RateCourse
+    began_s: float  #: clock time, the middle between command and reply
+    u_s: float  #: standard uncertainty of the time of an angle that all angles have in common
+    is_whole: bool = False  #: whether nothing is left to be commanded
+
+    @property
+    def ends_s(self) -> float:
+        """When it is planned to end, clock time."""
+        return self.began_s + self.course.duration_s
+
+
+@runtime_checkable
+class CourseTable(Protocol):
+    """A table with an encoder that follows a rate which changes; its limits say so by `follows_courses`."""
+
+    def begin_course(self, course: RateCourse) -> CourseRun:
+        """Bring the table to the rate from which a course begins, then begin it.
+
+        Raises LimitError (nothing was sent), RequestRejected, NoReply, MalformedReply, LinkError.
+        """
+        ...
+
+    def continue_course(self, run: CourseRun) -> CourseRun:
+        """Command what is due of a course; returns it as it was commanded so far. Call it often. Raises as above."""
+        ...
+
+    def read_course_angle(self, run: CourseRun) -> AngleReading:
+        """Get the angle of the encoder, unwrapped since the course began; raises NoReply, MalformedReply, LinkError."""
+        ...
+
+    def end_course(self, run: CourseRun) -> None:
+        """Control the table to rest at the end of a course; raises RequestRejected where it stopped before."""
         ...

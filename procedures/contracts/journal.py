@@ -10,6 +10,7 @@ from typing import Literal, Protocol
 
 from instruments.interfaces.gyro import Readings
 from procedures.contracts.campaign_state import CampaignState
+from procedures.contracts.measured_course import MeasuredCourse
 from procedures.contracts.steps import Acquire, StepResult, Turn
 
 
@@ -58,6 +59,7 @@ class TableAngles:
     angle_from_deg: float  #: of the line, when the gate opens
     computed_dps: float  #: the rate that the table was taken to run at
     is_reference: bool  #: whether the measured rate is the reference of the readings
+    course: MeasuredCourse | None = None  #: of a rate that changes; `rate_dps` is then its mean
 
 
 @dataclass(frozen=True)

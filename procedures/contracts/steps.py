@@ -9,6 +9,8 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from instruments.interfaces.rate_course import RateCourse
+
 
 class StepBase(BaseModel):
     """What all steps share."""
@@ -99,6 +101,8 @@ class Acquire(StepBase):
     settle_s: float
     duration_s: float
     verification: bool = False  #: measured to verify a calibration, and never fitted
+    #: a rate that changes, in place of `rate_dps`, which is then 0; the data set lasts as long as the course
+    course: RateCourse | None = Field(default=None, discriminator="kind")
 
 
 class Turn(StepBase):

@@ -6,7 +6,6 @@ import numpy as np
 
 from instruments.clock import latency_s
 from instruments.errors import LinkError
-from instruments.interfaces.gyro import Gyro, Readings
 from instruments.interfaces.table import Spin
 from instruments.positions import Position
 from procedures.contracts.errors import BadData, GuardTripped, StepFailed
@@ -14,10 +13,11 @@ from procedures.contracts.journal import DataSetHeader, DataSetState
 from procedures.contracts.steps import Acquire
 from procedures.execution import late_readings
 from procedures.execution.context import UNIT_FAULTS, ExecutionContext, raise_violation
+from procedures.execution.course import take_course
+from procedures.execution.gate_readings import count_missing, demand_readings, read_late, read_round
 from procedures.execution.table_checks import follow_clock
 from procedures.execution.waiting import checkpoint, pass_time
 from procedures.monitoring.bench_snapshot import ReadingCounts
-from procedures.monitoring.campaign_time import CampaignTime
 from procedures.monitoring.event_recorder import warning
 from procedures.monitoring.host_stalls import not_run
 from procedures.monitoring.table_reference import EncoderLog, rate_event
@@ -41,7 +41,7 @@ def acquire(context: ExecutionContext, step: Acquire) -> dict[str, float]:
         attempt += 1
         stalled_s = context.monitor.stalls.total_s()
         try:
-            return _take(context, step)
+            return _take(context, step) if step.course is None else take_course(context, step)
         except (LinkError, BadData, GuardTripped) as error:
             unit = _unit_at_fault(context, error)
             if unit is None:
@@ -104,11 +104,11 @@ def _take(context: ExecutionContext, step: Acquire) -> dict[str, float]:
             _read_gate(context, watch, encoder, number, gate, counts)
             if context.monitor.is_due(within_s=ramp_s + LEAD_S):
                 context.poll(read_latest=False)
-            _read_late(context, number, gate, counts, late_readings.STEADY_S)
+            read_late(context, number, gate, counts, late_readings.STEADY_S)
             context.bench.table.settle(spin)  # a run that does not end as computed was not the run it was taken for
-            _read_late(context, number, gate, counts, late_readings.WAIT_S)
-            _demand_readings(counts)
-            _count_missing(context, number, gate, counts)
+            read_late(context, number, gate, counts, late_readings.WAIT_S)
+            demand_readings(counts)
+            count_missing(context, number, gate, counts)
             _demand_answer(context, step, spin)
             rates = _note_angles(context, encoder, spin, gate, number)
         except BaseException as error:
@@ -204,82 +204,13 @@ def _read_gate(
     while (left_s := gate[1] - context.clock.now_s()) > 0:
         watch.ask()
         encoder.read()
-        _read_round(context, number, gate, counts, min(block_s, left_s) / len(gyros))
+        read_round(context, number, gate, counts, min(block_s, left_s) / len(gyros))
         if context.monitor.is_due(within_s=block_s):
             context.poll(read_latest=False)
         else:
             raise_violation(context.monitor.check_guards())
         checkpoint(context)
     if len(gyros) > 1:  # the unit read first in the last round still has the end of the gate in its buffer
-        _read_round(context, number, gate, counts, 0.0)
+        read_round(context, number, gate, counts, 0.0)
         raise_violation(context.monitor.check_guards())
     encoder.read(now=True)
-
-
-def _read_late(
-    context: ExecutionContext, number: int, gate: tuple[float, float], counts: dict[str, ReadingCounts], wait_s: float
-) -> None:
-    """Wait for readings of the gate that are still on their way, until `wait_s` after its end."""
-    gyros, every_s = context.bench.gyros, late_readings.EVERY_S / len(context.bench.gyros)
-    while context.clock.now_s() < gate[1] + wait_s and any(
-        late_readings.is_late(gyro)
-        or late_readings.pending(gyro, gate, counts[name])
-        or _missing(gyro, gate, counts[name])
-        for name, gyro in gyros.items()
-    ):
-        _read_round(context, number, gate, counts, every_s)
-        checkpoint(context)
-
-
-def _missing(gyro: Gyro, gate: tuple[float, float], count: ReadingCounts) -> int:
-    """Return how many readings of the gate neither came nor were counted as lost."""
-    return late_readings.promise_of(gyro, gate[1] - gate[0]).missing(count.valid + count.invalid + count.damaged)
-
-
-def _count_missing(
-    context: ExecutionContext, number: int, gate: tuple[float, float], counts: dict[str, ReadingCounts]
-) -> None:
-    """Count what never came as lost, and say it; too much of it raises GuardTripped."""
-    for name, gyro in context.bench.gyros.items():
-        at_edges = late_readings.dropped(gyro, gate, counts[name]) + late_readings.pending(gyro, gate, counts[name])
-        if missing := max(_missing(gyro, gate, counts[name]), at_edges):
-            lost = late_readings.lost_readings(gyro, missing)
-            counts[name].add(lost)
-            context.recorder.journal.readings(number, name, lost, context.monitor.air_c)
-            expected = round(late_readings.promise_of(gyro, gate[1] - gate[0]).readings)
-            text = f"{name}: {missing} of {expected} readings of a data set did not arrive; they are counted as lost"
-            context.recorder.event(warning("readings_lost", text, name))
-    raise_violation(context.monitor.check_guards())
-
-
-def _read_round(
-    context: ExecutionContext, number: int, gate: tuple[float, float], counts: dict[str, ReadingCounts], slice_s: float
-) -> None:
-    """Read every unit once and write down what falls into the gate."""
-    for name, gyro in context.bench.gyros.items():
-        readings = gyro.read(max(slice_s, 1.5 / gyro.sample_rate_hz))
-        if len(readings):
-            context.monitor.add_readings(name, gyro, readings)
-            counts[name].note(readings.t_s, gate[0])
-        kept = cut(readings, gate, context.recorder.time)
-        if len(kept) or kept.lost or kept.damaged:
-            counts[name].add(kept)
-            context.response.add(name, kept)
-            beside = context.monitor.references.beside(kept)
-            context.recorder.journal.readings(number, name, beside, context.monitor.chamber_c)
-
-
-def cut(readings: Readings, gate: tuple[float, float], time: CampaignTime) -> Readings:
-    """Return the readings inside the gate [from, until) with their times in campaign time; both in clock seconds."""
-    t_s = readings.t_s
-    if len(t_s) and gate[0] <= t_s[0] and t_s[-1] < gate[1]:
-        return time.of_readings(readings)
-    return time.of_readings(readings.only((t_s >= gate[0]) & (t_s < gate[1])))
-
-
-def _demand_readings(counts: dict[str, ReadingCounts]) -> None:
-    for name, count in counts.items():
-        if count.valid + count.invalid == 0:
-            raise BadData(
-                name, f"none of about {count.expected:.0f} expected readings arrived; check cable, power and baud rate"
-            )

@@ -30,7 +30,10 @@ def describe_step(step: Step, datasets: int) -> str:
 
 
 _TEXTS: Mapping[type[Step], Callable[[Any], str]] = {
-    Acquire: lambda step: f"{step.rate_dps:+g} deg/s at {step.temperature_c:g} deg C, {step.position} up",
+    Acquire: lambda step: (
+        f"{step.course.text if step.course else f'{step.rate_dps:+g} deg/s'} at {step.temperature_c:g} deg C, "
+        f"{step.position} up"
+    ),
     Turn: lambda step: f"{step.turn_deg:+g} deg by hand, {step.position} up",
     Soak: lambda step: f"soak at {step.temperature_c:g} deg C for {step.hold_s / 60:g} min",
     MoveChamber: lambda step: f"chamber to {step.temperature_c:g} deg C",

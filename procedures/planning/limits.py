@@ -9,12 +9,17 @@ from dataclasses import dataclass
 from instruments.errors import InstrumentError
 from instruments.interfaces.chamber import ChamberLimits
 from instruments.interfaces.gyro import GyroLimits
+from instruments.interfaces.rate_course import RateCourse, course_complaint
 from instruments.interfaces.table import TableLimits
 from procedures.contracts.bench import Bench
 from procedures.contracts.errors import PlanRefused
 from procedures.recipe.recipe import Recipe
 
 NEEDS = "Name a bench with both, or choose a recipe with [turns], such as by-hand, which needs neither."
+CONSTANT_ONLY = (
+    "the driver of the table runs constant rates only; name a bench with a table that follows a course (driver "
+    "acutrol-3000), use `labctl simulate`, or remove [[profiles]]"
+)
 ADVICE = "Change the recipe, or plan with --clip to leave these points out."
 
 
@@ -27,6 +32,8 @@ class BenchLimits:
     gyros: Mapping[str, GyroLimits]
     achievable_dps: Callable[[float], float] | None = None  #: the rate a table would really run (step quantisation)
     needs_person: bool = True  #: whether a person turns the units; a unit handler takes no time that a plan counts
+    #: whether the table moves in a campaign; in a simulation without bytes any table follows any course of the rate
+    is_driven: bool = True
 
     @classmethod
     def of(cls, bench: Bench, *, needs_person: bool = True) -> BenchLimits:
@@ -57,6 +64,22 @@ class BenchLimits:
         if complaints:
             return "beyond " + " and ".join(complaints)
         return self._quantisation_complaint(rate_dps, max_error_fraction)
+
+    def course_complaint(self, course: RateCourse) -> str | None:
+        """Return why the table or a unit cannot do a course of the rate, or None."""
+        table = self.table
+        if table is None or not self.is_driven:
+            return None
+        if not table.follows_courses:
+            return CONSTANT_ONLY
+        if text := course_complaint(course, table.max_rate_dps, table.max_acceleration_dps2):
+            return text
+        beyond = [
+            f"the {limit:g} deg/s of {owner}" for owner, limit in _unit_rates(self.gyros) if course.largest_dps > limit
+        ]
+        return (
+            f"reaches {course.largest_dps:g} deg/s, beyond {' and '.join(beyond)}; make it slower" if beyond else None
+        )
 
     def _table_rate(self) -> list[tuple[str, float]]:
         return [] if self.table is None else [("the table", self.table.max_rate_dps)]
@@ -125,6 +148,9 @@ def fit_to_bench(recipe: Recipe, limits: BenchLimits, *, clip: bool) -> tuple[Re
         holder[key] = tuple(value for value in holder[key] if not complaints[value])
         if not holder[key]:
             empty.append(f"{name}: no value is left within the limits")
+    courses = [limits.course_complaint(profile.course) for profile in recipe.profiles]
+    beyond += _courses_beyond(recipe, courses)
+    values["profiles"] = tuple(each for each, text in zip(values["profiles"], courses, strict=True) if not text)
     handling = recipe.mounting.handling_c
     if handling is not None and (text := limits.temperature_complaint(handling)):
         empty.append(f"mounting.handling_c {handling:g}: {text}")
@@ -133,6 +159,14 @@ def fit_to_bench(recipe: Recipe, limits: BenchLimits, *, clip: bool) -> tuple[Re
     if beyond and not clip:
         raise PlanRefused(recipe.name, beyond, ADVICE)
     return (Recipe.model_validate(values), tuple(beyond)) if beyond else (recipe, ())
+
+
+def _courses_beyond(recipe: Recipe, complaints: list[str | None]) -> list[str]:
+    """Return what is wrong with the courses of a recipe; once where no course can be run at all."""
+    if CONSTANT_ONLY in complaints:
+        return [f"profiles: {CONSTANT_ONLY}"]
+    named = zip(recipe.profiles, complaints, strict=True)
+    return [f"profiles[{n}], a {each.course.text}: {text}" for n, (each, text) in enumerate(named) if text]
 
 
 def _point_lists(recipe: Recipe) -> list[tuple[str, str]]:

@@ -139,7 +139,9 @@ def _unset(step: Step) -> set[str]:
     """Return the names that plans of before a later version do not have, where the step does not use them."""
     if isinstance(step, MeasureClock) and not step.runs_s:
         return {"runs_s"}
-    return {"verification"} if isinstance(step, Acquire) and not step.verification else set()
+    if not isinstance(step, Acquire):
+        return set()
+    return {name for name in ("verification", "course") if not getattr(step, name)}
 
 
 def _powered(steps: tuple[Step, ...]) -> int:

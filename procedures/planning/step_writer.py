@@ -82,6 +82,8 @@ class _StepWriter:
             self.move_chamber(level.temperature_c)
             self.soak(level.temperature_c, block.hold_s)
             self.check_home(level)
+            if not block.verification:
+                self.follow()
             self.acquire(level, verification=block.verification)
             self.check_home(level)
             self.measure_clock_again()
@@ -183,6 +185,27 @@ class _StepWriter:
                     duration_s=duration_s,
                     expected_s=self.recipe.acquire.settle_s + duration_s + ramps_s,
                     verification=verification,
+                )
+            )
+
+    def follow(self) -> None:
+        """Take a data set of each course of the rate."""
+        for profile in self.recipe.profiles:
+            self.datasets += 1
+            course = profile.course
+            ramps_s = 2 * abs(course.begins_dps) / self.limits.max_acceleration_dps2
+            self.steps.append(
+                Acquire(
+                    dataset=self.datasets,
+                    rate_dps=0.0,
+                    temperature_c=self.air_c,
+                    position=self.position,
+                    run=self.run,
+                    mounting=self.mounting,
+                    settle_s=self.recipe.acquire.settle_s,
+                    duration_s=course.duration_s,
+                    expected_s=self.recipe.acquire.settle_s + course.duration_s + ramps_s,
+                    course=course,
                 )
             )
 

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, Literal
 
 from pydantic import Field
 
+from instruments.interfaces import rate_course
 from procedures.recipe.rules import Number, Table
-
-#: Steps of a course in the fastest period that it has, and the longest step, s.
-STEPS_OF_PERIOD, LONGEST_STEP_S = 200, 0.01
 
 
 class Ramp(Table):
@@ -22,13 +19,9 @@ class Ramp(Table):
     duration_s: Number = Field(gt=0, le=7200)
 
     @property
-    def step_s(self) -> float:
-        """How short a step of the course is, s."""
-        return LONGEST_STEP_S
-
-    def rate_dps(self, t_s: float) -> float:
-        """Return the rate at a time since the start, s."""
-        return self.from_dps + (self.to_dps - self.from_dps) * t_s / self.duration_s
+    def course(self) -> rate_course.Ramp:
+        """The rate over time."""
+        return rate_course.Ramp(self.from_dps, self.to_dps, self.duration_s)
 
 
 class SineSweep(Table):
@@ -42,16 +35,9 @@ class SineSweep(Table):
     fade_s: Number = Field(default=2.0, ge=0)
 
     @property
-    def step_s(self) -> float:
-        """How short a step of the course is, s."""
-        return min(LONGEST_STEP_S, 1.0 / (STEPS_OF_PERIOD * max(self.from_hz, self.to_hz)))
-
-    def rate_dps(self, t_s: float) -> float:
-        """Return the rate at a time since the start, s."""
-        growth = math.log(self.to_hz / self.from_hz) / self.duration_s
-        cycles = self.from_hz * (math.expm1(growth * t_s) / growth if growth else t_s)
-        fade = min(t_s, self.duration_s - t_s) / self.fade_s if self.fade_s else 1.0
-        return self.amplitude_dps * max(min(fade, 1.0), 0.0) * math.sin(2 * math.pi * cycles)
+    def course(self) -> rate_course.SineSweep:
+        """The rate over time."""
+        return rate_course.SineSweep(self.amplitude_dps, self.from_hz, self.to_hz, self.duration_s, self.fade_s)
 
 
 Profile = Annotated[Ramp | SineSweep, Field(discriminator="kind")]

@@ -74,7 +74,7 @@ class Recipe(Table):
     power_cycle: PowerCycle | None = None
     verification: Verification | None = None  #: absent: nothing is measured beside what is fitted
     mounting: Mounting = Mounting()
-    profiles: tuple[Profile, ...] = ()  #: courses of the rate, run at the start of each level; simulated only
+    profiles: tuple[Profile, ...] = ()  #: courses of the rate, run at the start of each level
     guards: GuardRules = GuardRules()
     on_failure: OnFailure = OnFailure()
     resume: ResumeRules = ResumeRules()

@@ -10,10 +10,12 @@ import math
 
 from instruments.clock import Clock, sleep_until
 from instruments.drivers.acutrol3000 import checks
+from instruments.drivers.acutrol3000.course import CourseFollower
 from instruments.drivers.acutrol3000.link import AcutrolLink
 from instruments.drivers.driver import TableDriver
-from instruments.errors import NoReply, RequestRejected, WrongInstrument
-from instruments.interfaces.table import AngleReading, Spin, TableLimits
+from instruments.errors import LimitError, NoReply, RequestRejected, WrongInstrument
+from instruments.interfaces.rate_course import RateCourse, course_complaint
+from instruments.interfaces.table import AngleReading, CourseRun, Spin, TableLimits
 from instruments.protocols.acutrol3000 import commands as acl
 from instruments.protocols.acutrol3000.settings import Acutrol3000Settings
 from instruments.transport.factory import Ports
@@ -28,7 +30,7 @@ HOME_DEG = 0.01
 #: An angle is asked for this often, and the quickest answer is used, where answers come within this time, s: the time
 #: of the quickest answer is the least uncertain.
 QUESTIONS, QUICK_S = 3, 0.02
-MODES = (acl.RATE, acl.POSITION, acl.OFF)
+MODES = (acl.RATE, acl.POSITION, acl.OFF, acl.SYNTHESIS)
 
 
 class Acutrol3000:
@@ -37,10 +39,13 @@ class Acutrol3000:
     def __init__(self, settings: Acutrol3000Settings, ports: Ports, clock: Clock) -> None:
         self.name = "table"
         self.settings = settings
-        self.limits = TableLimits(settings.max_rate_dps, settings.acceleration_dps2, 0.0, reference=settings.reference)
+        self.limits = TableLimits(
+            settings.max_rate_dps, settings.acceleration_dps2, 0.0, reference=settings.reference, follows_courses=True
+        )
         self.rate_u_ppm = settings.rate_u_ppm
         self._clock = clock
         self._link = AcutrolLink(self.name, settings, ports, clock, self._forget)
+        self._courses = CourseFollower(self.name, settings, self._link, clock)
         self._ready = False  #: whether limits were set and the interlock was found closed since the link is open
         self._rate_dps = 0.0  #: of the run that is under way
         self._last: AngleReading | None = None
@@ -117,6 +122,35 @@ class Acutrol3000:
                 self.name,
                 f"stopped during a run at {spin.rate_dps:g} deg/s{self._cause()}; check the load, then home the table",
             )
+
+    def begin_course(self, course: RateCourse) -> CourseRun:
+        """Bring the table to the rate from which a course begins, then begin it.
+
+        Raises LimitError (nothing was sent), RequestRejected, NoReply, MalformedReply, LinkError.
+        """
+        if complaint := course_complaint(course, self.limits.max_rate_dps, self.limits.max_acceleration_dps2):
+            raise LimitError(self.name, f"a {course.text} {complaint}; change it in the [[profiles]] of the recipe")
+        self._courses.check(course)
+        self.spin(course.begins_dps, 0.0)
+        self._rate_dps, self._ready = 0.0, False  # its rate passes zero, and a ramp is a limit
+        return self._courses.begin(course)
+
+    def continue_course(self, run: CourseRun) -> CourseRun:
+        """Command the fade-out of a sweep once it is due; raises as `begin_course` does."""
+        return self._courses.go_on(run)
+
+    def read_course_angle(self, run: CourseRun) -> AngleReading:
+        """Get the angle of the encoder, unwrapped since the course began; raises NoReply, MalformedReply, LinkError."""
+        return self._courses.angle(run)
+
+    def end_course(self, run: CourseRun) -> None:
+        """Control the table to rest, and set the limits of constant rates again.
+
+        Raises RequestRejected where an interlock ended the course, NoReply, MalformedReply, LinkError.
+        """
+        self._courses.demand_closed(run.course)
+        self._come_to_rest()
+        self._prepare()
 
     def stop(self) -> None:
         """Control the table to rest (Off mode). It is sent before anything is read; raises LinkError."""

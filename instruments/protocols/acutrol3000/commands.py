@@ -21,7 +21,9 @@ LONGEST = 32_768
 #: What a command without data is answered with.
 DONE = "OK"
 #: Letters of the profiler modes (TM-8004 page 137).
-OFF, RATE, POSITION = "O", "R", "P"
+OFF, RATE, POSITION, SYNTHESIS = "O", "R", "P", "S"
+#: Lowest frequency of the oscillator where it changes by the same factor in equal times, Hz (TM-8004 page 82).
+LEAST_HZ = 0.001
 #: First letters of the states of an interlock (TM-8004 page 133).
 CLOSED, OPEN, FAULT = "C", "O", "F"
 #: Bits of the register A(n)DYN (TM-8004 page 214).
@@ -88,6 +90,31 @@ def demand_rate(axis: int, rate_dps: float) -> str:
 def demand_position(axis: int, angle_deg: float) -> str:
     """Return the command that demands an angle, degrees, and changes to position mode in the same frame."""
     return f":Demand:Position {axis},{number(angle_deg)};:Mode:Position {axis}"
+
+
+def configure_oscillator(axis: int, slew_dps2: float, decades_per_s: float) -> str:
+    """Return the command that lets the oscillator keep the size of the rate while its frequency changes.
+
+    The size then changes evenly, the frequency by the same factor in equal times (TM-8004 page 82).
+    """
+    slews = f"{number(slew_dps2)},{decades_per_s:.9f}"
+    return f":Configure:Oscillator {axis},Enable,{slews},Rate,Log"
+
+
+def demand_oscillator(axis: int, size_dps: float, frequency_hz: float, phase_deg: float) -> str:
+    """Return the command that demands a sine of the rate: its peak, deg/s, and its frequency (TM-8004 page 110)."""
+    return f":Demand:Oscillator {axis},{number(size_dps)},{frequency_hz:.9g},{phase_deg:g}"
+
+
+def synthesis(axis: int) -> str:
+    """Return the command that changes to the mode of the oscillator (TM-8004 page 153)."""
+    return f":Mode:Synthesis {axis}"
+
+
+def ramp(axis: int, to_dps: float, slope_dps2: float) -> str:
+    """Return the command that demands a rate, to be reached with a slope; in rate mode it is obeyed at once."""
+    limit = f":Limit:Acceleration {RATE},{axis},{slope_dps2:.9g};" if slope_dps2 else ""
+    return f"{limit}:Demand:Rate {axis},{number(to_dps)}"
 
 
 def off(axis: int) -> str:

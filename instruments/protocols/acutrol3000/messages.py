@@ -12,9 +12,10 @@ from dataclasses import dataclass
 
 #: Main command -> its subsystem commands; where a short form fits several, the first one is meant.
 TREE = {
-    "demand": ("rate", "position", "deltaposition"),
+    "configure": ("oscillator",),
+    "demand": ("rate", "position", "deltaposition", "oscillator"),
     "read": ("rate", "position", "acceleration"),
-    "mode": ("rate", "position", "off"),
+    "mode": ("rate", "position", "off", "synthesis"),
     "interlock": ("close", "open", "reset"),
     "limit": ("rate", "acceleration", "absolute"),
     "status": ("csr", "msg", "stb", "esr"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 from pydantic import Field, model_validator
 
@@ -11,6 +11,8 @@ from instruments.bench_config import TableSettings
 
 class Acutrol3000Settings(TableSettings):
     """Address, axis and reference of a servo table."""
+
+    follows_courses: ClassVar[bool] = True
 
     tcp_port: int = 9878  #: with `host`; a serial `port` leads to the same stream through a device server
     baudrate: int = 9600

@@ -15,6 +15,7 @@ from instruments.bench_config import part_of
 from instruments.protocols.acutrol3000 import commands as acl
 from instruments.protocols.acutrol3000.messages import Command, ParseError, commands_of
 from instruments.protocols.acutrol3000.settings import Acutrol3000Settings
+from instruments.simulators.physics.oscillator import Sine
 from instruments.simulators.physics.servo_motion import ServoMotion
 from instruments.simulators.physics.world import number
 from instruments.simulators.setup import InstrumentSetup
@@ -23,7 +24,7 @@ IDENTITY = "Acutronic R&D USA,Acutrol3000,0,A8800-001-01.000-a"
 PARSING, OUT_OF_RANGE, NOT_SERVOED = 100, 101, 102
 TEXTS = {PARSING: "Command Parse Error", OUT_OF_RANGE: "Parameter Out Of Range", NOT_SERVOED: "Axis Not Servoed"}
 STATES = {acl.CLOSED: "Close", acl.OPEN: "Open", acl.FAULT: "Fault"}
-MODE_NAMES = {acl.OFF: "Off", acl.RATE: "Rate", acl.POSITION: "Position"}
+MODE_NAMES = {acl.OFF: "Off", acl.RATE: "Rate", acl.POSITION: "Position", acl.SYNTHESIS: "Synthesis"}
 #: Noise of the estimated rate at rest, deg/s.
 RATE_NOISE_DPS = 1e-4
 
@@ -44,6 +45,8 @@ class _Axis:
     rate_limits: dict[str, float] = field(default_factory=dict)
     acceleration_limits: dict[str, float] = field(default_factory=dict)
     done_s: float = 0.0  #: when the profile is complete
+    oscillator: tuple[float, float, float] = (0.0, 1.0, 0.0)  #: demanded size, deg/s, frequency, Hz, and phase, deg
+    slews: tuple[float, float] | None = None  #: of size, deg/s^2, and frequency, decades/s; none: it is not configured
     hardware: int = 0  #: bits of its hardware interlocks
     software: int = 0
 
@@ -75,6 +78,8 @@ class SimulatedAcutrol3000:
             "demand:position": self._demand_position,
             "demand:position?": lambda *_: acl.number(self.axis.position_deg),
             "mode:rate": self._mode_rate, "mode:position": self._mode_position, "mode:off": self._mode_off,
+            "configure:oscillator": self._configure_oscillator, "demand:oscillator": self._demand_oscillator,
+            "mode:synthesis": self._mode_synthesis,
             "mode?": lambda *_: MODE_NAMES[self.axis.mode],
             "interlock?": self._interlock, "interlock:close": self._close, "interlock:open": self._open,
             "interlock:reset": self._reset, "limit:absolute?": self._absolute_limits,
@@ -169,6 +174,36 @@ class SimulatedAcutrol3000:
         self.axis.done_s = self.motion.move_to(
             t_s, self._sign * self.axis.position_deg, rate, self._acceleration(acl.POSITION)
         )
+        return ""
+
+    def _configure_oscillator(self, command: Command, t_s: float) -> str:  # noqa: ARG002  for the next demand
+        self._of_axis(command)
+        if [word[:1].lower() for word in (*command.arguments[1:2], *command.arguments[4:6])] != ["e", "r", "l"]:
+            raise Refused(OUT_OF_RANGE)  # it has other modes, which labctl does not use
+        self.axis.slews = command.value(2), command.value(3)
+        return ""
+
+    def _demand_oscillator(self, command: Command, t_s: float) -> str:
+        self._of_axis(command)
+        size, frequency, phase = (command.value(at) for at in (1, 2, 3))
+        limits = (self.axis.rate_limits, self._absolute[0]), (self.axis.acceleration_limits, self._absolute[1])
+        rate, acceleration = (limit.get(acl.SYNTHESIS, most) for limit, most in limits)
+        if not 0 <= size <= rate or frequency <= 0 or 2 * np.pi * frequency * size > acceleration * (1 + 1e-6):
+            raise Refused(OUT_OF_RANGE)
+        self.axis.oscillator = size, frequency, phase
+        sine = self.motion.sine()
+        if self.axis.mode == acl.SYNTHESIS and sine is not None and self.axis.slews is not None:
+            self.motion.oscillate(sine.changed(t_s, self.ratio[0] * size, frequency, *self.axis.slews))
+        return ""
+
+    def _mode_synthesis(self, command: Command, t_s: float) -> str:
+        if self.axis.slews is None:
+            raise Refused(OUT_OF_RANGE)
+        self._servo(command, acl.SYNTHESIS)
+        size, frequency, phase = self.axis.oscillator
+        turned = np.radians(phase + (0.0 if self._sign > 0 else 180.0))
+        whole = self.ratio[0] * size
+        self.motion.oscillate(Sine(t_s, float(turned), 0.0, frequency, whole, frequency, *self.axis.slews))
         return ""
 
     def _mode_off(self, command: Command, t_s: float) -> str:

@@ -73,15 +73,7 @@ def operator_of(bench: Bench) -> Operator:
 
 
 def _runnable(recipe: Recipe, *, fit: bool) -> Recipe:
-    """Return a recipe, without [fit] where none is wanted.
-
-    Raises BadInput for one with courses of the rate, which no driver runs.
-    """
-    if recipe.profiles:
-        raise BadInput(
-            f"recipe {recipe.name}: its {len(recipe.profiles)} [[profiles]] can only be simulated (`labctl "
-            "simulate`), because no table driver can follow a rate profile; leave them out"
-        )
+    """Return a recipe, without [fit] where none is wanted."""
     return recipe if fit else recipe.model_copy(update={"fit": None})
 
 
@@ -251,6 +243,13 @@ def _units(
     )
 
 
+def _motion(recipe: Recipe) -> str:
+    """Return what moves the units in a recipe."""
+    if recipe.turns is not None:
+        return "turns"
+    return "profile" if recipe.profiles else "rates"
+
+
 def _conventions(identity: GyroIdentity, bench: BenchFile) -> dict[str, str]:
     """Return the conventions that the bench file states for the figures of a unit's data sheet."""
     stated = next((unit.datasheet_conventions for unit in bench.gyros if unit.serial == identity.serial), {})
@@ -274,7 +273,7 @@ def _unit(
             "model": identity.model,
             "axes": gyro.axes,
             "kind": "samples",
-            "motion": "rates" if recipe.turns is None else "turns",
+            "motion": _motion(recipe),
             "rate_reference": None if table is None or recipe.turns is not None else table.limits.reference,
             "turn_common_u": None if recipe.turns is None else recipe.turns.common_u,
             "started_at": clock.utc(),

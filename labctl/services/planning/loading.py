@@ -86,8 +86,11 @@ def _first(error: ValidationError) -> str:
     return f"{place}: {first['msg']}{given}"
 
 
-def limits_of(bench: BenchFile) -> BenchLimits:
-    """Return what a bench's instruments may be asked for, from its file alone."""
+def limits_of(bench: BenchFile, *, driven: bool = False) -> BenchLimits:
+    """Return what a bench's instruments may be asked for, from its file alone.
+
+    `driven` is for a campaign, in which the table has to be able to follow the courses of a recipe.
+    """
     table, chamber = bench.table, bench.chamber
     return BenchLimits(
         None
@@ -98,16 +101,18 @@ def limits_of(bench: BenchFile) -> BenchLimits:
             360.0 / table.steps_per_turn,
             clock_run_s=getattr(table, "clock_run_s", 0.0),  # keys of a driver's own model
             checks_home=getattr(table, "check_home", False),
+            follows_courses=getattr(table, "follows_courses", False),
         ),
         None
         if chamber is None
         else ChamberLimits(chamber.min_c, chamber.max_c, USUAL_RESOLUTION_C, chamber.ramp_c_per_min),
         {gyro.name: GyroLimits(gyro.max_rate_dps, gyro.min_c, gyro.max_c) for gyro in bench.gyros},
         needs_person=bench.needs_person,
+        is_driven=driven,
     )
 
 
-def bench_for(recipe: Recipe) -> str:
+def bench_for(recipe: Recipe, *, driven: bool = False) -> str:
     """Return the shipped simulated bench that fits a recipe best.
 
     One that is named after it; else the one with the fewest axes that can do it whole, the fastest of these first, and
@@ -124,7 +129,8 @@ def bench_for(recipe: Recipe) -> str:
         recorded = {axis for gyro in bench.gyros for axis in gyro.axes}
         if bench.is_simulated and axes <= recorded and not missing_instruments(recipe, limits_of(bench)):
             has_encoder = getattr(bench.table, "reference", "computed") != "computed"  # a key of a driver's own model
-            fitting.append((not _can_do(recipe, bench), len(recorded), -bench.gyros[0].max_rate_dps, has_encoder, name))
+            can = _can_do(recipe, bench, driven=driven)
+            fitting.append((not can, len(recorded), -bench.gyros[0].max_rate_dps, has_encoder, name))
     if not fitting:
         raise BadBench(
             f"recipe {recipe.name}: no bench that comes with labctl measures the axes {sorted(axes)}; name a "
@@ -133,9 +139,9 @@ def bench_for(recipe: Recipe) -> str:
     return min(fitting)[-1]
 
 
-def _can_do(recipe: Recipe, bench: BenchFile) -> bool:
+def _can_do(recipe: Recipe, bench: BenchFile, *, driven: bool) -> bool:
     try:
-        make_plan(recipe, limits_of(bench))
+        make_plan(recipe, limits_of(bench, driven=driven))
     except PlanRefused:
         return False
     return True
@@ -145,5 +151,5 @@ def plan_for(recipe_source: str, bench_source: str | None, *, clip: bool) -> tup
     """Return the plan of a recipe on a bench. Raises RecipeError, BadBench, PlanRefused."""
     recipe = load_recipe(recipe_source)
     check_fit(recipe)
-    bench = load_bench(bench_source or bench_for(recipe))
-    return make_plan(recipe, limits_of(bench), clip=clip), bench
+    bench = load_bench(bench_source or bench_for(recipe, driven=True))
+    return make_plan(recipe, limits_of(bench, driven=True), clip=clip), bench

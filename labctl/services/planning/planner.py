@@ -32,14 +32,14 @@ def list_recipes(bench: BenchFile | None) -> list[RecipeResponse]:
 
 def _recipe(name: str, text: str, bench: BenchFile | None) -> RecipeResponse:
     recipe = load_recipe(name)
-    on = bench or load_bench(bench_for(recipe))
+    on = bench or load_bench(bench_for(recipe, driven=True))
     remark = _lacking(recipe.positions, on)
     said: dict[str, Any] = {
         "name": name, "description": recipe.description, "text": text, "bench": on.name, "remark": remark,
         "by_hand": recipe.turns is not None,
     }  # fmt: skip
     try:
-        plan = make_plan(recipe, limits_of(on))
+        plan = make_plan(recipe, limits_of(on, driven=True))
     except PlanRefused as refused:
         return RecipeResponse(**said, refused=str(refused))
     return RecipeResponse(**said, steps=len(plan.steps), datasets=plan.datasets, expected_s=plan.expected_s)
@@ -66,8 +66,8 @@ def plan_steps(
     Raises RecipeError, PlanRefused, BadInput.
     """
     recipe = load_recipe(request.recipe)
-    on = bench or load_bench(bench_for(recipe))
-    plan = make_plan(recipe, limits_of(on), clip=request.clip)
+    on = bench or load_bench(bench_for(recipe, driven=True))
+    plan = make_plan(recipe, limits_of(on, driven=True), clip=request.clip)
     if request.visibility and plan.expected_s > LONGEST_LOOK_S:
         raise BadInput(
             f"visibility: the plan takes {plan.expected_s / 86_400:.0f} days, but the effects that a plan can "

@@ -49,7 +49,7 @@ def add_start(store: Store, request: CampaignRequest, bench: BenchFile, now: dat
         due = times.moment(request.at, zone, now)
     recipe = load_recipe(request.recipe)
     with_hidden_effects(bench, request.hide)  # what cannot be hidden is refused now
-    plan = make_plan(recipe, limits_of(bench), clip=request.clip)
+    plan = make_plan(recipe, limits_of(bench, driven=True), clip=request.clip)
     confirmed = confirmation_text(bench, request)
     new = NewStart(
         bench_name=bench.name, recipe_name=recipe.name, recipe=request.recipe, clip=request.clip,

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from instruments.bench_config import BenchFile, GyroSettings, SimulationSettings, part_of
 from instruments.clock import VirtualClock
+from instruments.interfaces.rate_course import RateCourse
 from instruments.protocols.arrick_c4_moves import plan_move
 from instruments.protocols.arrick_c4_settings import StepperSettings
 from instruments.simulation import open_simulation
@@ -22,7 +23,6 @@ from labctl.services.benches.standards import standards_of
 from procedures.contracts.steps import Acquire, Mount, MoveChamber, PowerOff, PowerOn
 from procedures.planning.plan import Plan
 from procedures.planning.step_writer import MOUNTING_S
-from procedures.recipe.profiles import Ramp, SineSweep
 
 #: Interval of the environment log, s.
 ENVIRONMENT_S = 10.0
@@ -60,8 +60,6 @@ class _Walk:
         self._run, self._setpoint = 0, bench.chamber.safe_c
         self._parts: list[dict[str, NDArray[np.generic]]] = []
         self._environment: list[tuple[float, int, float, float, float]] = []
-        self._level: tuple[object, ...] | None = None
-        self._courses = 0
 
     def run(self) -> None:
         """Take every step of the plan."""
@@ -99,31 +97,27 @@ class _Walk:
             self._environment += [(t, self._run, sensor, there, self._setpoint) for t, sensor, there in rows]
 
     def _acquire(self, step: Acquire) -> None:
-        level = (step.position, step.run, step.mounting, self._setpoint)
-        if level != self._level:  # the first data set of a level
-            self._level = level
-            for profile in self._plan.recipe.profiles:
-                self._follow(step, profile)
-        self._take(step)
+        if step.course is None:
+            self._take(step)
+        else:
+            self._follow(step, step.course)
 
-    def _follow(self, step: Acquire, profile: Ramp | SineSweep) -> None:
+    def _follow(self, step: Acquire, course: RateCourse) -> None:
         """Let the table follow a course of rates, and read it by its encoder."""
-        times = np.arange(0.0, profile.duration_s + profile.step_s / 2, profile.step_s)
-        rates = np.array([profile.rate_dps(min(t, profile.duration_s)) for t in times.tolist()])
+        times = np.arange(0.0, course.duration_s + course.step_s / 2, course.step_s)
+        rates = course.rate_dps(np.minimum(times, course.duration_s))
         fastest, most = float(np.abs(rates).max()), self._table.max_rate_dps
         if fastest > most:
             raise BadInput(
-                f"recipe {self._plan.recipe.name}: a {profile.kind} reaches {fastest:g} deg/s, but the limit of "
+                f"recipe {self._plan.recipe.name}: a {course.kind} reaches {fastest:g} deg/s, but the limit of "
                 f"the table of bench {self._bench.name} is {most:g} deg/s; make it slower"
             )
-        lead = self._lead(rates[0], profile.step_s), self._lead(rates[-1], profile.step_s)[::-1]
-        self._t = self._world.follow(self._t, profile.step_s, np.concatenate([lead[0], rates, lead[1]]))
-        end = self._t - profile.step_s * len(lead[1])
-        n = round(profile.duration_s / self._period)
+        lead = self._lead(rates[0], course.step_s), self._lead(rates[-1], course.step_s)[::-1]
+        self._t = self._world.follow(self._t, course.step_s, np.concatenate([lead[0], rates, lead[1]]))
+        end = self._t - course.step_s * len(lead[1])
+        n = round(course.duration_s / self._period)
         read_s = end - self._period * np.arange(n - 1, -1, -1.0)
-        self._courses += 1
-        number = self._plan.datasets + self._courses
-        self._read(step, read_s, self._world.encoder_rates_dps(read_s, self._period), number)
+        self._read(step, read_s, self._world.encoder_rates_dps(read_s, self._period), step.dataset)
         self._world.leave_profile()
 
     def _lead(self, rate_dps: float, step_s: float) -> NDArray[np.float64]:

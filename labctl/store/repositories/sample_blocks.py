@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NotRequired
 
 import numpy as np
 import sqlalchemy as sa
 from numpy.typing import NDArray
 from typing_extensions import TypedDict
 
+from labctl.json_types import JsonObject
 from labctl.json_types.recordings import RawChannelJson
 from labctl.recording.columns import ARRIVAL_S, DEVICE_S, READING_TIMES, VERIFICATION
 from labctl.store import sample_codec
@@ -16,6 +18,7 @@ from labctl.store.import_parts import block_row
 from labctl.store.manifests.digests import block_digests
 from labctl.store.schema import tables
 from procedures.contracts.journal import TableAngles
+from procedures.contracts.measured_course import MeasuredCourse
 
 
 def _blocks_query() -> sa.Select[int, int, int, int, bytes]:
@@ -58,6 +61,8 @@ class EncoderAngles(TypedDict):
     rate_u_dps: float
     angle_from_deg: float  #: when the gate opened
     computed_dps: float  #: the rate that the table was taken to run at
+    course: NotRequired[JsonObject]  #: of a rate that changes, as MeasuredCourse says it; the rates are then means
+    is_reference: NotRequired[bool]  #: with `course`: whether the measured rates are the reference, not the commanded
 
 
 class DataSetHead(TypedDict):
@@ -154,7 +159,11 @@ def scaled(
     }
     if head["verification"]:
         columns[VERIFICATION] = np.ones(n, dtype=np.int64)
-    if (encoder := head["encoder"]) is not None:
+    encoder = head["encoder"]
+    course = None if encoder is None else encoder.get("course")
+    if encoder is not None and course is not None:
+        columns |= _of_course(encoder, course, t_s)
+    elif encoder is not None:
         columns["table_angle_deg"] = encoder["angle_from_deg"] + encoder["rate_dps"] * (t_s - head["gate_from_s"])
         columns["computed_rate_dps"] = np.full(n, encoder["computed_dps"])
         columns["encoder_rate_dps"] = np.full(n, encoder["rate_dps"])
@@ -186,12 +195,30 @@ def _put_references(columns: dict[str, NDArray[np.generic]], channels: list[RawC
             columns[column] = columns[channel["name"]]
 
 
+def _of_course(
+    encoder: EncoderAngles, document: JsonObject, t_s: NDArray[np.float64]
+) -> dict[str, NDArray[np.generic]]:
+    """Return the columns, (n,), of a rate that changes: means over the period that ends with each reading."""
+    course = MeasuredCourse.of_json(document)
+    period_s = float(np.median(np.diff(t_s))) if len(t_s) > 1 else 1.0
+    measured, commanded = course.rates_dps(t_s, period_s)
+    return {
+        "table_rate_dps": measured if encoder.get("is_reference", True) else commanded,
+        "table_angle_deg": course.angle_deg(t_s - period_s / 2),  # at the middle of what a reading averages
+        "computed_rate_dps": commanded,
+        "encoder_rate_dps": measured,
+        "encoder_rate_u_dps": np.full(len(t_s), encoder["rate_u_dps"]),
+    }
+
+
 def angle_values(angles: TableAngles) -> dict[str, object]:
     """Return what a data set's row has of the table's encoder; the rate is the reference where that is said."""
     encoder: EncoderAngles = {
         "t_s": list(angles.t_s), "angle_deg": list(angles.angle_deg), "rate_dps": angles.rate_dps,
         "rate_u_dps": angles.rate_u_dps, "angle_from_deg": angles.angle_from_deg, "computed_dps": angles.computed_dps,
     }  # fmt: skip
+    if angles.course is not None:
+        encoder["course"], encoder["is_reference"] = angles.course.to_json(), angles.is_reference
     values: dict[str, object] = {"encoder": encoder, "table_angle_deg": angles.angle_from_deg}
     return values | ({"table_rate_dps": angles.rate_dps} if angles.is_reference else {})
 

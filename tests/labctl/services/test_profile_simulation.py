@@ -1,24 +1,19 @@
-"""Simulated ramps and sweeps: what is hidden is found, the encoder has its errors, and no campaign runs them."""
+"""Simulated ramps and sweeps: what is hidden is found, and the encoder has its errors."""
 
 from __future__ import annotations
-
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from instruments.bench_config import SimulationSettings
-from instruments.clock import VirtualClock
 from instruments.simulators.hidden import EFFECTS
 from instruments.simulators.physics.profile_motion import ProfileMotion
 from labctl.errors import BadInput
 from labctl.fitting import fit
 from labctl.recording import Recording
 from labctl.recording.sanity import inspect_recording
-from labctl.services.campaigns.preparation import prepare
 from labctl.services.planning.loading import limits_of, load_bench
 from labctl.services.simulation.plan_simulation import simulate
-from labctl.store import open_store
 from procedures.planning.plan import make_plan
 from procedures.recipe.recipe import parse_recipe
 
@@ -121,11 +116,3 @@ def test_the_memory_of_a_bandwidth_is_that_of_a_first_order_filter() -> None:
 def test_a_course_beyond_the_table_is_refused() -> None:
     with pytest.raises(BadInput, match=r"a sine_sweep reaches .* deg/s, but the limit of the table of bench"):
         simulated(amplitude_dps=5000.0)
-
-
-def test_no_campaign_runs_a_course(tmp_path: Path) -> None:
-    path = tmp_path / "sweep.toml"
-    path.write_text(RECIPE.format(amplitude=40))
-    lab = open_store(str(tmp_path / "lab.sqlite"), write=True)
-    with lab as store, pytest.raises(BadInput, match="can only be simulated"):
-        prepare(store, str(path), load_bench("single-axis-sim"), VirtualClock(), clip=False)

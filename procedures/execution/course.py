@@ -1,0 +1,122 @@
+"""One data set of a course: the table's rate changes while every unit is read, and its encoder says how."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from instruments.errors import InstrumentError
+from instruments.interfaces.table import CourseRun, CourseTable
+from procedures.contracts.errors import StepFailed
+from procedures.contracts.journal import DataSetHeader, DataSetState, TableAngles
+from procedures.contracts.steps import Acquire
+from procedures.execution import late_readings
+from procedures.execution.context import ExecutionContext, raise_violation
+from procedures.execution.gate_readings import count_missing, demand_readings, read_late, read_round
+from procedures.execution.waiting import checkpoint
+from procedures.monitoring.bench_snapshot import ReadingCounts
+from procedures.monitoring.course_reference import CourseLog, course_event
+
+#: From angle to angle, s; the units are read in between.
+READ_EVERY_S = 0.1
+
+
+def take_course(context: ExecutionContext, step: Acquire) -> dict[str, float]:
+    """Take one data set of a course; the table is at rest before and after.
+
+    Raises StepFailed, InstrumentError, GuardTripped, Aborted.
+    """
+    table = context.bench.table
+    if step.course is None or not isinstance(table, CourseTable):
+        raise StepFailed(f"{table.name}: runs constant rates only; remove [[profiles]] from the recipe")
+    if context.monitor.is_due(within_s=step.settle_s):
+        context.poll()
+    log = CourseLog(table, table.name, context.clock)
+    run = table.begin_course(step.course)
+    try:
+        for name, gyro in context.bench.gyros.items():  # what the streams have buffered before
+            context.monitor.add_readings(name, gyro, gyro.read_latest())
+        return _follow(context, step, table, run, log)
+    except InstrumentError:
+        table.stop()
+        raise
+
+
+def _follow(
+    context: ExecutionContext, step: Acquire, table: CourseTable, run: CourseRun, log: CourseLog
+) -> dict[str, float]:
+    gate = run.began_s, run.ends_s
+    counts = {
+        name: ReadingCounts(gyro.sample_rate_hz * (gate[1] - gate[0])) for name, gyro in context.bench.gyros.items()
+    }
+    with context.monitor.taking_readings(counts=counts):
+        number = context.recorder.journal.dataset_opened(_header(context, step, run))
+        try:
+            run = _read(context, table, run, log, number, gate, counts)
+            table.end_course(run)
+            read_late(context, number, gate, counts, late_readings.WAIT_S)
+            demand_readings(counts)
+            count_missing(context, number, gate, counts)
+            found = _note_course(context, run, log, number)
+        except BaseException as error:
+            reason = str(error) or type(error).__name__
+            context.recorder.journal.dataset_closed(number, DataSetState.PARTIAL, reason)
+            raise
+    context.recorder.journal.dataset_closed(number, DataSetState.COMPLETE)
+    taken = {f"readings.{name}": float(count.valid + count.invalid) for name, count in counts.items()}
+    figures = {"encoder_dps": found.rate_dps, "encoder_u_dps": found.rate_u_dps, "angles": float(len(found.t_s))}
+    return {"gate_s": gate[1] - gate[0], **figures, **taken}
+
+
+def _read(
+    context: ExecutionContext,
+    table: CourseTable,
+    run: CourseRun,
+    log: CourseLog,
+    number: int,
+    gate: tuple[float, float],
+    counts: dict[str, ReadingCounts],
+) -> CourseRun:
+    """Read table and units in turn until the course is over; returns it as it was commanded."""
+    gyros = context.bench.gyros
+    while (left_s := gate[1] - context.clock.now_s()) > 0:
+        run = table.continue_course(run)
+        log.read(run)
+        read_round(context, number, gate, counts, min(READ_EVERY_S, left_s) / len(gyros))
+        if context.monitor.is_due():
+            context.poll(read_latest=False)
+        else:
+            raise_violation(context.monitor.check_guards())
+        checkpoint(context)
+    log.read(run)
+    return run
+
+
+def _note_course(context: ExecutionContext, run: CourseRun, log: CourseLog, number: int) -> TableAngles:
+    """Record the course as the encoder measured it, and say where it is not as commanded."""
+    table = context.bench.table
+    is_reference = table.limits.reference == "measured"
+    found = log.result(run, context.recorder.time, is_reference=is_reference)
+    context.recorder.journal.table_angles(number, found)
+    assert found.course is not None
+    event = course_event(table, found, found.course, run.course.duration_s)
+    if event is not None:
+        context.recorder.event(replace(event, message=f"data set {number}: {event.message}"))
+    return found
+
+
+def _header(context: ExecutionContext, step: Acquire, run: CourseRun) -> DataSetHeader:
+    turned_deg = float(run.course.angle_deg(np.array([run.course.duration_s]))[0])
+    mean_dps = turned_deg / run.course.duration_s
+    return DataSetHeader(
+        step=step,
+        rate_dps=mean_dps,
+        asked_dps=mean_dps,
+        gate_from_s=context.recorder.time.of(run.began_s),
+        gate_until_s=context.recorder.time.of(run.ends_s),
+        angle_from_deg=None,
+        setpoint_c=context.monitor.setpoint_c,
+        run=step.run + context.added_runs,
+        gyros=tuple(context.bench.gyros),
+    )

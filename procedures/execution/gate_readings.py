@@ -1,0 +1,81 @@
+"""The readings of a data set, during its gate and just after: cut to the gate, written down and counted."""
+
+from __future__ import annotations
+
+from instruments.interfaces.gyro import Gyro, Readings
+from procedures.contracts.errors import BadData
+from procedures.execution import late_readings
+from procedures.execution.context import ExecutionContext, raise_violation
+from procedures.execution.waiting import checkpoint
+from procedures.monitoring.bench_snapshot import ReadingCounts
+from procedures.monitoring.campaign_time import CampaignTime
+from procedures.monitoring.event_recorder import warning
+
+
+def read_late(
+    context: ExecutionContext, number: int, gate: tuple[float, float], counts: dict[str, ReadingCounts], wait_s: float
+) -> None:
+    """Wait for readings of the gate that are still on their way, until `wait_s` after its end."""
+    gyros, every_s = context.bench.gyros, late_readings.EVERY_S / len(context.bench.gyros)
+    while context.clock.now_s() < gate[1] + wait_s and any(
+        late_readings.is_late(gyro)
+        or late_readings.pending(gyro, gate, counts[name])
+        or missing_of(gyro, gate, counts[name])
+        for name, gyro in gyros.items()
+    ):
+        read_round(context, number, gate, counts, every_s)
+        checkpoint(context)
+
+
+def missing_of(gyro: Gyro, gate: tuple[float, float], count: ReadingCounts) -> int:
+    """Return how many readings of the gate neither came nor were counted as lost."""
+    return late_readings.promise_of(gyro, gate[1] - gate[0]).missing(count.valid + count.invalid + count.damaged)
+
+
+def count_missing(
+    context: ExecutionContext, number: int, gate: tuple[float, float], counts: dict[str, ReadingCounts]
+) -> None:
+    """Count what never came as lost, and say it; too much of it raises GuardTripped."""
+    for name, gyro in context.bench.gyros.items():
+        at_edges = late_readings.dropped(gyro, gate, counts[name]) + late_readings.pending(gyro, gate, counts[name])
+        if missing := max(missing_of(gyro, gate, counts[name]), at_edges):
+            lost = late_readings.lost_readings(gyro, missing)
+            counts[name].add(lost)
+            context.recorder.journal.readings(number, name, lost, context.monitor.air_c)
+            expected = round(late_readings.promise_of(gyro, gate[1] - gate[0]).readings)
+            text = f"{name}: {missing} of {expected} readings of a data set did not arrive; they are counted as lost"
+            context.recorder.event(warning("readings_lost", text, name))
+    raise_violation(context.monitor.check_guards())
+
+
+def read_round(
+    context: ExecutionContext, number: int, gate: tuple[float, float], counts: dict[str, ReadingCounts], slice_s: float
+) -> None:
+    """Read every unit once and write down what falls into the gate."""
+    for name, gyro in context.bench.gyros.items():
+        readings = gyro.read(max(slice_s, 1.5 / gyro.sample_rate_hz))
+        if len(readings):
+            context.monitor.add_readings(name, gyro, readings)
+            counts[name].note(readings.t_s, gate[0])
+        kept = cut(readings, gate, context.recorder.time)
+        if len(kept) or kept.lost or kept.damaged:
+            counts[name].add(kept)
+            context.response.add(name, kept)
+            beside = context.monitor.references.beside(kept)
+            context.recorder.journal.readings(number, name, beside, context.monitor.chamber_c)
+
+
+def cut(readings: Readings, gate: tuple[float, float], time: CampaignTime) -> Readings:
+    """Return the readings inside the gate [from, until) with their times in campaign time; both in clock seconds."""
+    t_s = readings.t_s
+    if len(t_s) and gate[0] <= t_s[0] and t_s[-1] < gate[1]:
+        return time.of_readings(readings)
+    return time.of_readings(readings.only((t_s >= gate[0]) & (t_s < gate[1])))
+
+
+def demand_readings(counts: dict[str, ReadingCounts]) -> None:
+    for name, count in counts.items():
+        if count.valid + count.invalid == 0:
+            raise BadData(
+                name, f"none of about {count.expected:.0f} expected readings arrived; check cable, power and baud rate"
+            )
