@@ -5,8 +5,8 @@ from __future__ import annotations
 from itertools import groupby
 from xml.etree import ElementTree as ET
 
-from labctl.certificates.document import Certificate, Condition, Conformity, StandardUsed, StateOfItem
-from labctl.certificates.readable import uncertainty_text
+from labctl.certificates.document import Certificate, Condition, Conformity, SensorResult, StandardUsed, StateOfItem
+from labctl.certificates.readable import reference_text, uncertainty_text
 from labctl.certificates.units import readable
 from labctl.certificates.xml_parts import DCC, ENGLISH, SI, child, contact, optional, quantity, referred, texts
 
@@ -257,6 +257,26 @@ def _results(parent: ET.Element, given: Certificate) -> None:
         name = f"Axis {each.axis}: {each.name}{where}{alone}"
         quantity(made, name, [each.value], each.unit, u=each.u)
     _budget(parent, given)
+    for sensor in given.sensors:
+        _sensor(parent, sensor, probability)
+
+
+def _sensor(parent: ET.Element, given: SensorResult, probability: float) -> None:
+    """Add the result of an accelerometer or magnetometer."""
+    made = _result(
+        parent,
+        f"{given.sensor.capitalize()}, version {given.version}",
+        f"{given.formula}. Verdict: {given.verdict}. {' '.join(given.found)} Holds for: {given.holds_for} "
+        f"{given.not_stated} Measured {given.performed_from} to {given.performed_until}. Reference: "
+        f"{reference_text(given.reference)}. Files, SHA-256: {'; '.join(given.files)}. SHA-256 of the result: "
+        f"{given.hash}.",
+    )
+    reference = given.reference
+    quantity(made, f"Reference: {reference.quantity}", [reference.value], reference.unit, u=reference.u)
+    for each in given.coefficients:
+        quantity(
+            made, each.name, [each.value], each.unit, expanded=[each.expanded], k=[each.k], probability=probability
+        )
 
 
 def _any_axis(parent: ET.Element, given: Certificate) -> None:

@@ -215,6 +215,46 @@ class StabilityResult(Part):
     type: TypeOfItem | None = None  #: None: the drift is that of this item by its own calibrations
 
 
+class SensorCoefficient(Part):
+    """A coefficient of an accelerometer or magnetometer with its expanded uncertainty."""
+
+    name: str
+    value: float
+    u: float  #: combined standard uncertainty, with that of the reference where it is stated
+    expanded: float
+    k: float
+    unit: str
+
+
+class SensorReference(Part):
+    """The quantity by which a sensor was calibrated: local gravity, or the size of the local field."""
+
+    quantity: str
+    value: float
+    u: float | None  #: standard uncertainty; None: not stated, and not in the coefficients
+    unit: str
+    traceability: str  #: empty: none
+
+
+class SensorResult(Part):
+    """The calibration of the item's accelerometer or magnetometer."""
+
+    sensor: Literal["accelerometer", "magnetometer"]
+    version: int
+    hash: str  #: SHA-256 of the stored result
+    files: tuple[str, ...]  #: name and SHA-256 of each file that was fitted
+    performed_from: date
+    performed_until: date
+    included_by: str  #: who issued the certificate with it
+    formula: str
+    reference: SensorReference
+    coefficients: tuple[SensorCoefficient, ...]
+    verdict: Literal["adequate", "unexplained"]
+    found: tuple[str, ...]  #: what the fit found, in sentences
+    holds_for: str
+    not_stated: str  #: what was not measured, and is not stated
+
+
 class Authorisation(Part):
     """Who authorised the results: the act of certification, and its release where two persons have to agree."""
 
@@ -289,6 +329,7 @@ class Certificate(Part):
     results: tuple[ResultPoint, ...]
     any_axis: tuple[AnyAxisResult, ...] = ()  #: none: issued before it was stated
     coefficients: tuple[CoefficientResult, ...]
+    sensors: tuple[SensorResult, ...] = ()  #: accelerometer and magnetometer, where the order names them
     as_found: StateOfItem
     as_left: StateOfItem
     adjustment: str

@@ -14,6 +14,8 @@ from labctl.certificates.document import (
     CoefficientResult,
     ConformityResult,
     ResultPoint,
+    SensorReference,
+    SensorResult,
     StandardUsed,
     StateOfItem,
 )
@@ -80,6 +82,7 @@ def _pages(given: Certificate) -> dict[str, object]:
         ],
         "adjustment": given.adjustment,
         "coefficients": [_coefficient(each) for each in given.coefficients],
+        "sensors": [_sensor(each) for each in given.sensors],
         "conformity": _conformity(given),
         "external": given.external,
         "due": given.due.isoformat() if given.due else "",
@@ -250,6 +253,35 @@ def _coefficient(given: CoefficientResult) -> list[str]:
     warm = "" if given.temperature_c is None else _number(given.temperature_c)
     of_fit = "" if given.has_standards or u == "–" else FIT_ALONE
     return [given.axis, given.name.replace("_", " "), warm, value, u + of_fit, readable(given.unit)]
+
+
+def _sensor(given: SensorResult) -> Mapping[str, object]:
+    """Return the section of an accelerometer or magnetometer."""
+    first, last = given.performed_from.isoformat(), given.performed_until.isoformat()
+    return {
+        "title": f"{given.sensor.capitalize()}, version {given.version}",
+        "facts": [
+            ["Verdict", given.verdict],
+            ["Findings", " ".join(given.found)],
+            ["Reference", reference_text(given.reference)],
+            ["Holds for", f"{given.holds_for} {given.not_stated}"],
+            ["Measured", first if first == last else f"{first} to {last}"],
+            ["Included by", given.included_by],
+            ["Files, SHA-256", "; ".join(given.files)],
+            ["SHA-256 of the result", given.hash],
+        ],
+        "formula": given.formula,
+        "rows": [
+            [each.name, *rounded(each.value, each.expanded), f"{each.k:.2f}", readable(each.unit)]
+            for each in given.coefficients
+        ],
+    }
+
+
+def reference_text(given: SensorReference) -> str:
+    """Return the quantity by which a sensor was calibrated, its uncertainty and traceability."""
+    u = "" if given.u is None else f", u = {given.u:.2g} {readable(given.unit)}"
+    return f"{given.quantity} {given.value:.7g} {readable(given.unit)}{u}. Traceability: {given.traceability}"
 
 
 def _state(title: str, given: StateOfItem) -> Mapping[str, object]:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import re
 
 #: labctl's word -> what a person reads.
-READ = {"deg/s": "°/s", "deg C": "°C", "deg": "°", "pct": "%"}
+READ = {"deg/s": "°/s", "deg C": "°C", "deg": "°", "pct": "%", "m/s^2": "m/s²", "uT": "µT"}
 #: What a person reads -> D-SI (SI brochure, 9th edition; D-SI 2.2.1).
 SYMBOLS = {
     "deg": r"\degree", "°": r"\degree", "s": r"\second", "h": r"\hour", "min": r"\minute", "K": r"\kelvin",
     "°C": r"\degreecelsius", "deg C": r"\degreecelsius", "V": r"\volt", "%": r"\percent", "ppm": r"\ppm", "1": r"\one",
-    "hPa": r"\hecto\pascal",
+    "hPa": r"\hecto\pascal", "m": r"\metre", "uT": r"\micro\tesla",
 }  # fmt: skip
 _POWER = re.compile(r"([^\^]+)(?:\^(\d+))?")
 

@@ -27,7 +27,7 @@ from labctl.fitting.criticism.visibility import not_testable
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.data.mounting_angles import leaning_rates
 from labctl.fitting.data.noise_floor import NoiseFloor
-from labctl.fitting.data.static_record import LONG_S, static_record
+from labctl.fitting.data.static_record import LONG_S, StaticRecord, static_record
 from labctl.fitting.data.temperature.channel import with_temperature
 from labctl.fitting.effects import CATALOGUE, Effect, Term, kind_of
 from labctl.fitting.effects.response import response_of_terms
@@ -133,10 +133,14 @@ def criticise(
     points: Recording | None = None,
     fitted: FittedMeans | None = None,
     full: bool = True,
+    is_decimated: bool = False,
+    static: StaticRecord | None = None,
 ) -> Criticism:
     """Compare a model with a recording. Without `full` only the verdict is computed, for long studies.
 
-    `points` are the recording's means, and `fitted` the fit to them, where they are already known. Raises
+    `points` are the recording's means, and `fitted` the fit to them, where they are already known. The noise of single
+    readings is not that of averages: where the readings are such (`is_decimated`), `static` is the static record by all
+    of them, None where there is none. Raises
     NotEnoughData only where the model cannot even be fitted; too little for a verdict is a verdict. Raises Cancelled
     at a stage that finds it cancelled.
     """
@@ -146,7 +150,7 @@ def criticise(
     base = fitted.base if fitted is not None else None
     report_stage("reducing the recording")
     recording = with_temperature(fitted_part(recording))
-    data = _reduced(recording, full=full)
+    data = _reduced(recording, static, is_decimated=is_decimated, full=full)
     forward = _forward(fit_data, model, base)
     if (short := _too_little(data, forward)) is not None:
         return Criticism(Verdict("insufficient_data", reason=short), data, fit_data, base, None, None)
@@ -178,14 +182,21 @@ def criticise(
 
 @single_threaded
 def best_shapes(
-    recording: Recording, model: ErrorModel, catalogue: Mapping[str, Effect], *, points: Recording
+    recording: Recording,
+    model: ErrorModel,
+    catalogue: Mapping[str, Effect],
+    *,
+    points: Recording,
+    is_decimated: bool = False,
+    static: StaticRecord | None = None,
 ) -> dict[str, Term]:
     """Return effect id -> the shape that fits a recording best beside a model, whatever the evidence for the effect.
 
-    `points` are the recording's means. Raises NotEnoughData where the model cannot be fitted.
+    `points` are the recording's means, `is_decimated` and `static` as of `criticise`. Raises NotEnoughData where the
+    model cannot be fitted.
     """
     recording = with_temperature(fitted_part(recording))
-    data = replace(reduce_recording(recording), static=static_record(recording))
+    data = replace(reduce_recording(recording), static=static if is_decimated else static_record(recording))
     fit_data = fit_data_of(points)
     forward = _forward(fit_data, model, None)
     seen = _leaning(data, fit_data, forward).through(response_of_terms(forward.terms))
@@ -212,10 +223,11 @@ def _checked(found: Criticism, forward: ErrorModel, *, full: bool) -> Criticism:
     return replace(found, verdict=verdict, advice=kept, slow=slow, family=family if LAG in verdict.named else None)
 
 
-def _reduced(recording: Recording, *, full: bool) -> ReducedRecording:
+def _reduced(recording: Recording, static: StaticRecord | None, *, is_decimated: bool, full: bool) -> ReducedRecording:
     """Return a recording reduced to means, with its record at rest and the steps of its outputs."""
     data = reduce_recording(recording)
-    static = static_record(recording, 0.0 if full else LONG_S)
+    if not is_decimated:
+        static = static_record(recording, 0.0 if full else LONG_S)
     return replace(data, static=static, steps=steps_of(recording, data.white_var))
 
 

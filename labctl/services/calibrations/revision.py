@@ -197,7 +197,10 @@ def _shaped(measured: Measurements, base: ErrorModel, term: Term) -> Term:
     kind = kind_of(term)
     if term.order is not None or not (kind.parameters or kind.max_order):
         return term
-    shape = best_shapes(measured.readings, base, {kind.id: kind}, points=measured.points).get(kind.id)
+    shape = best_shapes(
+        measured.readings, base, {kind.id: kind}, points=measured.points, is_decimated=measured.is_decimated,
+        static=measured.static,
+    ).get(kind.id)  # fmt: skip
     return replace(shape, steady=True) if shape is not None else term
 
 

@@ -69,6 +69,7 @@ def assembled(
         results=found.results.points,
         any_axis=found.results.any_axis,
         coefficients=measured.coefficients(facts.calibration),
+        sensors=tuple(facts.sensors.results(order, request.by)),
         as_found=before,
         as_left=left,
         adjustment=adjustment,

@@ -12,6 +12,7 @@ from instruments.standards import SIMULATED, Standard
 from labctl.calibration import Calibration, read_calibration
 from labctl.recording import RecordingInfo
 from labctl.services.certificates.missing import of_contact
+from labctl.services.certificates.sensors import Sensors, missing_of
 from labctl.services.schemas.documents.certificates import CertificateOrder
 from labctl.services.standards.usage import performed
 from labctl.store import CalibrationRecord, CampaignRow, CertificationRow, RecordingRow, Store
@@ -37,6 +38,7 @@ class Facts:
     performed_from: date | None
     performed_until: date | None
     simulated: bool
+    sensors: Sensors
 
     @property
     def what(self) -> str:
@@ -77,6 +79,7 @@ class Facts:
                 "date of the next calibration, which state_due of the order asks for",
                 f"`labctl certify {self.row.serial} {self.row.version} --due-days DAYS ...`, or leave state_due out",
             )
+        yield from missing_of(self.order)
         yield from self._traceability()
 
     def _traceability(self) -> Iterator[tuple[str, str]]:
@@ -119,6 +122,7 @@ def facts_of(store: Store, serial: str, version: int, order: CertificateOrder) -
         performed_until=max(until, default=None) if campaign else method.performed_until or max(until, default=None),
         simulated=(bench is not None and bench.has_simulated)
         or any(each.traceability == SIMULATED for each in _standards(measured)),
+        sensors=Sensors.of(store, row.serial, order),
     )  # fmt: skip
 
 

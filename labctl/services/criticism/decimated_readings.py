@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,8 +15,20 @@ from labctl.services.forked import Forked
 from labctl.services.recordings.loading import is_profile, motion_of
 from labctl.store import RecordingRow, Store, open_store
 
-#: Gives the decimated readings of a recording, column by column.
-Decimated = Callable[[RecordingRow], Columns]
+if TYPE_CHECKING:
+    from labctl.fitting.data.static_record import StaticRecord
+
+
+@dataclass(frozen=True)
+class ReadRecording:
+    """What a criticism takes of a recording: its readings, decimated, and its static record by all of them."""
+
+    columns: Columns
+    static: StaticRecord | None
+
+
+#: Gives what a criticism takes of a recording.
+Decimated = Callable[[RecordingRow], ReadRecording]
 
 
 def is_decimated(row: RecordingRow) -> bool:
@@ -25,11 +39,14 @@ def is_decimated(row: RecordingRow) -> bool:
     return row.kind == "samples" and motion_of(row) not in {"turns", "poses"} and not is_profile(row)
 
 
-def decimated_columns_of(store: Store, row: RecordingRow) -> Columns:
-    """Return the readings of a recording, decimated data set by data set."""
+def read_recording_of(store: Store, row: RecordingRow) -> ReadRecording:
+    """Return the readings of a recording, decimated data set by data set, and its static record."""
+    from labctl.services.recordings.allan import static_record_of  # noqa: PLC0415  slow to import
+
     info = RecordingInfo.model_validate(row.info)
     parts = [decimate(Recording(info, columns, None)).columns for _, columns in store.recordings.iter_datasets(row.id)]
-    return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    return ReadRecording(columns, static_record_of(store, row))
 
 
 @contextmanager
@@ -37,16 +54,16 @@ def reading_beside(store: Store, rows: Sequence[RecordingRow]) -> Iterator[Decim
     """Begin to read the recordings; gives the function that returns the readings of each when they are needed."""
     wanted = [row for row in rows if is_decimated(row)]
 
-    def read() -> dict[int, Columns]:
+    def read() -> dict[int, ReadRecording]:
         with open_store(store.location, write=False) as own:
-            return {row.id: decimated_columns_of(own, row) for row in wanted}
+            return {row.id: read_recording_of(own, row) for row in wanted}
 
     with closing(Forked(read)) as forked:
-        found: dict[int, Columns] = {}
+        found: dict[int, ReadRecording] = {}
 
-        def decimated(row: RecordingRow) -> Columns:
+        def decimated(row: RecordingRow) -> ReadRecording:
             if not forked.is_forked:
-                return decimated_columns_of(store, row)
+                return read_recording_of(store, row)
             if not found:
                 found.update(forked.result())
             return found[row.id]

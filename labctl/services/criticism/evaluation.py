@@ -46,7 +46,10 @@ def evaluate(
     try:
         model = model_of(calibration)
         fitted = fit_means(measured.points, model)  # while the readings are being read
-        found = criticise(measured.readings, model, catalogue, fitted=fitted)
+        found = criticise(
+            measured.readings, model, catalogue, fitted=fitted, is_decimated=measured.is_decimated,
+            static=measured.static,
+        )  # fmt: skip
     except NotConverged as error:
         what = f"criticism of version {calibration.version} on {measured.named}"
         refuse_wrong(warnings, what, accepted=False, insist=f"; without refitting, {error}")

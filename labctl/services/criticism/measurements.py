@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,11 +13,18 @@ from labctl.errors import BadInput
 from labctl.fitting.data.covered import Covered
 from labctl.fitting.data.fit_data import refuse_poses
 from labctl.fitting.data.joined import joined_coverage, joined_recording
+from labctl.fitting.data.static_record import StaticRecord
 from labctl.progress import report_stage
 from labctl.recording import Recording
+from labctl.recording.columns import OWN_DATASET, RECORDING
 from labctl.recording.info import GIVE_DATE, RecordingInfo, measured_at
 from labctl.recording.output_steps import per_reading, quantisation_of
-from labctl.services.criticism.decimated_readings import Decimated, decimated_columns_of, is_decimated
+from labctl.services.criticism.decimated_readings import (
+    Decimated,
+    ReadRecording,
+    is_decimated,
+    read_recording_of,
+)
 from labctl.services.recordings.coverage import covered_of
 from labctl.services.recordings.inspection import inspect_stored
 from labctl.services.recordings.loading import (
@@ -114,8 +121,39 @@ class Measurements:
         """The readings at no more than criticism needs; the means where there are no readings. Raises BadInput."""
         report_stage("reading the recording" if len(self.rows) == 1 else f"reading {self.named}")
         return joined_recording(
-            {row.id: load_reduced_readings(self.store, row, self.of_each[row.id], self.decimated) for row in self.rows}
+            {row.id: _reduced_readings(self.of_each[row.id], self._read.get(row.id)) for row in self.rows}
         )
+
+    @cached_property
+    def _read(self) -> Mapping[int, ReadRecording]:
+        """What was read of each recording of which a criticism takes decimated readings."""
+        for row in self.rows:
+            refuse_unmeasured(row, self.of_each[row.id])
+        wanted = [row for row in self.rows if is_decimated(row)]
+        return {
+            row.id: read_recording_of(self.store, row) if self.decimated is None else self.decimated(row)
+            for row in wanted
+        }
+
+    @property
+    def is_decimated(self) -> bool:
+        """Whether the readings are averages, so that only `static` has the noise of single ones."""
+        return bool(self._read)
+
+    @cached_property
+    def static(self) -> StaticRecord | None:
+        """The longest static record by all readings, data sets as `readings` numbers them; None: there is none."""
+        found = [(number, read.static) for number, read in self._read.items() if read.static is not None]
+        if not found:
+            return None
+        recording, longest = max(found, key=lambda each: each[1].duration_s)
+        columns = self.readings.columns
+        if RECORDING not in columns:
+            return longest
+        own = np.asarray(columns[OWN_DATASET])[np.asarray(columns[RECORDING]) == recording]
+        joined = np.asarray(columns["dataset"])[np.asarray(columns[RECORDING]) == recording]
+        first, last = (int(joined[own == n][0]) for n in (longest.first_dataset, longest.last_dataset))
+        return replace(longest, first_dataset=first, last_dataset=last)
 
     def question(self) -> dict[str, object]:
         """Return what an answer about these measurements depends on."""
@@ -177,15 +215,11 @@ def refuse_unmeasured(row: RecordingRow, points: Recording) -> None:
         refuse_poses(points.info)
 
 
-def load_reduced_readings(store: Store, row: RecordingRow, points: Recording, decimated: Decimated | None) -> Recording:
-    """Return a recording's readings, decimated data set by data set; `points`, its means, where it has none.
-
-    `decimated` gives them where they are read already. Raises BadInput for what `refuse_unmeasured` refuses.
-    """
-    refuse_unmeasured(row, points)
-    if not is_decimated(row):
+def _reduced_readings(points: Recording, read: ReadRecording | None) -> Recording:
+    """Return a recording's readings, decimated data set by data set; `points`, its means, where it has none."""
+    if read is None:
         return points
-    columns = dict(decimated_columns_of(store, row) if decimated is None else decimated(row))
+    columns = dict(read.columns)
     for name, values in quantisation_of(points).items():  # decimated readings do not show their steps any more
         numbers = np.asarray(points.columns["dataset"], dtype=np.int64)
         columns[name] = per_reading(np.asarray(columns["dataset"], dtype=np.int64), numbers, values)

@@ -103,21 +103,40 @@ def _of_set(recording: Recording, dataset: int) -> StaticRecord:
     return StaticRecord(dataset, dataset, mean_c, len(t_s) * period_s, axes)
 
 
-def _at_rest(store: Store, recording: int, info: RecordingInfo) -> StaticRecord:
-    """Return the static record, looked for only in what was measured at rest: the rest of the readings stay unread."""
+def static_record_of(store: Store, row: RecordingRow) -> StaticRecord | None:
+    """Return the static record of a recording by all of its readings, or None: of the Allan deviation and a criticism.
+
+    The longest section at rest of what is fitted, as `allan_unit` states it.
+    """
+    info = RecordingInfo.model_validate(row.info)
+    _, still = _still(store, row.id)
+    return _static_record(store, row.id, info, still) if still else None
+
+
+def _still(store: Store, recording: int) -> tuple[int, list[int]]:
+    """Return how many data sets were measured at rest, and the numbers of those that are fitted."""
     rows = store.recordings.data_sets(recording)
     at_rest = [row for row in rows if row.state == "complete" and row.n and row.table_rate_dps == 0]
-    still = [row.number for row in at_rest if not row.verification]
+    return len(at_rest), [row.number for row in at_rest if not row.verification]
+
+
+def _static_record(store: Store, recording: int, info: RecordingInfo, still: Sequence[int]) -> StaticRecord | None:
     names = (*NEEDED, *(f"gyro_{axis}" for axis in info.axes))
     parts: list[dict[str, NDArray[np.generic]]] = []
     for number in still:
         columns = store.recordings.dataset(recording, number)
         parts.append({name: columns[name] for name in names if name in columns})
-    if parts:
-        together = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-        if (found := static_record(Recording(info, together))) is not None:
-            return found
-    aside = len(at_rest) - len(still)
+    together = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    return static_record(Recording(info, together))
+
+
+def _at_rest(store: Store, recording: int, info: RecordingInfo) -> StaticRecord:
+    """Return the static record, looked for only in what was measured at rest: the rest of the readings stay unread."""
+    at_rest, still = _still(store, recording)
+    found = None if not still else _static_record(store, recording, info, still)
+    if found is not None:
+        return found
+    aside = at_rest - len(still)
     beside = f" beside the {aside} data sets at rest that were measured to verify a calibration" if aside else ""
     raise NotEnoughData(
         f"recording {recording} has no section of {LEAST_READINGS} readings at rest and at one temperature{beside}; "

@@ -3642,6 +3642,10 @@ export interface components {
             environment?: components["schemas"]["RoomConditions"];
             /** @description Statement of conformity to a specification; null: the certificate makes no statement. */
             conformity?: components["schemas"]["OrderedConformity"] | null;
+            /** @description Version of the unit's accelerometer to state; null: none. */
+            accelerometer?: components["schemas"]["OrderedAccelerometer"] | null;
+            /** @description Version of the unit's magnetometer to state; null: none. */
+            magnetometer?: components["schemas"]["OrderedMagnetometer"] | null;
             /**
              * Adjustment
              * @description Adjustments or repairs other than the new coefficients; empty: none.
@@ -7750,6 +7754,43 @@ export interface components {
             do: string;
         };
         /**
+         * OrderedAccelerometer
+         * @description The accelerometer, and the local gravity by which it is traceable.
+         */
+        OrderedAccelerometer: {
+            /**
+             * Version
+             * @description Number of the version, as `labctl sensors list SERIAL` prints it.
+             */
+            version: number;
+            /**
+             * Performed From
+             * @description First day of its measurements.
+             */
+            performed_from?: string | null;
+            /**
+             * Performed Until
+             * @description Last day; null: the same day.
+             */
+            performed_until?: string | null;
+            /**
+             * Gravity M S2
+             * @description Gravity at the place of the measurements, m/s2.
+             */
+            gravity_m_s2?: number | null;
+            /**
+             * Gravity U M S2
+             * @description Its standard uncertainty, m/s2.
+             */
+            gravity_u_m_s2?: number | null;
+            /**
+             * Traceability
+             * @description How that gravity is known: measurement, or gravity information system.
+             * @default
+             */
+            traceability?: string;
+        };
+        /**
          * OrderedConformity
          * @description The specification to which conformity is to be stated, and the rule.
          */
@@ -7807,6 +7848,43 @@ export interface components {
              * @description Date of receipt; null: the results do not depend on it.
              */
             received?: string | null;
+        };
+        /**
+         * OrderedMagnetometer
+         * @description The magnetometer; the size of the field is stated only where a magnetometer that is calibrated measured it.
+         */
+        OrderedMagnetometer: {
+            /**
+             * Version
+             * @description Number of the version, as `labctl sensors list SERIAL` prints it.
+             */
+            version: number;
+            /**
+             * Performed From
+             * @description First day of its measurements.
+             */
+            performed_from?: string | null;
+            /**
+             * Performed Until
+             * @description Last day; null: the same day.
+             */
+            performed_until?: string | null;
+            /**
+             * Field Ut
+             * @description Size of the field at the place of the measurements, uT.
+             */
+            field_ut?: number | null;
+            /**
+             * Field U Ut
+             * @description Its standard uncertainty, uT.
+             */
+            field_u_ut?: number | null;
+            /**
+             * Traceability
+             * @description How that field is known.
+             * @default
+             */
+            traceability?: string;
         };
         /**
          * OrderedMethod

@@ -77,7 +77,7 @@ def test_residuals_are_the_rows_behind_the_map(
     rows = answer["columns"]
     assert {len(values) for values in rows.values()} == {3 * 630}
     with monkeypatch.context() as patched:  # one work gives both
-        patched.setattr(measurements, "load_reduced_readings", None)
+        patched.setattr(measurements, "_reduced_readings", None)
         maps = client.get(f"{path}/1/criticism").json()["maps"]
     cells = by_cell(rows, "residual_dps", "over_floor", "table_rate_dps", "temperature_c", "position")
     for part in maps:

@@ -131,7 +131,7 @@ def test_criticise_looks_at_the_readings_once(tmp_path: Path, monkeypatch: pytes
     def never(*_: object) -> None:
         raise AssertionError("read again")
 
-    monkeypatch.setattr(measurements, "load_reduced_readings", never)
+    monkeypatch.setattr(measurements, "_reduced_readings", never)
     assert lab.json("criticise", "FOG-0001") == first
     with pytest.raises(AssertionError, match="read again"):
         lab.run("criticise", "FOG-0001", "--formula", "wet: supply_v - 5")

@@ -77,6 +77,38 @@ class RoomConditions(Request):
     pressure_hpa: Span | None = Field(default=None, description="Air pressure of the room, hPa.")
 
 
+class OrderedSensor(Request):
+    """A version of the unit's accelerometer or magnetometer that the certificate is to state."""
+
+    version: int = Field(ge=1, description="Number of the version, as `labctl sensors list SERIAL` prints it.")
+    performed_from: date | None = Field(default=None, description="First day of its measurements.")
+    performed_until: date | None = Field(default=None, description="Last day; null: the same day.")
+
+
+class OrderedAccelerometer(OrderedSensor):
+    """The accelerometer, and the local gravity by which it is traceable."""
+
+    gravity_m_s2: float | None = Field(
+        default=None, ge=9.7, le=9.9, description="Gravity at the place of the measurements, m/s2."
+    )
+    gravity_u_m_s2: float | None = Field(default=None, gt=0, le=0.1, description="Its standard uncertainty, m/s2.")
+    traceability: str = Field(
+        default="",
+        max_length=LINE,
+        description="How that gravity is known: measurement, or gravity information system.",
+    )
+
+
+class OrderedMagnetometer(OrderedSensor):
+    """The magnetometer; the size of the field is stated only where a magnetometer that is calibrated measured it."""
+
+    field_ut: float | None = Field(
+        default=None, gt=0, le=1e6, description="Size of the field at the place of the measurements, uT."
+    )
+    field_u_ut: float | None = Field(default=None, gt=0, le=1e6, description="Its standard uncertainty, uT.")
+    traceability: str = Field(default="", max_length=LINE, description="How that field is known.")
+
+
 class CertificateOrder(Request):
     """The facts of the order: what a campaign cannot know. They are kept with the certificate."""
 
@@ -90,6 +122,12 @@ class CertificateOrder(Request):
     conformity: OrderedConformity | None = Field(
         default=None,
         description="Statement of conformity to a specification; null: the certificate makes no statement.",
+    )
+    accelerometer: OrderedAccelerometer | None = Field(
+        default=None, description="Version of the unit's accelerometer to state; null: none."
+    )
+    magnetometer: OrderedMagnetometer | None = Field(
+        default=None, description="Version of the unit's magnetometer to state; null: none."
     )
     adjustment: LongText = Field(default="", max_length=TEXT, description="Adjustments or repairs other than the new "
     "coefficients; empty: none.")  # fmt: skip

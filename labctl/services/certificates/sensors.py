@@ -1,0 +1,215 @@
+"""What a certificate states of the item's accelerometer and magnetometer: versions that the order names.
+
+The reference is a common scale: gravity by which a force is known, or the field. The coefficients are converted exactly
+to the value that the order states, and its uncertainty is a line of their budgets.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from labctl.certificates.document import SensorCoefficient, SensorReference, SensorResult
+from labctl.errors import BadInput
+from labctl.fitting.magnetometer.calibrate import AXES
+from labctl.fitting.magnetometer.ellipsoid import PARAMETERS, PLACES
+from labctl.fitting.poses.at_rest.accelerometer import PARAMETERS as ACCELEROMETER_PARAMETERS
+from labctl.fitting.poses.at_rest.gravity import STANDARD_GRAVITY
+from labctl.fitting.poses.triad import UPPER
+from labctl.fitting.uncertainty.budget import BudgetLine, budget_of
+from labctl.services.schemas.documents.certificates import (
+    CertificateOrder,
+    OrderedAccelerometer,
+    OrderedMagnetometer,
+    OrderedSensor,
+)
+from labctl.services.schemas.reports.accelerometer import AccelerometerResponse
+from labctl.services.schemas.sensors import AccelerometerVersion, MagnetometerVersion, SensorName
+from labctl.services.sensor_versions import one_accelerometer, one_magnetometer
+from labctl.store import Store
+
+#: Parameters of an accelerometer that an earlier version has given, where it was used too.
+KNOWN_BEFORE = 6
+FORCE = "reading = bias + (1 + E) force; E: scale factors on the diagonal, misalignment ij of axis i by force along j"
+FIELD = "field = soft iron (reading - hard iron); soft iron symmetric, in the axes of the sensor"
+NOT_FORCE = (
+    "Not measured, and not stated: other temperatures, larger forces, nonlinearity, vibration, and the change from one "
+    "power-on to the next or with time."
+)
+NOT_FIELD = (
+    "Not measured, and not stated: other temperatures, iron and currents that come near later, change with time."
+)
+NO_FIELD = "none: the soft iron is relative to this size, the hard iron in the nominal unit of the readings"
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """The versions that an order names."""
+
+    accelerometer: AccelerometerVersion | None = None
+    magnetometer: MagnetometerVersion | None = None
+
+    @staticmethod
+    def of(store: Store, serial: str, order: CertificateOrder) -> Sensors:
+        """Return the versions that an order names. Raises NotFound."""
+        force, field = order.accelerometer, order.magnetometer
+        return Sensors(
+            None if force is None else one_accelerometer(store, serial, force.version),
+            None if field is None else one_magnetometer(store, serial, field.version),
+        )
+
+    def results(self, order: CertificateOrder, included_by: str) -> Iterator[SensorResult]:
+        """Yield what the certificate states of each."""
+        if self.accelerometer is not None and order.accelerometer is not None:
+            yield accelerometer_result(self.accelerometer, order.accelerometer, included_by)
+        if self.magnetometer is not None and order.magnetometer is not None:
+            yield magnetometer_result(self.magnetometer, order.magnetometer, included_by)
+
+
+def missing_of(order: CertificateOrder) -> Iterator[tuple[str, str]]:
+    """Yield the mandatory facts of the named versions that the order does not state. Raises BadInput for wrong ones."""
+    force, field = order.accelerometer, order.magnetometer
+    if force is not None:
+        yield from _missing_day(force, "accelerometer")
+        for name, value in (
+            ("local gravity (gravity_m_s2)", force.gravity_m_s2),
+            ("standard uncertainty of the local gravity (gravity_u_m_s2)", force.gravity_u_m_s2),
+            ("traceability of the local gravity", force.traceability.strip()),
+        ):
+            if not value:
+                yield name, "[accelerometer] of the order"
+    if field is not None:
+        yield from _missing_day(field, "magnetometer")
+        stated = (field.field_ut, field.field_u_ut, field.traceability.strip())
+        if any(stated) and not all(stated):
+            yield "field_ut, field_u_ut and traceability together", "[magnetometer] of the order, or none of the three"
+
+
+def _missing_day(sensor: OrderedSensor, name: str) -> Iterator[tuple[str, str]]:
+    where = f"[{name}] of the order"
+    if sensor.performed_from is None:
+        yield f"performed_from of the {name}", where
+    elif sensor.performed_until is not None and sensor.performed_until < sensor.performed_from:
+        raise BadInput(
+            f"{where}: performed_until = {sensor.performed_until} is before performed_from = {sensor.performed_from}; "
+            "correct the dates"
+        )
+
+
+def accelerometer_result(
+    version: AccelerometerVersion, ordered: OrderedAccelerometer, included_by: str
+) -> SensorResult:
+    """Return an accelerometer's result, its scale factors those of the stated gravity."""
+    result = version.result
+    if ordered.gravity_m_s2 is None or ordered.gravity_u_m_s2 is None:
+        raise BadInput("[accelerometer] of the order: state gravity_m_s2 and gravity_u_m_s2")  # refused before
+    used = result.gravity_g * STANDARD_GRAVITY
+    ratio, relative_u = used / ordered.gravity_m_s2, ordered.gravity_u_m_s2 / ordered.gravity_m_s2
+    freedom = _freedom_of(result)
+    u = np.sqrt(np.diag(np.array(result.covariance)))
+    found = [
+        _coefficient(f"bias {axis}", STANDARD_GRAVITY * result.bias_g[axis].value, "m/s^2", (STANDARD_GRAVITY * u[i],
+                     freedom), 0.0)
+        for i, axis in enumerate(AXES)
+    ]  # fmt: skip
+    for place, (i, j) in enumerate(UPPER, start=len(AXES)):
+        name, own = AXES[i] + AXES[j], float(i == j)
+        was = result.scale_factor[AXES[i]] if i == j else result.misalignment[name]
+        value = ratio * (own + was.value) - own
+        named = f"scale factor {AXES[i]}" if i == j else f"misalignment {name}"
+        found.append(_coefficient(named, value, "1", (ratio * u[place], freedom), (own + value) * relative_u))
+    reference = SensorReference(
+        quantity="local gravity", value=ordered.gravity_m_s2, u=ordered.gravity_u_m_s2, unit="m/s^2",
+        traceability=ordered.traceability.strip(),
+    )  # fmt: skip
+    holds_for = (
+        f"Specific forces of the size of gravity in any direction, at the conditions of the "
+        f"{result.rests - result.left_out} rests in {result.poses} poses."
+    )
+    converted = (
+        f"The fit took the local gravity as {used:.7g} m/s²; the coefficients here are for that of the reference."
+    )
+    notes = (FORCE, holds_for, NOT_FORCE)
+    return _result("accelerometer", version, ordered, included_by, reference, found, notes, [converted])
+
+
+def magnetometer_result(version: MagnetometerVersion, ordered: OrderedMagnetometer, included_by: str) -> SensorResult:
+    """Return a magnetometer's result: its soft iron that of the stated field, or relative where none is stated.
+
+    Raises BadInput for one whose field was not constant.
+    """
+    result = version.result
+    if version.verdict != "adequate":
+        raise BadInput(
+            f"[magnetometer] of the order: the field of version {version.version} was not constant, and its "
+            "coefficients are no calibration; record it again, or leave [magnetometer] out"
+        )
+    covariance, used = np.array(result.covariance), result.field_ut.value
+    stated, u_stated = ordered.field_ut, ordered.field_u_ut
+    ratio = 1.0 if stated is None else stated / used
+    freedom = max((result.readings - result.left_out) / result.repetition - PARAMETERS, 1.0)
+    found = [
+        _coefficient(f"hard iron {axis}", result.hard_iron_ut[axis].value, "uT", (math.sqrt(covariance[i, i]), freedom),
+                     0.0)
+        for i, axis in enumerate(AXES)
+    ]  # fmt: skip
+    for place, (i, j) in enumerate(PLACES, start=len(AXES)):
+        value = ratio * result.soft_iron[AXES[i] + AXES[j]].value
+        by = np.zeros(len(covariance))
+        by[place] = ratio
+        if stated is not None:  # the stated size replaces the one by the readings, with its uncertainty
+            by[-1] = -value / used
+        of_fit = math.sqrt(max(float(by @ covariance @ by), 0.0))
+        of_field = 0.0 if stated is None or u_stated is None else value * u_stated / stated
+        found.append(_coefficient(f"soft iron {AXES[i]}{AXES[j]}", value, "1", (of_fit, freedom), of_field))
+    reference = SensorReference(
+        quantity="size of the local field", value=used if stated is None else stated, unit="uT",
+        u=None if stated is None else u_stated,
+        traceability=NO_FIELD if stated is None else ordered.traceability.strip(),
+    )  # fmt: skip
+    holds_for = (
+        "The item as it was mounted, with the iron and the currents near it; from any direction of the field to the "
+        f"nearest that was measured: up to {result.largest_gap_deg:.0f}°."
+    )
+    return _result("magnetometer", version, ordered, included_by, reference, found, (FIELD, holds_for, NOT_FIELD))
+
+
+def _freedom_of(result: AccelerometerResponse) -> float:
+    """Return the degrees of freedom of the fit: rests beyond what the parameters take."""
+    known = KNOWN_BEFORE if result.earlier is not None else 0
+    return max(float(result.rests - result.left_out + known - ACCELEROMETER_PARAMETERS), 1.0)
+
+
+def _coefficient(
+    name: str, value: float, unit: str, of_fit: tuple[float, float], of_reference: float
+) -> SensorCoefficient:
+    """Return a coefficient with U: `of_fit` is the standard uncertainty of the fit with its degrees of freedom."""
+    u, freedom = of_fit
+    lines = [BudgetLine("coefficients", "fit", "A", "normal", u, unit, 1.0, u, freedom)]
+    if of_reference:
+        size = abs(of_reference)
+        lines.append(BudgetLine("reference", "reference", "B", "normal", size, unit, 1.0, size, is_common=True))
+    budget = budget_of(name, unit, lines, value)
+    combined, expanded, k = budget.combined or 0.0, budget.expanded or 0.0, budget.k or 0.0  # every line is known
+    return SensorCoefficient(name=name, value=value, u=combined, expanded=expanded, k=k, unit=unit)
+
+
+def _result(
+    sensor: SensorName, version: AccelerometerVersion | MagnetometerVersion, ordered: OrderedSensor, included_by: str,
+    reference: SensorReference, coefficients: Sequence[SensorCoefficient], notes: tuple[str, str, str],
+    found: Sequence[str] = (),
+) -> SensorResult:  # fmt: skip
+    formula, holds_for, not_stated = notes
+    first = ordered.performed_from
+    if first is None:
+        raise BadInput(f"[{sensor}] of the order: state performed_from")  # refused before
+    return SensorResult(
+        sensor=sensor, version=version.version, hash=version.hash,
+        files=tuple(f"{each.name} ({each.sha256})" for each in version.data.files),
+        performed_from=first, performed_until=ordered.performed_until or first, included_by=included_by,
+        formula=formula, reference=reference, coefficients=tuple(coefficients), verdict=version.verdict,
+        found=(*version.summary, *found), holds_for=holds_for, not_stated=not_stated,
+    )  # fmt: skip
