@@ -39,7 +39,7 @@ LAWS = {
     "output": "scale * difference * output is subtracted with the rest of the errors",
 }
 #: Samples that are followed at once, so that they stay in the processor's cache.
-BLOCK = 8192
+BLOCK = 16384
 
 
 @dataclass(frozen=True)
@@ -279,24 +279,20 @@ class RunningMemory:
             np.matmul(np.array(rows).T, self._sizes, out=found)
 
 
-def course(running: RunningMemory, t_s: Array, temperature_c: Array) -> Remembered:
-    """Return the errors of samples at times (n,) and temperatures (n,), (n, axes) or one for all, (n, axes) each.
-
-    Raises BadInput for times that go back.
-    """
+def check_order(running: RunningMemory, t_s: Array) -> None:
+    """Raise BadInput for samples at times (n,) s that go back, or are from before the last one that was followed."""
     last = running.last_s
     goes_on = len(t_s) == 0 or last is None or bool(t_s[0] >= last)
-    if not (goes_on and np.all(t_s[1:] >= t_s[:-1])):  # also where one is no number
-        rows = np.flatnonzero(np.isfinite(t_s))
-        known = t_s[rows]
-        before = np.concatenate([known[:1] if last is None else [last], known[:-1]])
-        if np.any(back := known < before):
-            k = int(np.argmax(back))
-            raise BadInput(
-                f"sample {rows[k] + 1}: t_s = {known[k]:.9g} s is before {before[k]:.9g} s; give them in order of time"
-            )
-    warm = temperature_c.mean(axis=1) if temperature_c.ndim == 2 else np.broadcast_to(temperature_c, t_s.shape)
-    return running.errors(t_s, np.asarray(warm))
+    if goes_on and np.all(t_s[1:] >= t_s[:-1]):
+        return
+    rows = np.flatnonzero(np.isfinite(t_s))  # one that is no number is left out
+    known = t_s[rows]
+    before = np.concatenate([known[:1] if last is None else [last], known[:-1]])
+    if np.any(back := known < before):
+        k = int(np.argmax(back))
+        raise BadInput(
+            f"sample {rows[k] + 1}: t_s = {known[k]:.9g} s is before {before[k]:.9g} s; give them in order of time"
+        )
 
 
 def split_memory(fitted: FittedModel, axes: tuple[str, ...]) -> tuple[FittedModel, Memory | None]:

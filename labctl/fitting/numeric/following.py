@@ -28,7 +28,7 @@ FEW = 16 * LANE
 #: A sum over decays is written with growing weights, exp(a): up to this exponent, where they keep 13 digits.
 LARGEST_EXPONENT = 60.0
 #: Terms of the series of the mean over a step are left out below this share.
-NEGLIGIBLE = 1e-17
+NEGLIGIBLE = 5e-17
 #: The longest step, in time constants, whose mean is summed as a series; of longer ones it is an exponential.
 SERIES_TO = 0.05
 
@@ -57,7 +57,7 @@ class Steps:
     def of(t_s: Array, now_c: Array, last_s: float, last_c: float) -> Steps:
         """Return the steps of samples at times (n,) and temperatures (n,), after a sample at `last_s` and `last_c`."""
         fall_k = _falls(now_c, last_c)
-        step_s = np.negative(_falls(t_s, last_s))
+        step_s = _changes(t_s, last_s)
         mean_s = (float(t_s[-1]) - last_s) / len(t_s)
         ulp = np.spacing(max(abs(float(t_s[-1])), abs(last_s)))
         if len(t_s) > 1 and float(step_s.max() - step_s.min()) <= ROUNDED * ulp:
@@ -140,6 +140,14 @@ class Steps:
         return np.asarray(low)
 
 
+def _changes(values: Array, last: float) -> Array:
+    """Return by how much each value, (n,), is more than the one before it, the first of them `last`."""
+    found = np.empty_like(values)
+    found[0] = values[0] - last
+    np.subtract(values[1:], values[:-1], out=found[1:])
+    return found
+
+
 def _falls(values: Array, last: float) -> Array:
     """Return by how much each value, (n,), is less than the one before it, the first of them `last`."""
     found = np.empty_like(values)
@@ -164,8 +172,8 @@ def _means(ratios: Array) -> Array:
         safe = np.where(ratios > 0, ratios, 1.0)
         return np.where(ratios > 0, -np.expm1(-safe) / safe, 1.0)
     terms = [1.0, -1.0 / 2]
-    while abs(terms[-1]) * longest ** (len(terms) - 1) > NEGLIGIBLE:
-        terms.append(-terms[-1] / (len(terms) + 1))
+    while abs(following := -terms[-1] / (len(terms) + 1)) * longest ** len(terms) > NEGLIGIBLE:
+        terms.append(following)
     found = ratios * terms[-1]
     for term in terms[-2:0:-1]:
         found += term
