@@ -19,7 +19,7 @@ from labctl.fitting.data.channels import BODY_AXES
 from labctl.fitting.data.temperature.channel import STAND_IN_C
 from labctl.fitting.data.temperature.history import TemperatureHistory
 from labctl.fitting.models.correction import Correct, correct_across, correction, with_scale
-from labctl.fitting.models.memory import MemoryState, Remembered, RunningMemory, course, split_memory
+from labctl.fitting.models.memory import BLOCK, MemoryState, Remembered, RunningMemory, check_order, split_memory
 
 __all__ = [
     "MARGIN_C",
@@ -197,38 +197,63 @@ class Compensator:
             )
         warm = np.asarray(self._known(temperature_c), dtype=np.float64)
         beside = self._by_force(specific_force_g, len(raw))
-        if self._memory is not None:
-            if history is None:
-                running = self._running if continued and self._running is not None else RunningMemory(self._memory)
-                remembered = course(running, np.asarray(known["t_s"], dtype=np.float64), warm)
-            else:
-                remembered = self._memory.of_history(history, known)
-            beside = remembered if beside is None else remembered.with_bias(beside.bias_dps)
         correct = self._correct if cross_rates_dps is None else self._correct_across(cross_rates_dps, len(raw))
-        return self._beside(beside, raw, warm, known, given.shape, correct, has_force=specific_force_g is not None)
+        if self._memory is None or history is not None:
+            if self._memory is not None and history is not None:
+                remembered = self._memory.of_history(history, known)
+                beside = remembered if beside is None else remembered.with_bias(beside.bias_dps)
+            found = self._beside(beside, raw, warm, known, correct)
+        else:
+            running = self._running if continued and self._running is not None else RunningMemory(self._memory)
+            found = self._followed(running, beside, raw, warm, known, correct, len(raw) if cross_rates_dps else BLOCK)
+        left_out = self._left_out_dps if specific_force_g is None else None
+        return Compensated(found.rate_dps.reshape(given.shape), found.outside, left_out)
+
+    def _followed(
+        self, running: RunningMemory, by_force: Remembered | None, raw: Array, warm: Array,
+        known: Mapping[str, Array], correct: Correct, at_once: int,
+    ) -> Compensated:  # fmt: skip
+        """Correct a course of outputs (n, axes), so many samples `at_once`, that they stay in the processor's cache."""
+        n = len(raw)
+        channels = {name: np.asarray(values) for name, values in known.items()}
+        t_s = channels["t_s"].astype(np.float64, copy=False)
+        check_order(running, t_s)
+        rate, outside = np.empty_like(raw), np.empty(n, dtype=bool)
+        for first in range(0, n, at_once):
+            rows = slice(first, first + at_once)
+            of_rows = {name: values[rows] if values.shape[:1] == (n,) else values for name, values in channels.items()}
+            warm_rows = warm[rows] if warm.ndim else warm
+            one_c = warm_rows.mean(axis=1) if warm.ndim == 2 else np.broadcast_to(warm_rows, t_s[rows].shape)
+            beside = running.errors(t_s[rows], one_c)
+            if by_force is not None:
+                beside = beside.with_bias(by_force.bias_dps[rows])
+            found = self._beside(beside, raw[rows], warm_rows, of_rows, correct, first)
+            rate[rows], outside[rows] = found.rate_dps, found.outside
+        return Compensated(rate, outside)
 
     def _beside(
-        self, beside: Remembered | None, raw: Array, warm: Array, known: Mapping[str, Array], shape: tuple[int, ...],
-        correct: Correct, *, has_force: bool,
+        self, beside: Remembered | None, raw: Array, warm: Array, known: Mapping[str, Array], correct: Correct,
+        first: int = 0,
     ) -> Compensated:  # fmt: skip
-        """Correct outputs (n, axes) of which errors of bias and scale factor, (n, axes), are known; None: none."""
-        left_out = None if has_force else self._left_out_dps
+        """Correct outputs (n, axes) of which errors of bias and scale factor, (n, axes), are known; None: none.
+
+        `first` is the number of samples before them.
+        """
         if beside is None:
-            found = self._held(raw, warm, known, correct)
-            return Compensated(found.rate_dps.reshape(shape), found.outside, left_out)
+            return self._held(raw, warm, known, correct, first)
         if self._is_direct:
-            found = self._held(np.where(np.isnan(beside.bias_dps), np.nan, raw), warm, known, correct)
+            found = self._held(np.where(np.isnan(beside.bias_dps), np.nan, raw), warm, known, correct, first)
             rate = found.rate_dps - beside.bias_dps
             if beside.scale is not None:
                 rate = rate - beside.scale * np.clip(raw, self._slow, self._fast)
-            return Compensated(rate.reshape(shape), found.outside, left_out)
+            return Compensated(rate, found.outside)
         less = raw - beside.bias_dps
-        found = self._held(less, warm, known, correct)
+        found = self._held(less, warm, known, correct, first)
         rate = found.rate_dps
         if beside.scale is not None:
             held = partial(self._at_edge, warm=warm, known=known, correct=correct)
             rate = with_scale(held, less, beside.scale, self._slow, self._fast)
-        return Compensated(rate.reshape(shape), found.outside, left_out)
+        return Compensated(rate, found.outside)
 
     def _by_force(self, specific_force_g: ArrayLike | None, n: int) -> Remembered | None:
         """Return what specific force adds to the bias; it remembers nothing."""
@@ -253,7 +278,7 @@ class Compensator:
         across = {axis: np.broadcast_to(np.asarray(r, np.float64), (n,)) for axis, r in cross_rates_dps.items()}
         return partial(correct_across, self._model, self.axes, across)
 
-    def _held(self, raw: Array, warm: Array, known: Mapping[str, Array], correct: Correct) -> Compensated:
+    def _held(self, raw: Array, warm: Array, known: Mapping[str, Array], correct: Correct, first: int) -> Compensated:
         """Correct outputs (n, axes) by what does not remember, at the edge of the range where they are outside."""
         lowest, highest = (float(np.min(warm)), float(np.max(warm))) if warm.size else (self._low_c, self._high_c)
         least, most = (float(np.min(raw)), float(np.max(raw))) if raw.size else (0.0, 0.0)
@@ -261,7 +286,7 @@ class Compensator:
         if calm:  # also false when there is a NaN
             flags = np.zeros(len(raw), dtype=bool)
         else:
-            flags = self._judge(raw, warm)
+            flags = self._judge(raw, warm, first)
             return Compensated(self._at_edge(raw, warm, known, correct), flags)
         return Compensated(correct(raw, warm, known), flags)
 
@@ -285,7 +310,7 @@ class Compensator:
             )
         return STAND_IN_C
 
-    def _judge(self, raw: Array, warm: Array) -> NDArray[np.bool_]:
+    def _judge(self, raw: Array, warm: Array, first: int) -> NDArray[np.bool_]:
         """Return which samples are outside the range or no numbers, (n,); raises BadInput when that is refused."""
         spread = warm.reshape(len(raw), -1) if warm.ndim else np.full((len(raw), 1), float(warm))
         within_c = (spread >= self._low_c - MARGIN_C) & (spread <= self._high_c + MARGIN_C)
@@ -299,7 +324,7 @@ class Compensator:
                 else f"rate {raw[row].tolist()} deg/s outside {self._slow:g} to {self._fast:g} deg/s"
             )
             raise BadInput(
-                f"sample {row + 1}: {what} (the range calibrated for {self.calibration.serial} version "
+                f"sample {first + row + 1}: {what} (the range calibrated for {self.calibration.serial} version "
                 f"{self.calibration.version}); set outside = 'clamp' to correct such a sample as at the "
                 "edge of the range and flag it"
             )
@@ -338,6 +363,6 @@ class Compensator:
         beside = self._running.errors(np.array([t_s]), np.array([temperature_c]))
         found = self._beside(
             beside if by_force is None else beside.with_bias(by_force.bias_dps), raw, np.array([temperature_c]),
-            {"t_s": np.array([t_s])}, raw.shape, self._correct, has_force=specific_force_g is not None,
+            {"t_s": np.array([t_s])}, self._correct,
         )  # fmt: skip
         return found.rate_dps[0], bool(found.outside[0])

@@ -126,7 +126,7 @@ def _finite(path: Path, name: str, values: Column, valid: Column | None) -> None
         row = int(np.argmax(bad))
         raise BadRecording(
             f"{path}: column {name!r}, row {row + 1}: {values[row]} is not a number (the column is the "
-            f"{BY_NAME[name].meaning}); leave the row out, or mark it with valid = 0"
+            f"{BY_NAME[name].meaning.removeprefix('the ')}); leave the row out, or mark it with valid = 0"
         )
 
 

@@ -223,3 +223,25 @@ def test_what_is_not_exported_is_said_with_its_size() -> None:
     hours = np.asarray(fit_data_of(to_points(recording)).channels["t_s"]) / 3600.0
     hours -= (hours.min() + hours.max()) / 2  # a coefficient of time counts from the middle of the recording
     assert left["rms_dps"] == pytest.approx(np.sqrt(np.mean((slope * hours) ** 2)), rel=1e-3)
+
+
+def test_a_long_array_is_that_of_its_parts_and_a_refusal_names_the_sample(flows: dict[str, Calibration]) -> None:
+    n = 40_000
+    t_s = 1e5 + 0.01 * np.arange(n)
+    warm = 30.0 + 20.0 * np.sin(t_s / 70.0)
+    warm[21_000] = np.nan
+    raw = np.random.default_rng(8).normal(0, 0.2, n)
+    for kind in KINDS:
+        whole, parts = Compensator(flows[kind]), Compensator(flows[kind])
+        found = whole.compensate(raw, warm, {"t_s": t_s}, continued=True)
+        halves = [
+            parts.compensate(raw[rows], warm[rows], {"t_s": t_s[rows]}, continued=True).rate_dps
+            for rows in (slice(0, 17_003), slice(17_003, n))
+        ]
+        assert np.concatenate(halves) == pytest.approx(found.rate_dps, abs=1e-12, nan_ok=True)
+        assert np.flatnonzero(found.outside).tolist() == [21_000]
+        assert whole.state is not None
+        assert parts.state is not None
+        assert whole.state.at_c == pytest.approx(parts.state.at_c, abs=1e-10)
+    with pytest.raises(BadInput, match="sample 21001: temperature"):
+        Compensator(flows["two ways"], "refuse").compensate(raw, warm, {"t_s": t_s})

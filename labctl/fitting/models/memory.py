@@ -72,19 +72,29 @@ class Follower:
         """What determines where it is: two that agree in this are always at the same place."""
         return self.kind, self.parameter, self.cooling_s
 
-    def moved(self, steps: Steps, at_c: float) -> Array:
-        """Return where it is after each step, (n,) deg C, from `at_c`."""
-        if self.kind == "play":
-            return steps.played(self.parameter, at_c)
-        if self.cooling_s is None:
-            return steps.lagged(self.parameter, at_c)
-        return steps.lagged_two_ways(self.parameter, self.cooling_s, at_c)
+    def place(self, at_c: float, now_c: float) -> float:
+        """Return what is kept from sample to sample: of a lag how far it is behind, K, of a play where it is, deg C."""
+        return at_c - now_c if self.kind == "lag" else at_c
 
-    def state(self, at_c: Array, now_c: Array) -> Array:
+    def at_c(self, place: float, now_c: float) -> float:
+        """Return where it is, deg C, by what is kept of it."""
+        return now_c + place if self.kind == "lag" else place
+
+    def moved(self, steps: Steps, place: float) -> Array:
+        """Return its place after each step, (n,), from `place`."""
+        if self.kind == "play":
+            return steps.played(self.parameter, place)
+        if self.cooling_s is None:
+            return steps.lagged(self.parameter, place)
+        return steps.lagged_two_ways(self.parameter, self.cooling_s, place)
+
+    def state(self, places: Array, now_c: Array) -> Array:
         """Return what the size is multiplied by, (n,): K behind the temperature, or the side of the play, -1 to 1."""
         if self.kind == "lag":
-            return LagElement("", "", self.part, self.parameter).values(at_c - now_c, now_c - self.reference_c)
-        side = (now_c - at_c) / (self.parameter / 2)
+            if self.part == "all":
+                return places
+            return LagElement("", "", self.part, self.parameter).values(places, now_c - self.reference_c)
+        side = (now_c - places) / (self.parameter / 2)
         if self.bow is None:
             return side
         share = np.clip((now_c - self.bow[0]) / max(self.bow[1] - self.bow[0], 1e-9), 0.0, 1.0)
@@ -188,11 +198,21 @@ class RunningMemory:
             none = np.zeros(self._axes)
             scales = [none if follower.scale is None else follower.scale for follower in self._followers]
             self._sizes = np.concatenate([self._sizes, np.array(scales)], axis=1)
-        self.state: MemoryState | None = None  #: None before the first sample
+        #: Time, s, and temperature, deg C, of the last sample, and the place of each follower; None before the first.
+        self._last: tuple[float, float, tuple[float, ...]] | None = None
+
+    @property
+    def state(self) -> MemoryState | None:
+        """Where the followers are; None before the first sample."""
+        if self._last is None:
+            return None
+        t_s, warm, places = self._last
+        at_c = (each.at_c(place, warm) for each, place in zip(self._followers, places, strict=True))
+        return MemoryState(t_s, warm, tuple(at_c))
 
     def reset(self) -> None:
         """Forget all, as after the unit was switched off for long."""
-        self.state = None
+        self._last = None
 
     def start(self, state: MemoryState) -> None:
         """Go on from a state that another process has handed over; raises BadInput for one of another calibration."""
@@ -203,62 +223,76 @@ class RunningMemory:
                 f"temperature {state.temperature_c:g} deg C: this calibration has {len(self._followers)} followers, "
                 "and all values must be finite; hand over the `state` of a compensator of the same calibration"
             )
-        self.state = state
+        warm = state.temperature_c
+        places = (each.place(at_c, warm) for each, at_c in zip(self._followers, state.at_c, strict=True))
+        self._last = state.t_s, warm, tuple(places)
 
     @property
     def last_s(self) -> float | None:
         """The time of the last sample, s; None before the first."""
-        return self.state.t_s if self.state is not None else None
+        return self._last[0] if self._last is not None else None
 
     def errors(self, t_s: Array, temperature_c: Array) -> Remembered:
         """Return the errors at samples (n,) in order of time, (n, axes) each, and move on to the last of them.
 
         A sample that is no number moves nothing.
         """
-        found = self._errors(t_s, temperature_c)
+        found = np.empty((len(t_s), self._sizes.shape[1]))
+        for begin in range(0, len(t_s), BLOCK):
+            block = slice(begin, begin + BLOCK)
+            self._block(t_s[block], temperature_c[block], found[block])
         if found.shape[1] == self._axes:
             return Remembered(found)
         return Remembered(found[:, : self._axes], found[:, self._axes :])
 
-    def _errors(self, t_s: Array, temperature_c: Array) -> Array:
-        known = np.isfinite(t_s) & np.isfinite(temperature_c)
-        if not known.all():
-            found = np.full((len(t_s), self._sizes.shape[1]), np.nan)
-            found[known] = self._errors(t_s[known], temperature_c[known])
-            return found
-        found = np.empty((len(t_s), self._sizes.shape[1]))
-        for begin in range(0, len(t_s), BLOCK):
-            block = slice(begin, begin + BLOCK)
-            found[block] = self._block(t_s[block], temperature_c[block])
-        return found
+    def _block(self, t_s: Array, warm: Array, found: Array) -> None:
+        """Write the errors of some samples into `found`."""
+        known = np.isfinite(t_s)
+        known &= np.isfinite(warm)
+        if known.all():
+            self._known_block(t_s, warm, found)
+            return
+        found[:] = np.nan
+        if known.any():
+            of_known = np.empty((int(known.sum()), found.shape[1]))
+            self._known_block(t_s[known], warm[known], of_known)
+            found[known] = of_known
 
-    def _block(self, t_s: Array, warm: Array) -> Array:
-        state = self.state or MemoryState(float(t_s[0]), float(warm[0]), (float(warm[0]),) * len(self._followers))
-        steps = Steps.of(t_s, warm, state.t_s, state.temperature_c)
+    def _known_block(self, t_s: Array, warm: Array, found: Array) -> None:
+        if self._last is None:
+            self.start(MemoryState(float(t_s[0]), float(warm[0]), (float(warm[0]),) * len(self._followers)))
+        assert self._last is not None
+        last_s, last_c, places = self._last
+        steps = Steps.of(t_s, warm, last_s, last_c)
         moved: dict[tuple[str, float, float | None], Array] = {}
-        rows = np.empty((len(self._followers), len(warm)))
-        for k, (each, at_c) in enumerate(zip(self._followers, state.at_c, strict=True)):
-            if each.movement not in moved:
-                moved[each.movement] = each.moved(steps, at_c)
-            rows[k] = each.state(moved[each.movement], warm)
+        rows = []
+        for each, place in zip(self._followers, places, strict=True):
+            movement = each.movement
+            if movement not in moved:
+                moved[movement] = each.moved(steps, place)
+            rows.append(each.state(moved[movement], warm))
         ends = tuple(float(moved[each.movement][-1]) for each in self._followers)
-        self.state = MemoryState(float(t_s[-1]), float(warm[-1]), ends)
-        return rows.T @ self._sizes
+        self._last = float(t_s[-1]), float(warm[-1]), ends
+        if self._sizes.shape == (1, 1):  # a product of matrices would cost as much as the state
+            np.multiply(rows[0], self._sizes[0, 0], out=found[:, 0])
+        else:
+            np.matmul(np.array(rows).T, self._sizes, out=found)
 
 
-def course(running: RunningMemory, t_s: Array, temperature_c: Array) -> Remembered:
-    """Return the errors of samples at times (n,) and temperatures (n,), (n, axes) or one for all, (n, axes) each.
-
-    Raises BadInput for times that go back.
-    """
+def check_order(running: RunningMemory, t_s: Array) -> None:
+    """Raise BadInput for samples at times (n,) s that go back, or are from before the last one that was followed."""
     last = running.last_s
-    back = np.diff(t_s, prepend=t_s[:1] if last is None else last) < 0
-    if np.any(back):
-        row = int(np.argmax(back))
-        before = t_s[row - 1] if row else last
-        raise BadInput(f"sample {row + 1}: t_s = {t_s[row]:.9g} s is before {before:.9g} s; give them in order of time")
-    warm = temperature_c.mean(axis=1) if temperature_c.ndim == 2 else np.broadcast_to(temperature_c, t_s.shape)
-    return running.errors(t_s, np.asarray(warm))
+    goes_on = len(t_s) == 0 or last is None or bool(t_s[0] >= last)
+    if goes_on and np.all(t_s[1:] >= t_s[:-1]):
+        return
+    rows = np.flatnonzero(np.isfinite(t_s))  # one that is no number is left out
+    known = t_s[rows]
+    before = np.concatenate([known[:1] if last is None else [last], known[:-1]])
+    if np.any(back := known < before):
+        k = int(np.argmax(back))
+        raise BadInput(
+            f"sample {rows[k] + 1}: t_s = {known[k]:.9g} s is before {before[k]:.9g} s; give them in order of time"
+        )
 
 
 def split_memory(fitted: FittedModel, axes: tuple[str, ...]) -> tuple[FittedModel, Memory | None]:

@@ -26,30 +26,32 @@ class Surface:
         """Return corrected rates, (n, axes), from outputs (n, axes) and temperatures (n,), (n, axes) or one for all."""
         out = np.empty_like(raw)
         warm = np.asarray(temperature_c, dtype=np.float64)
-        for axis, c in enumerate(self.coefficients):
-            of_axis = warm[:, axis] if warm.ndim == 2 else warm
-            self._correct_axis(c, raw[:, axis], of_axis, out[:, axis])
+        buffers = np.empty(PIECE), np.empty(PIECE), np.empty(PIECE)
+        for start in range(0, len(raw), PIECE):  # all axes of a piece, as they lie between each other in memory
+            piece = slice(start, start + PIECE)
+            u, row, total = (buffer[: len(raw[piece])] for buffer in buffers)
+            for axis, c in enumerate(self.coefficients):
+                if axis == 0 or warm.ndim == 2:
+                    of_axis = warm[piece, axis] if warm.ndim == 2 else warm[piece] if warm.ndim else warm
+                    np.subtract(of_axis, self.reference_c, out=u)
+                _sum(c, raw[piece, axis], u, row, total)
+                np.subtract(raw[piece, axis], total, out=out[piece, axis])
         return out
 
-    def _correct_axis(self, c: NDArray[np.float64], raw: Array, warm: Array, out: Array) -> None:
-        rate_powers, temperature_powers = c.shape
-        centred, row, sum_ = np.empty(PIECE), np.empty(PIECE), np.empty(PIECE)
-        for start in range(0, len(raw), PIECE):
-            w = raw[start : start + PIECE]
-            m = len(w)
-            u, a, e = centred[:m], row[:m], sum_[:m]
-            np.subtract(warm[start : start + PIECE] if warm.ndim else warm, self.reference_c, out=u)
-            for i in range(rate_powers - 1, -1, -1):
-                target = e if i == rate_powers - 1 else a
-                np.multiply(u, c[i, -1], out=target)
-                for j in range(temperature_powers - 2, 0, -1):
-                    target += c[i, j]
-                    target *= u
-                target += c[i, 0]
-                if i < rate_powers - 1:
-                    e *= w
-                    e += a
-            np.subtract(w, e, out=out[start : start + PIECE])
+
+def _sum(c: NDArray[np.float64], w: Array, u: Array, row: Array, total: Array) -> None:
+    """Write sum c[i, j] w^i u^j of rates and centred temperatures, (n,), into `total`; `row` is overwritten."""
+    rate_powers, temperature_powers = c.shape
+    for i in range(rate_powers - 1, -1, -1):
+        target = total if i == rate_powers - 1 else row
+        np.multiply(u, c[i, -1], out=target)
+        for j in range(temperature_powers - 2, 0, -1):
+            target += c[i, j]
+            target *= u
+        target += c[i, 0]
+        if i < rate_powers - 1:
+            total *= w
+            total += row
 
 
 def surface_of(fitted: FittedModel, axes: tuple[str, ...]) -> Surface | None:

@@ -1,13 +1,15 @@
 """Followers of a temperature through many samples at once, each from where it was before the first of them.
 
 The recurrences are solved in the order of the samples, so samples that come in one array, in several, or one by one
-give the same up to rounding.
+give the same up to rounding. A lag is followed as its distance from the temperature: x + (T - x) would round a small
+distance at the last digit of the temperature, at each of millions of steps.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +19,18 @@ from labctl.fitting.numeric.arrays import Array
 
 #: Steps that differ by less than this many units in the last place of their times are even.
 ROUNDED = 4.0
+#: Values that one row of a matrix product sums: the product costs as many operations for each value.
+LANE = 16
+#: Rows of one product: of more, the product would be spread over threads, and small ones wait for each other.
+LANES = 512
+#: Sums over fewer values are solved one value after the other.
+FEW = 16 * LANE
+#: A sum over decays is written with growing weights, exp(a): up to this exponent, where they keep 13 digits.
+LARGEST_EXPONENT = 60.0
+#: Terms of the series of the mean over a step are left out below this share.
+NEGLIGIBLE = 5e-17
+#: The longest step, in time constants, whose mean is summed as a series; of longer ones it is an exponential.
+SERIES_TO = 0.05
 
 
 def lag_shares(step_s: float, tau_s: float) -> tuple[float, float, float]:
@@ -35,79 +49,79 @@ class Steps:
     """Steps from one sample to the next, the first of them from the sample before: durations, s, and temperatures."""
 
     step_s: Array  #: (n,), or (1,) where all are even
-    before_c: Array  #: (n,) deg C
+    passed_s: Array  #: (n,) from the sample before the first, s
+    fall_k: Array  #: (n,) of the temperature in each step, K
     now_c: Array  #: (n,) deg C
 
     @staticmethod
     def of(t_s: Array, now_c: Array, last_s: float, last_c: float) -> Steps:
         """Return the steps of samples at times (n,) and temperatures (n,), after a sample at `last_s` and `last_c`."""
-        before_c = np.empty_like(now_c)
-        before_c[0], before_c[1:] = last_c, now_c[:-1]
-        step_s = np.empty_like(t_s)
-        step_s[0] = t_s[0] - last_s
-        np.subtract(t_s[1:], t_s[:-1], out=step_s[1:])
+        fall_k = _falls(now_c, last_c)
+        step_s = _changes(t_s, last_s)
         mean_s = (float(t_s[-1]) - last_s) / len(t_s)
         ulp = np.spacing(max(abs(float(t_s[-1])), abs(last_s)))
-        is_even = len(t_s) > 1 and float(np.ptp(step_s)) <= ROUNDED * ulp
-        return Steps(np.array([mean_s]) if is_even else step_s, before_c, now_c)
+        if len(t_s) > 1 and float(step_s.max() - step_s.min()) <= ROUNDED * ulp:
+            return Steps(np.array([mean_s]), _counted(len(t_s)) * mean_s, fall_k, now_c)
+        return Steps(step_s, t_s - last_s, fall_k, now_c)
 
     @staticmethod
     def even(course_c: Array, step_s: float) -> Steps:
         """Return the steps of an evenly spaced course (n,), the first of them from its own temperature."""
-        return Steps(np.array([step_s]), np.concatenate([course_c[:1], course_c[:-1]]), course_c)
+        passed_s = _counted(len(course_c)) * step_s
+        return Steps(np.array([step_s]), passed_s, _falls(course_c, float(course_c[0])), course_c)
 
-    def lagged(self, tau_s: float, at_c: float) -> Array:
-        """Return a first-order follower after each step, (n,) deg C; exact for temperatures on straight lines."""
-        keep, pull = self._first_order(tau_s)
-        return _followed(keep, pull, at_c)
+    def lagged(self, tau_s: float, behind_k: float) -> Array:
+        """Return a first-order follower less the temperature after each step, (n,) K, from `behind_k` before them.
 
-    def lagged_two_ways(self, warming_s: float, cooling_s: float, at_c: float) -> Array:
+        Exact for temperatures on straight lines.
+        """
+        if len(self.step_s) > 1:
+            ratios = self.step_s / tau_s
+            return _decayed(ratios, self.passed_s / tau_s, _means(ratios) * self.fall_k, behind_k)
+        keep, _, new = lag_shares(float(self.step_s[0]), tau_s)
+        return _decaying_sum(keep, (1.0 - new) * self.fall_k, behind_k)
+
+    def lagged_two_ways(self, warming_s: float, cooling_s: float, behind_k: float) -> Array:
         """Return the same of one with another time constant in steps that end below where it was at their start.
 
         Which steps these are depends on the answer: it is found again until they stay the same. All samples up to the
-        first that still changes are final, so that each pass gets further, as a rule to the end in a few.
+        first that still changes are final, so that each pass gets further, as a rule to the end in one or two: a
+        follower is far from where a lag matters, and slow.
         """
-        cools = self.now_c < self.before_c
-        keep, pull = self._two_ways(warming_s, cooling_s, cools, slice(None))
+        start_k = behind_k
+        cools = self.now_c < float(self.now_c[0] + self.fall_k[0]) + behind_k
         found = np.empty_like(self.now_c)
         begin = 0
         while True:
             rest = slice(begin, None)
-            start = at_c if begin == 0 else float(found[begin - 1])
-            found[rest] = _followed(keep[rest], pull[rest].copy(), start)
+            found[rest] = self._two_ways(warming_s, cooling_s, cools, begin, start_k)
             cooled = np.empty_like(cools[rest])
-            cooled[0] = self.now_c[begin] < start
-            np.less(self.now_c[begin + 1 :], found[begin:-1], out=cooled[1:])
-            changed = begin + np.flatnonzero(cooled != cools[rest])
-            if len(changed) == 0:
+            cooled[0] = start_k + self.fall_k[begin] > 0
+            np.greater(found[begin:-1] + self.fall_k[begin + 1 :], 0.0, out=cooled[1:])
+            changed = cooled != cools[rest]
+            first = int(np.argmax(changed))
+            if not changed[first]:
                 return found
             cools[rest] = cooled
-            keep[changed], pull[changed] = self._two_ways(warming_s, cooling_s, cools, changed)
-            begin = int(changed[0])
+            begin += first
+            start_k = behind_k if begin == 0 else float(found[begin - 1])
 
     def _two_ways(
-        self, warming_s: float, cooling_s: float, cools: NDArray[np.bool_], rows: slice | NDArray[np.int64]
-    ) -> tuple[Array, Array]:
-        """Return what is kept in some steps, each of which warms or cools (n,), and where it is pulled to, (.,)."""
-        own = cools[rows]
-        before_c, now_c = self.before_c[rows], self.now_c[rows]
-        if len(self.step_s) > 1:
-            keeps, means = _shares(self.step_s[rows] / np.where(own, cooling_s, warming_s))
-            return keeps, (means - keeps) * before_c + (1.0 - means) * now_c
-        step_s = float(self.step_s[0])
-        both = zip(lag_shares(step_s, cooling_s), lag_shares(step_s, warming_s), strict=True)
-        keep, last, new = (np.where(own, cooling, warming) for cooling, warming in both)
-        return keep, last * before_c + new * now_c
-
-    def _first_order(self, tau_s: float) -> tuple[Array | float, Array]:
-        """Return what is kept of a first-order follower in each step, (n,) or one, and where it is pulled to."""
-        if len(self.step_s) == 1:
-            keep, last, new = lag_shares(float(self.step_s[0]), tau_s)
-            pull = last * self.before_c
-            pull += new * self.now_c
-            return keep, pull
-        keeps, means = _shares(self.step_s / tau_s)
-        return keeps, (means - keeps) * self.before_c + (1.0 - means) * self.now_c
+        self, warming_s: float, cooling_s: float, cools: NDArray[np.bool_], begin: int, behind_k: float
+    ) -> Array:
+        """Return the follower from a step on, where it is known which steps cool (n,)."""
+        own = cools[begin:]
+        rest = Steps(
+            self.step_s[begin:] if len(self.step_s) > 1 else self.step_s,
+            self.passed_s[begin:] - (self.passed_s[begin - 1] if begin else 0.0),
+            self.fall_k[begin:], self.now_c[begin:],
+        )  # fmt: skip
+        if own.all() or not own.any():
+            return rest.lagged(cooling_s if own[0] else warming_s, behind_k)
+        per_s = np.where(own, 1.0 / cooling_s, 1.0 / warming_s)
+        ratios = rest.step_s * per_s
+        exponents = _decaying_sum(1.0, ratios.copy(), 0.0)
+        return _decayed(ratios, exponents, _means(ratios) * rest.fall_k, behind_k)
 
     def played(self, width_k: float, at_c: float) -> Array:
         """Return a follower that the temperature carries along at the edges of a play of this width, (n,) deg C.
@@ -126,22 +140,104 @@ class Steps:
         return np.asarray(low)
 
 
-def _followed(keep: Array | float, pull: Array, at_c: float) -> Array:
-    """Return x with x_k = keep_k x_(k-1) + pull_k, (n,), from `at_c`; writes over `pull`."""
+def _changes(values: Array, last: float) -> Array:
+    """Return by how much each value, (n,), is more than the one before it, the first of them `last`."""
+    found = np.empty_like(values)
+    found[0] = values[0] - last
+    np.subtract(values[1:], values[:-1], out=found[1:])
+    return found
+
+
+def _falls(values: Array, last: float) -> Array:
+    """Return by how much each value, (n,), is less than the one before it, the first of them `last`."""
+    found = np.empty_like(values)
+    found[0] = last - values[0]
+    np.subtract(values[:-1], values[1:], out=found[1:])
+    return found
+
+
+@lru_cache(maxsize=2)
+def _counted(n: int) -> Array:
+    """Return 1 to n."""
+    return np.arange(1.0, n + 1.0)
+
+
+def _means(ratios: Array) -> Array:
+    """Return the mean of a decay over each of some steps, given in time constants, (n,): (1 - exp(-r)) / r.
+
+    Steps are short beside a time constant, as a rule: a few terms of the series then are exact, and cost less.
+    """
+    longest = float(ratios.max())
+    if longest > SERIES_TO:
+        safe = np.where(ratios > 0, ratios, 1.0)
+        return np.where(ratios > 0, -np.expm1(-safe) / safe, 1.0)
+    terms = [1.0, -1.0 / 2]
+    while abs(following := -terms[-1] / (len(terms) + 1)) * longest ** len(terms) > NEGLIGIBLE:
+        terms.append(following)
+    found = ratios * terms[-1]
+    for term in terms[-2:0:-1]:
+        found += term
+        found *= ratios
+    found += 1.0
+    return found
+
+
+def _decayed(ratios: Array, exponents: Array, pull: Array, start: float) -> Array:
+    """Return x with x_k = exp(-ratios_k) x_(k-1) + pull_k, (n,), from `start`; writes over the exponents and `pull`.
+
+    As a sum, exp(a_k) x_k is that of exp(a_j) pull_j up to k, where the exponents a are the sums of the ratios. Its
+    rounding decays with the terms themselves.
+    """
+    if len(pull) < FEW or float(exponents[-1]) > LARGEST_EXPONENT:
+        return _one_by_one(np.exp(-ratios), pull, start)
+    weights = np.exp(exponents, out=exponents)
+    pull *= weights
+    found = _decaying_sum(1.0, pull, start)
+    found /= weights
+    return found
+
+
+def _decaying_sum(keep: float, values: Array, start: float) -> Array:
+    """Return x with x_k = keep x_(k-1) + values_k, (n,), from `start`; writes over `values`.
+
+    Lanes of values are summed by a matrix product, after the first of each got what is left of the lanes before it.
+    """
+    n = len(values)
+    whole = n - n % LANE
+    if n < FEW:
+        return _one_by_one(keep, values, start)
+    within, whole_lane = _lane(keep)
+    found = np.empty(n)
+    lanes = found[:whole].reshape(-1, LANE)
+    given = values[:whole].reshape(-1, LANE)
+    given[0, 0] += keep * start
+    ends = _decaying_sum(whole_lane, given[:-1] @ within[:, -1], 0.0)
+    given[1:, 0] += keep * ends
+    for begin in range(0, len(lanes), LANES):
+        np.matmul(given[begin : begin + LANES], within, out=lanes[begin : begin + LANES])
+    if whole < n:
+        found[whole:] = _one_by_one(keep, values[whole:], float(found[whole - 1]))
+    return found
+
+
+@lru_cache(maxsize=16)
+def _lane(keep: float) -> tuple[Array, float]:
+    """Return what is left of the values of a lane at each of its places, (LANE, LANE), and after a lane's length."""
+    powers = np.power(keep, np.arange(LANE + 1.0))
+    places = np.arange(LANE)
+    after = places[None, :] - places[:, None]
+    return np.where(after >= 0, powers[np.maximum(after, 0)], 0.0), float(powers[-1])
+
+
+def _one_by_one(keep: Array | float, pull: Array, start: float) -> Array:
+    """Return x with x_k = keep_k x_(k-1) + pull_k, (n,), from `start`; writes over `pull`."""
     band = np.empty((2, len(pull)), order="F")
     band[0] = 1.0
     if isinstance(keep, np.ndarray):
         band[1, :-1] = -keep[1:]
-        pull[0] += keep[0] * at_c
+        pull[0] += keep[0] * start
     else:
         band[1] = -keep
-        pull[0] += keep * at_c
+        pull[0] += keep * start
     found, _ = dtbtrs(band, pull[:, None], uplo="L", diag="U", overwrite_b=True)
     return np.asarray(found[:, 0])
-
-
-def _shares(ratios: Array) -> tuple[Array, Array]:
-    """Return what is kept of a follower after steps in time constants (n,), and its mean over each step."""
-    less = np.expm1(-ratios)
-    means = np.where(ratios > 0, -less / np.where(ratios > 0, ratios, 1.0), 1.0)
-    return 1.0 + less, means

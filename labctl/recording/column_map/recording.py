@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from typing import Any
 
@@ -21,6 +21,7 @@ from labctl.recording.column_map.movement import Movement, movement
 from labctl.recording.column_map.problems import Problems
 from labctl.recording.column_map.proposal import serial_of
 from labctl.recording.column_map.sources import refuse_wrong_cells, sources, unused
+from labctl.recording.column_map.thermometer_cells import fill_between, is_thermometer
 from labctl.recording.column_map.time_axis import TimeAxis, time_axis
 from labctl.recording.column_map.units import find_unit
 from labctl.recording.columns import BY_NAME, holds_flags
@@ -73,6 +74,7 @@ def recording_of(table: RawTable, column_map: ColumnMap) -> MappedLog:
             continue
         if column.is_boolean or not _holds_text(target):
             allowed = valid is not None and target.startswith("gyro_")
+            allowed |= column_map.kind == "samples" and is_thermometer(target)  # these are filled in, or refused, below
             refuse_wrong_cells(column, target, problems, empty_allowed=allowed)
     times = _times(column_map, found.get("t_s"), table.rows, problems)
     if column_map.kind == "points" and times is None and "t_s" not in column_map.columns:
@@ -127,6 +129,9 @@ def _assembled(
     table: RawTable, column_map: ColumnMap, found: dict[str, RawColumn], columns: dict[str, Any], times: TimeAxis,
     problems: Problems,
 ) -> MappedLog:  # fmt: skip
+    if column_map.kind == "samples" and (filled := fill_between(columns, times.t_s, problems)):
+        times = replace(times, said="; ".join(filter(None, (times.said, filled))))
+    problems.raise_if_any()
     rates = np.column_stack([columns[f"gyro_{axis}"] for axis in column_map.axes])
     moved = movement(rates, times.t_s)
     division = divide(table, column_map, times.t_s, moved, problems)

@@ -29,7 +29,7 @@ _COUNTERS = (16, 24, 32)
 
 @dataclass(frozen=True)
 class TimeAxis:
-    """Times of readings, (n,) s, the instant of their zero where the file tells it, and what was done to them."""
+    """Times of readings, (n,) s, the instant of their zero where the file tells it, and what was filled in or moved."""
 
     t_s: Array
     started_at: datetime | None

@@ -143,13 +143,12 @@ def _slope(temperature_c: Array, over_s: float) -> Array:
 
 def _lag(temperature_c: Array, tau_s: float) -> Array:
     """Return follower minus temperature, (k,) K, in equilibrium at the start; straight lines between temperatures."""
-    return Steps.even(temperature_c, SPACING_S).lagged(tau_s, float(temperature_c[0])) - temperature_c
+    return Steps.even(temperature_c, SPACING_S).lagged(tau_s, 0.0)
 
 
 def _lag_two_ways(temperature_c: Array, warming_s: float, cooling_s: float) -> Array:
     """Return the same of a follower with one time constant while it is the colder one, and another, (k,) K."""
-    steps = Steps.even(temperature_c, SPACING_S)
-    return steps.lagged_two_ways(warming_s, cooling_s, float(temperature_c[0])) - temperature_c
+    return Steps.even(temperature_c, SPACING_S).lagged_two_ways(warming_s, cooling_s, 0.0)
 
 
 def _lags_two_ways(temperature_c: Array, warming_s: Array, cooling_s: Array) -> NDArray[np.float64]:

@@ -8,6 +8,7 @@ from itertools import combinations, pairwise
 import numpy as np
 
 from labctl.recording.sanity.finding import Finding
+from labctl.recording.sanity.readings.jumps import jump_of
 from labctl.recording.sanity.readings.series import ROBUST, Array, Marked, Rows, Series, noise_of, rows_in_words
 
 #: Blocks in which the noise of long data sets is compared, and readings of one.
@@ -286,8 +287,10 @@ def _after(series: Series) -> Iterator[Marked]:
         if len(lasting) < 2:
             share = min(row, n - row) / n
             lasting = lasting if series.motion == "rest" and share > ALONE_SHARE else set()  # else a rate changes
-            alone = [name for name in lasting if abs(apart[name]) > APART_ALONE]
-            yield from (_level_step(series, name, part.start + row, part) for name in alone)
+            alone = {name: row for name in lasting if abs(apart[name]) > APART_ALONE}
+            if not alone and series.motion == "rest":
+                alone = _jumps(series, part)
+            yield from (_level_step(series, name, part.start + at, part) for name, at in alone.items())
             continue
         rows = np.zeros(len(series), dtype=bool)
         rows[part.start + row : part.stop] = True
@@ -303,6 +306,16 @@ def _after(series: Series) -> Iterator[Marked]:
             ),
             rows,
         )  # fmt: skip
+
+
+def _jumps(series: Series, part: slice) -> dict[str, int]:
+    """Return the outputs whose level jumps within a drift, and the rows of a data set where they do."""
+    found = {
+        name: jump_of(values[part], series.noises[name], series.code_steps[name])
+        for name, values in series.residuals.items()
+    }
+    ends = ALONE_SHARE * (part.stop - part.start)
+    return {name: row for name, row in found.items() if row is not None and ends < row < part.stop - part.start - ends}
 
 
 def _level_step(series: Series, name: str, row: int, part: slice) -> Marked:
