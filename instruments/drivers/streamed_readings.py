@@ -137,5 +137,6 @@ class StreamedReadings:
         if self._counter is not None and self._law.counter is not None:
             return self._counter.advance(found.values[self._law.counter.field][kept])
         advance = np.ones(len(found), dtype=np.int64)
-        advance[0] += found.damaged  # a damaged message has taken its sampling period too
+        # a damaged message has taken its sampling period too
+        advance[0] += found.damaged if found.missed is None else found.missed
         return advance

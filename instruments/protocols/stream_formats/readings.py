@@ -38,6 +38,7 @@ class Decoded:
     values: Mapping[str, Whole]
     valid: NDArray[np.bool_]
     damaged: int = 0
+    missed: int | None = None  #: readings that did not come whole; None: one for each damaged message
 
     def __len__(self) -> int:
         return len(self.valid)
