@@ -21,12 +21,14 @@ from pydantic import BaseModel, ConfigDict, Field, SerializeAsAny, model_validat
 from instruments.datasheet import Convention, undeclared
 from instruments.laboratory import Laboratory
 from instruments.standards import Standard
-from instruments.toml_documents import read_toml
+from instruments.toml_documents import MOST_BYTES, read_toml
 
 #: A serial number becomes part of file names, addresses and C comments.
 SERIAL = r"^[A-Za-z0-9][A-Za-z0-9._+# -]{0,63}$"
 #: Addresses of simulated instruments begin with this scheme.
 SIMULATED_SCHEME = "sim://"
+#: Addresses of CAN buses begin with this scheme: can://INTERFACE/CHANNEL?bitrate=N, by the names of python-can.
+CAN_SCHEME = "can://"
 
 
 def is_simulated_address(address: str) -> bool:
@@ -279,7 +281,7 @@ def read_bench(source: str | Path) -> BenchFile:
 
 
 def _with_formats(document: dict[str, object], folder: Path) -> dict[str, object]:
-    """Return a document whose instruments have their formats in place of the names of files beside it.
+    """Return a document whose instruments have their formats and DBC files in place of the names of files beside it.
 
     A campaign keeps its bench file, and so the formats. The name of a file that is not there stays: its driver says so.
     Raises tomllib.TOMLDecodeError naming the file.
@@ -296,4 +298,20 @@ def _with_formats(document: dict[str, object], folder: Path) -> dict[str, object
                 section["format"] = read_toml(folder / given)
             except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
                 raise tomllib.TOMLDecodeError(f"format {folder / given}: {error}") from error
+        given = section.get("dbc")
+        if isinstance(given, str) and given.endswith(".dbc") and (folder / given).is_file():
+            section["dbc"] = _dbc_text(folder / given)
     return document
+
+
+def _dbc_text(path: Path) -> str:
+    """Return the text of a DBC file, which is of UTF-8 or, as most tools write it, of Windows' code page 1252."""
+    with path.open("rb") as file:
+        content = file.read(MOST_BYTES + 1)
+    if len(content) > MOST_BYTES:
+        raise tomllib.TOMLDecodeError(f"DBC file {path}: larger than {MOST_BYTES} bytes, the limit of such a file")
+    try:
+        text = content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = content.decode("cp1252", errors="replace")
+    return text.replace("\r\n", "\n")

@@ -19,6 +19,24 @@ from instruments.transport.serial import BROKEN, SerialPort
 from instruments.transport.serial_stream import line_of
 
 LONGEST_REPLY_BYTES = 4096
+#: Attributes or methods by which classes of these libraries tell what the instrument says of itself (`*IDN?` and such).
+USUAL_IDENTITIES = ("id", "identity", "idn", "get_identity")
+
+
+def _in_one_line(said: object) -> str:
+    if said is None:
+        return ""
+    return one_line(", ".join(str(part) for part in said) if isinstance(said, list | tuple) else str(said))
+
+
+def serial_in(said: str) -> str:
+    """Return the serial number in an answer to `*IDN?`; empty where it has none.
+
+    By IEEE Std 488.2, 10.14, that answer has four fields: manufacturer, model, serial number and firmware. A serial
+    number that is not available is 0; some classes write NA.
+    """
+    fields = [field.strip() for field in said.split(",")]
+    return fields[2] if len(fields) == 4 and any(each in "123456789" for each in fields[2]) else ""
 
 
 class LibraryInstrument:
@@ -29,6 +47,28 @@ class LibraryInstrument:
         self._settings, self._ports, self._clock = settings, ports, clock
         self._instrument: Any = None
         self._port: SerialPort | None = None
+        self._tells_nothing = False  #: asked by default, without an answer
+
+    def identity(self) -> str:
+        """Return what the instrument says of itself, in one line; empty where it says nothing.
+
+        The attribute is that of the bench file; without one the usual attribute of the class is asked, and an
+        instrument that does not answer that counts as one that says nothing. Raises InstrumentError for an attribute
+        of the bench file that cannot be read, and where the class cannot be opened.
+        """
+        wanted = self._settings.identity
+        if wanted is not None:
+            return _in_one_line(self.get(wanted)) if wanted else ""
+        with self._one_line("open"):
+            class_ = type(self._opened())
+        usual = next((name for name in USUAL_IDENTITIES if hasattr(class_, name)), None)
+        if usual is None or self._tells_nothing:
+            return ""
+        try:
+            return _in_one_line(self.get(usual))
+        except InstrumentError:  # a broken link is found by the next reading
+            self._tells_nothing = True
+            return ""
 
     def get(self, attribute: str) -> object:
         """Return the value of an attribute, or what a method without arguments returns. Raises InstrumentError."""

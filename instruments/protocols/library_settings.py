@@ -25,7 +25,8 @@ class LibraryOptions(BaseModel):
     address: str = ""  #: of msl-equipment, in its own words: "TCP::10.0.0.7::2000", "ASRL/dev/ttyUSB0"
     #: Further arguments of the class (pymeasure), or properties of the connection (msl-equipment).
     arguments: dict[str, JsonValue] = Field(default_factory=dict)
-    identity: str = ""  #: attribute that states its identity
+    #: Attribute that states its identity; None: the usual one of the class, where it has one; empty: none is asked.
+    identity: str | None = None
 
     @model_validator(mode="after")
     def _has_address(self) -> LibraryOptions:

@@ -15,7 +15,9 @@ from instruments.bench_config import is_simulated_address
 from instruments.clock import Clock, wait_s
 from instruments.errors import LinkError
 from instruments.interfaces.unit_handler import UnitHandler
+from instruments.protocols.can.address import is_can_address
 from instruments.transport.adapters import require_adapter
+from instruments.transport.can_port import open_can
 from instruments.transport.opened_port import open_port
 from instruments.transport.port_failures import reason, remedy
 from instruments.transport.rpc.channel import RpcChannel, TimedChannel
@@ -80,7 +82,9 @@ class HardwareLinks:
         self._clock = clock
 
     def serial_port(self, url: str, *, baudrate: int, timeout_s: float, line: Line = EIGHT_N_1) -> SerialPort:
-        """Return an open port, locked for this process; raises what pyserial raises."""
+        """Return an open port, locked for this process, or a CAN bus; raises what pyserial raises."""
+        if is_can_address(url):
+            return open_can(url, timeout_s=wait_s(self._clock, timeout_s))
         return open_port(url, baudrate=baudrate, timeout_s=wait_s(self._clock, timeout_s), line=line)
 
     def port_timeout_s(self, timeout_s: float) -> float:

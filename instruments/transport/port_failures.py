@@ -6,6 +6,9 @@ import errno
 import os
 from pathlib import Path
 
+from instruments.protocols.can.address import is_can_address
+from instruments.transport import can_port
+
 #: Folders in which Linux names serial ports by their USB adapters, and by the sockets that these are plugged into.
 BY_ID, BY_PATH = Path("/dev/serial/by-id"), Path("/dev/serial/by-path")
 PROCESSES = Path("/proc")
@@ -21,6 +24,8 @@ def reason(error: Exception) -> str:
 
 def remedy(url: str, error: Exception) -> str:
     """Return what to check of a port that cannot be opened."""
+    if is_can_address(url):
+        return can_port.remedy(url, error)
     number = getattr(error, "errno", None)
     if number == errno.EACCES:
         return f"that this user has access to the port: {permission_command(url)}"

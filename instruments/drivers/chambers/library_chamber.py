@@ -21,9 +21,9 @@ class LibraryChamber(SetpointChamber):
 
     def identify(self) -> str:
         """Get what the instrument says of itself, after its air temperature was read; raises InstrumentError."""
-        said = f" {self._instrument.get(self._names.identity)}" if self._names.identity else ""
+        said = self._instrument.identity()
         self._read_air()
-        return f"{self._names.instrument} of {self._names.library}{said}"
+        return f"{self._names.instrument} of {self._names.library} {said}".strip()
 
     def make_safe(self) -> float:
         """Control the chamber to its safe set point, and off where the bench file says so; returns the value read back.

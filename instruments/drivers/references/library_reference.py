@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from instruments.clock import Clock
 from instruments.drivers.driver import ReferenceDriver, Trial
-from instruments.drivers.library_instrument import LibraryInstrument
+from instruments.drivers.library_instrument import LibraryInstrument, serial_in
 from instruments.errors import WrongInstrument
 from instruments.interfaces.gyro import Channel
 from instruments.interfaces.reference import ReferenceState
@@ -25,15 +25,14 @@ class LibraryReference:
 
     def identify(self) -> str:
         """Get what the instrument says of itself; raises WrongInstrument for another serial number, InstrumentError."""
-        settings, said = self.settings, ""
-        if settings.identity:
-            said = str(self._instrument.get(settings.identity))
-            if settings.serial and settings.serial not in said:
-                raise WrongInstrument(
-                    self.name,
-                    f"identifies itself as {said!r}, but the bench file gives serial number "
-                    f"{settings.serial!r}; correct the address, or serial and certificate, in the bench file",
-                )
+        settings, said = self.settings, self._instrument.identity()
+        tells_serial = settings.identity or serial_in(said)
+        if settings.serial and tells_serial and settings.serial not in said:
+            raise WrongInstrument(
+                self.name,
+                f"identifies itself as {said!r}, but the bench file gives serial number "
+                f"{settings.serial!r}; correct the address, or serial and certificate, in the bench file",
+            )
         self.read()
         certificate = f"; certificate {settings.certificate}" if settings.certificate else ""
         return f"{settings.instrument} of {settings.library} {said}".strip() + certificate

@@ -50,6 +50,7 @@ class Decoded:
     valid: NDArray[np.bool_]
     behind: Whole
     damaged: int = 0
+    missed: int | None = None  #: readings that did not come whole; None: one for each damaged message
 
     def __len__(self) -> int:
         return len(self.valid)

@@ -223,6 +223,7 @@ DEFAULT_PROFILES = {
     "labjack-t": "gyrostar",
     "nidaq": "gyrostar",
     "stream-format": "mems-triaxial",
+    "can": "mems-triaxial",
 }
 #: Sampling rate of a unit, Hz, where the bench file gives none: the rate of the wire.
 USUAL_RATE_HZ = {

@@ -131,19 +131,58 @@ class ScriptedPort:
 
 
 def test_a_thermometer_of_pymeasure() -> None:
-    """A Fluke 7341 as its manual (p. 81) prints it: t gives `t: 25.0100 C`."""
-    port = ScriptedPort(b"t: 25.0123 C \r\n", b"t: 25.0200 C \r\n")
+    """A Fluke 7341 as its manual (p. 81) prints it: *ver gives `ver.7341,1.00`, t gives `t: 25.0100 C`."""
+    port = ScriptedPort(b"ver.7341,1.00\r\n", b"t: 25.0123 C \r\n", b"t: 25.0200 C \r\n")
     driver = reference(
         SimpleNamespace(serial=lambda *_, **__: port),
         instrument="pymeasure.instruments.fluke:Fluke7341",
         port="/dev/ttyUSB0",
+        serial="A12345",  # of the readout; it does not tell its own
         certificate="NMI 1",
         corrections={"reference_c": 0.01},
     )
-    assert driver.identify() == "pymeasure.instruments.fluke:Fluke7341 of pymeasure; certificate NMI 1"
+    said = "pymeasure.instruments.fluke:Fluke7341 of pymeasure Fluke,7341,NA,1.00"
+    assert driver.identify() == f"{said}; certificate NMI 1"
     assert driver.read().raw == {"reference_c": 250200}
     assert driver.channels[0].offset == 0.01
-    assert port.sent == [b"t\r\n", b"t\r\n"]
+    assert port.sent == [b"*ver\r\n", b"t\r\n", b"t\r\n"]
+
+
+@pytest.mark.parametrize(
+    ("instrument", "reply", "said"),
+    [
+        ("pymeasure.instruments.hp:HP34401A", b"HEWLETT-PACKARD,34401A,0,11-5-2\n", "HEWLETT-PACKARD,34401A,0,11-5-2"),
+        ("pymeasure.instruments.hp:HP34401A", b"HEWLETT-PACKARD,34401A,X77,1\n", "HEWLETT-PACKARD,34401A,X77,1"),
+        ("pymeasure.instruments.hp:HP34401A", b"", ""),
+    ],
+)
+def test_the_identity_is_asked_by_default(instrument: str, reply: bytes, said: str) -> None:
+    """By `*IDN?` of IEEE Std 488.2 where the class has that; an instrument that does not answer is used without one."""
+    port = ScriptedPort(reply, b"+2.5E+01\n", *[b"+2.5E+01\n"] * 2)
+    clock = VirtualClock()
+    read = port.read
+    port.read = lambda size: read(size) or clock.sleep(1.0) or b""  # type: ignore[method-assign]
+    quantity = {"reference_c": {"attribute": "reading"}}
+    given = {"instrument": instrument, "port": "/dev/ttyUSB0", "serial": "X77", "reads": quantity}
+    driver = reference(SimpleNamespace(serial=lambda *_, **__: port), clock, **given)
+    assert driver.identify() == f"{instrument} of pymeasure {said}".strip()
+    assert driver.identify().startswith(instrument)
+    asked = port.sent.count(b"*IDN?\r\n")
+    assert asked == (2 if said else 1)
+
+
+def test_another_serial_number_in_the_usual_identity_is_refused() -> None:
+    port = ScriptedPort(b"HEWLETT-PACKARD,34401A,X78,11-5-2\n")
+    given = {"instrument": "pymeasure.instruments.hp:HP34401A", "port": "/dev/ttyUSB0", "serial": "X77"}
+    with pytest.raises(WrongInstrument, match="34401A,X78,11-5-2', but the bench file gives serial number 'X77'"):
+        reference(SimpleNamespace(serial=lambda *_, **__: port), **given).identify()
+
+
+def test_no_identity_is_asked_where_the_bench_file_says_so() -> None:
+    port = ScriptedPort(b"t: 25.0123 C \r\n")
+    given = {"instrument": "pymeasure.instruments.fluke:Fluke7341", "port": "/dev/ttyUSB0", "identity": ""}
+    assert reference(SimpleNamespace(serial=lambda *_, **__: port), **given).identify().endswith("of pymeasure")
+    assert port.sent == [b"t\r\n"]
 
 
 def test_instruments_of_msl_equipment(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,0 +1,179 @@
+"""Readings of a stream that a decoder takes apart: their times, their counter, what is lost, damaged or silent."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from instruments.clock import Clock
+from instruments.errors import NoReply
+from instruments.interfaces.gyro import Readings
+from instruments.protocols.stream_formats.document import Counter
+from instruments.protocols.stream_formats.readings import Decoded, Decoder, StampTicks
+from instruments.transport.device_time import DeviceTime
+from instruments.transport.sample_counter import SampleCounter
+from instruments.transport.sample_timing import FRESH_PERIODS, StreamTime, refuse_other_rate
+from instruments.transport.serial_stream import SerialStream
+
+SILENCE_S = 2.0
+#: Least size of a port's input buffer; a simulated port is emptied when half of it can be full.
+PORT_BUFFER_BYTES, EMPTY_EVERY_S, LONG_MESSAGE_BYTES = 4096, 1.0, 160
+
+
+@dataclass(frozen=True)
+class StreamLaw:
+    """What is known of a stream: its readings per second, the channels that are kept, its counter and time stamps."""
+
+    rate_hz: float
+    channels: Sequence[str]
+    counter: Counter | None
+    stamps: StampTicks | None = None
+
+
+class StreamedReadings:
+    """Readings of a gyro that sends them unasked. `unread` says what came in place of a reading, and what to check."""
+
+    def __init__(
+        self,
+        device: str,
+        port: str,
+        stream: SerialStream,
+        decoder: Decoder,
+        law: StreamLaw,
+        clock: Clock,
+        unread: Callable[[SerialStream, float], str],
+    ) -> None:
+        self._device, self._port, self._stream, self._decoder = device, port, stream, decoder
+        self._law, self._clock, self._unread = law, clock, unread
+        half_full_s = 0.5 * PORT_BUFFER_BYTES / (LONG_MESSAGE_BYTES * law.rate_hz)
+        self._empty_every_s = min(EMPTY_EVERY_S, half_full_s)
+        self._counter = self._new_counter()
+        self._stamp: int | None = None  #: time stamp of the newest reading
+        self._time = StreamTime(1.0 / law.rate_hz, 0.0)
+        self._device_time = self._new_device_time()
+        self._last_s = 0.0
+
+    @property
+    def is_late(self) -> bool:
+        """Whether the stream is too far behind the clock, so that readings may be lost."""
+        return self._time.is_late
+
+    def begin(self, requests: Sequence[bytes]) -> None:
+        """Open the port, send what starts the stream, drop what is old; raises LinkError."""
+        self._stream.open()
+        for request in requests:
+            self._stream.write(request)
+        self._counter = self._new_counter()
+        self._device_time = self._new_device_time()
+        self._discard()
+        self._last_s = self._clock.now_s()
+        self._time = StreamTime(1.0 / self._law.rate_hz, self._last_s)
+
+    def read(self, duration_s: float) -> Readings:
+        """Return every reading of the next `duration_s` seconds; fewer where messages are missing.
+
+        Raises NoReply after SILENCE_S, or five sampling periods, without a reading; MalformedReply for a counter that
+        stands; WrongInstrument for another rate; LinkError.
+        """
+        readings = self._decode(self._stream.read_for(duration_s, self._empty_every_s))
+        now_s = self._clock.now_s()
+        if len(readings):
+            self._last_s, self._stream.unused = now_s, 0
+        elif now_s - self._last_s > self._silence_s:
+            raise self._no_reading(now_s - self._last_s)
+        return readings
+
+    def read_latest(self) -> Readings:
+        """Return one fresh reading and drop everything older; raises NoReply after SILENCE_S, LinkError."""
+        self._discard()
+        began_s = self._clock.now_s()
+        while self._clock.now_s() < began_s + self._silence_s:
+            self._clock.sleep(FRESH_PERIODS / self._law.rate_hz)
+            data = self._stream.read_available()
+            if data and len(readings := self._decode(data)):
+                self._last_s, self._stream.unused = self._clock.now_s(), 0
+                return readings.newest()
+        raise self._no_reading(self._clock.now_s() - began_s)
+
+    @property
+    def _silence_s(self) -> float:
+        return max(SILENCE_S, 5 / self._law.rate_hz)
+
+    def _new_counter(self) -> SampleCounter | None:
+        given = self._law.counter
+        return None if given is None else SampleCounter(self._device, self._port, step=given.step, wrap=given.wrap)
+
+    def _new_device_time(self) -> DeviceTime | None:
+        """Return the unit's own time: by its time stamps, or by its counter; None without either."""
+        if (ticks := self._law.stamps) is not None:
+            return DeviceTime(ticks.tick_s, ticks.wrap)
+        if (given := self._law.counter) is not None:
+            return DeviceTime(1.0 / (self._law.rate_hz * given.step), given.wrap)
+        return None
+
+    def _discard(self) -> None:
+        self._stream.discard_input()
+        self._decoder.drop()
+        self._stamp = None
+        if self._counter is not None:
+            self._counter.drop()
+        self._time.drop()
+
+    def _no_reading(self, silence_s: float) -> NoReply:
+        return NoReply(self._device, self._unread(self._stream, silence_s))
+
+    def _decode(self, data: bytes) -> Readings:
+        found = self._decoder.feed(data)
+        damaged, kept = found.damaged, np.ones(len(found), dtype=bool)
+        if self._counter is not None and self._law.counter is not None and len(found):
+            content = np.stack(list(found.values.values()), axis=1)
+            kept = self._counter.is_new(found.values[self._law.counter.field], content)
+            damaged += len(kept) - int(kept.sum())
+        raw = {name: found.values[name][kept] for name in self._law.channels}
+        valid = found.valid[kept]
+        if not len(valid):
+            device_s = None if self._device_time is None else np.zeros(0)
+            return Readings(np.zeros(0), raw, valid, 0, damaged, device_s, np.zeros(0))
+        advance = self._advance(found, kept)
+        came = self._stream.last
+        turn = 0 if self._counter is None else self._counter.readings_per_turn
+        times, uncounted = self._time.times(
+            advance, came.now_s, turn, newest_s=came.newest_s, width_s=came.width_s
+        )  # fmt: skip
+        refuse_other_rate(self._device, self._port, self._time.line)
+        counts = self._counter is not None or self._law.stamps is not None
+        lost = int(advance.sum()) - len(advance) + uncounted if counts else uncounted
+        device_s = self._device_s(found, kept, times)
+        return Readings(times, raw, valid, lost, damaged, device_s, self._stream.arrival_s(found.behind[kept]))
+
+    def _device_s(
+        self, found: Decoded, kept: NDArray[np.bool_], t_s: NDArray[np.float64]
+    ) -> NDArray[np.float64] | None:
+        """Return the times (n,) of readings by the unit's own clock, s; None where it tells none."""
+        told = self._law.stamps or self._law.counter
+        if self._device_time is None or told is None:
+            return None
+        return self._device_time.of(found.values[told.field][kept], t_s)
+
+    def _advance(self, found: Decoded, kept: NDArray[np.bool_]) -> NDArray[np.int64]:
+        """Return how many periods each reading, (n,), is from the one before."""
+        if self._counter is not None and self._law.counter is not None:
+            return self._counter.advance(found.values[self._law.counter.field][kept])
+        if (ticks := self._law.stamps) is not None:
+            return self._advance_by_time(found.values[ticks.field], ticks)
+        advance = np.ones(len(found), dtype=np.int64)
+        # a damaged message has taken its sampling period too
+        advance[0] += found.damaged if found.missed is None else found.missed
+        return advance
+
+    def _advance_by_time(self, stamps: NDArray[np.int64], ticks: StampTicks) -> NDArray[np.int64]:
+        """Return how many periods each reading, (n,), is from the one before by its time stamp, at least 1."""
+        period = 1.0 / (self._law.rate_hz * ticks.tick_s)
+        moved = np.diff(stamps, prepend=stamps[0] - round(period) if self._stamp is None else self._stamp)
+        if ticks.wrap is not None:
+            moved %= ticks.wrap
+        self._stamp = int(stamps[-1])
+        return np.maximum(np.rint(moved / period), 1.0).astype(np.int64)
