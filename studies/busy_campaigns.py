@@ -1,14 +1,17 @@
 """Campaigns at 30 times real time, alone and beside busy processes: nothing is lost unsaid, no cable is blamed.
 
 Each campaign is started as a user does it, by the command line: against `labctl simulator` in a process of its own, on
-real ports, or by `labctl serve`. What a data set holds is counted in the database and compared with what the unit's
-rate and the data set's duration promise. `LABCTL_STUDY_CAMPAIGNS` are run alone, `LABCTL_STUDY_BUSY_CAMPAIGNS` beside
-`LABCTL_STUDY_BUSY_PROCESSES` processes that compute without end, at normal priority.
+real ports, or by `labctl serve`. Readings of a data set that are missing inside it are counted by the unit's own clock
+where it has one. Those missing at its ends, or of a unit without such a clock, are counted by what the unit's rate and
+the duration promise, as exactly as a computer knows at 30 times real time when a reading arrived.
+`LABCTL_STUDY_CAMPAIGNS` are run alone, `LABCTL_STUDY_BUSY_CAMPAIGNS` beside `LABCTL_STUDY_BUSY_PROCESSES` processes
+that compute without end, at normal priority.
 """
 
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
 import sqlite3
@@ -16,13 +19,18 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from instruments.bench_config import read_bench
+from labctl.recording.columns import DEVICE_S
+from labctl.store import DataSetRow, open_store
 
 QUIET = int(os.environ.get("LABCTL_STUDY_CAMPAIGNS", "100"))
 BUSY = int(os.environ.get("LABCTL_STUDY_BUSY_CAMPAIGNS", "10"))
@@ -31,7 +39,9 @@ SPEED = 30
 #: A campaign that has not ended after this is ended by the study, s of real time.
 LONGEST_S = 900.0
 #: A gate holds one reading more or fewer than its duration promises, depending on the phase of the stream.
-PHASE = 1
+PHASE = 1.0
+#: When a reading arrived is known so well, s of real time: its time in the campaign is `SPEED` times less certain.
+ARRIVAL_S = 1e-3
 #: What blames an instrument or its wire.
 BLAME = re.compile(r"cable|no answer|not answer|silent|check power|link .* (?:lost|broke)", re.IGNORECASE)
 RECIPE = """
@@ -93,19 +103,19 @@ class Counts:
         with sqlite3.connect(f"file:{database}?mode=ro", uri=True) as connection:
             events = connection.execute("select kind, message from events").fetchall()
             steps = connection.execute("select count(*) from steps where kind = 'acquire'").fetchone()[0]
-            sets = connection.execute(
-                "select r.serial, d.gate_until_s - d.gate_from_s, d.n, d.lost, d.damaged from data_sets d "
-                "join recordings r on r.id = d.recording_id where d.state = 'complete'"
-            ).fetchall()
         self.planned += steps
-        self.complete += len(sets)
         self.repeated += sum(kind == "data_set_repeated" for kind, _ in events)
         self.stalls += sum(kind == "host_stalled" for kind, _ in events)
         self.blames += [f"{kind}: {message}" for kind, message in events if BLAME.search(message)]
-        for serial, gate_s, readings, lost, damaged in sets:
-            missing = gate_s * rates_hz[serial] - readings
-            self.short_said += missing > PHASE and lost + damaged >= missing - PHASE
-            self.short_unsaid += missing > PHASE and lost + damaged < missing - PHASE
+        with open_store(str(database), write=False) as store:
+            for recording in store.recordings.all():
+                heads = {head.number: head for head in store.recordings.data_sets(recording.id)}
+                for number, columns in store.recordings.iter_datasets(recording.id, times=True):
+                    self.complete += 1
+                    missing = missing_of(heads[number], columns, rates_hz[recording.serial])
+                    said = heads[number].lost + heads[number].damaged
+                    self.short_said += 0 < missing <= said
+                    self.short_unsaid += missing > said
 
     @property
     def line(self) -> str:
@@ -116,6 +126,19 @@ class Counts:
             f"{self.short_unsaid:13}{len(self.blames):8}{self.retries:9}{self.stalls:8}"
             f"{wall_s[len(wall_s) // 2]:9.0f}{wall_s[-1]:6.0f}"
         )
+
+
+def missing_of(head: DataSetRow, columns: Mapping[str, NDArray[np.generic]], rate_hz: float) -> int:
+    """Return how many readings of a data set are missing for certain."""
+    gate_s = (head.t_until_s or 0.0) - (head.t_from_s or 0.0)
+    t_s, u_readings = np.asarray(columns["t_s"], dtype=np.float64), ARRIVAL_S * SPEED * rate_hz
+    if DEVICE_S not in columns:
+        return max(math.floor(gate_s * rate_hz - len(t_s) - PHASE - 2 * u_readings), 0)
+    device_s = np.asarray(columns[DEVICE_S], dtype=np.float64)
+    inside = round((device_s[-1] - device_s[0]) * rate_hz) + 1 - len(device_s)
+    before, after = t_s[0] - (head.t_from_s or 0.0), (head.t_until_s or 0.0) - t_s[-1]
+    at_ends = sum(math.floor(max(each_s * rate_hz - PHASE - u_readings, 0.0)) for each_s in (before, after))
+    return inside + at_ends
 
 
 HEAD = "   done/of   complete/of  repeated  short_said  short_unsaid  blames  retries  stalls  wall_s p50 / max"
