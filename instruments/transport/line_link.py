@@ -41,6 +41,7 @@ class LineLink:
         self._port: SerialPort | None = None
         self._line = RtuLine(device, clock)
         self._earliest_s = 0.0
+        self.awaits_slow = False  #: whether a request that takes long is not answered yet
         self.openings = 0  #: how often the port was opened: what was set over an earlier one may be forgotten
 
     def ask(
@@ -59,7 +60,13 @@ class LineLink:
                 log.warning("link.retry", extra={"device": self.device, "attempt": attempt, "reason": str(failure)})
             self._clock.sleep(pause_s)
             try:
-                return self._ask_once(request, reply, what, timeout_s or self._timeout_s)
+                self.awaits_slow = timeout_s is not None  # for good where what waits is ended
+                found = self._ask_once(request, reply, what, timeout_s or self._timeout_s)
+                self.awaits_slow = False
+                return found
+            except RequestRejected:
+                self.awaits_slow = False
+                raise
             except LinkError as error:
                 failure = error
                 if isinstance(error, NoReply | MalformedReply):
@@ -83,9 +90,13 @@ class LineLink:
         """Send requests without waiting for anything, whatever is under way; their replies are dropped later.
 
         Each is sent twice: the first may end a line that another process left half sent. Without a line end there is
-        none, and two requests would be one. Raises LinkError.
+        none, and two requests would be one. A link on which a slow request is under way takes no other: it is opened
+        anew. Raises LinkError.
         """
         try:
+            if self.awaits_slow:
+                self.close()
+            self.awaits_slow = False
             port = self._opened()
             for request in requests:
                 port.write(self._encoded(request) * (2 if self._syntax.end else 1))
@@ -159,7 +170,8 @@ class LineLink:
                     f"sent {len(data)} bytes without a line end when asked to {what}; check the baud rate and that "
                     f"{self.url} is this device",
                 )
-            self._clock.sleep(0.0)  # a stop ends a long wait
+            if timeout_s > self._timeout_s:
+                self._clock.sleep(0.0)  # a stop ends a long wait
             if self._clock.now_s() >= deadline_s - 1e-9:
                 raise self._silent(data, what)
 

@@ -48,6 +48,8 @@ class SimulatedXps(QueuedReplies):
             self._run(found[1].decode(), [each.strip() for each in found[2].decode("latin-1").split(",")], t_s)
 
     def _run(self, name: str, arguments: list[str], t_s: float) -> None:
+        if name == "GroupKill":  # it ends what another link waits for, which was closed
+            self._busy_until_s, self._replies = t_s, []
         begin_s = max(t_s, self._busy_until_s)
         stalls = self.faults.trigger(["stall"], t_s) is not None
         if stalls and self.status == JOGGING:

@@ -159,6 +159,46 @@ def test_a_command_that_takes_long_is_awaited_and_one_that_never_ends_is_said(ri
         endless.table.home()
 
 
+class Ended(Exception):
+    """What a stop raises in the thread that drives the bench."""
+
+
+class EndingClock:
+    """The clock of a bench that is stopped after a while."""
+
+    def __init__(self, clock: VirtualClock, at_s: float) -> None:
+        self._clock, self._at_s = clock, at_s
+
+    def now_s(self) -> float:
+        return self._clock.now_s()
+
+    def sleep(self, duration_s: float) -> None:
+        self._clock.sleep(duration_s)
+        if self._clock.now_s() > self._at_s:
+            raise Ended
+
+
+@pytest.mark.parametrize(
+    ("name", "stop"), [("newport-xps", "GroupKill(GROUP1)"), ("aerotech-ensemble", "ABORT @0\n" * 2)]
+)
+def test_a_stop_ends_a_home_search_at_once(name: str, stop: str, rig: Callable[..., Rig]) -> None:
+    s = rig(name, home_s=60.0)
+    s.table.identify()
+    link = s.table.dialogue.link
+    at_s = s.clock.now_s() + 20.0
+    link._clock = EndingClock(s.clock, at_s)
+    with pytest.raises(Ended):
+        s.table.home()
+    assert s.clock.now_s() - at_s <= 1.0  # a second of waiting for bytes
+    link._clock = s.clock
+    s.said.clear()
+    s.table.stop()
+    assert s.said == [stop]
+    assert s.clock.now_s() - at_s < 1.1
+    s.clock.sleep(1.0)
+    assert not s.motion.moving(s.clock.now_s())
+
+
 def test_another_instrument_is_refused(rig: Callable[..., Rig]) -> None:
     s = rig("aerotech-ensemble")
     s.device.number = "7"
