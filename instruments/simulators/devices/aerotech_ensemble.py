@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
-from instruments.simulators.devices.servo_axis import QueuedReplies, ServoAxis
+from instruments.simulators.servo_axis import QueuedReplies, ServoAxis
 from instruments.simulators.setup import InstrumentSetup
 
 DONE, INVALID, FAULT = "%", "!", "#"
