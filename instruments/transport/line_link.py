@@ -41,12 +41,16 @@ class LineLink:
         self._port: SerialPort | None = None
         self._line = RtuLine(device, clock)
         self._earliest_s = 0.0
+        self.awaits_slow = False  #: whether a request that takes long is not answered yet
         self.openings = 0  #: how often the port was opened: what was set over an earlier one may be forgotten
 
-    def ask(self, request: str, reply: str, what: str, *, tries: int = TRIES) -> re.Match[str]:
+    def ask(
+        self, request: str, reply: str, what: str, *, tries: int = TRIES, timeout_s: float | None = None
+    ) -> re.Match[str]:
         """Return the reply to a request as the match of the pattern `reply` with the whole line; tried three times.
 
-        A request that must not be executed twice gets one try. `what` names the request in messages. Raises the failure
+        A request that must not be executed twice gets one try, one that takes long a time-out of its own. `what` names
+        the request in messages. Raises the failure
         of the last try: NoReply, MalformedReply or LinkError; RequestRejected at once where the device refuses.
         """
         begun_s = self._clock.now_s()
@@ -56,7 +60,13 @@ class LineLink:
                 log.warning("link.retry", extra={"device": self.device, "attempt": attempt, "reason": str(failure)})
             self._clock.sleep(pause_s)
             try:
-                return self._ask_once(request, reply, what)
+                self.awaits_slow = timeout_s is not None  # for good where what waits is ended
+                found = self._ask_once(request, reply, what, timeout_s or self._timeout_s)
+                self.awaits_slow = False
+                return found
+            except RequestRejected:
+                self.awaits_slow = False
+                raise
             except LinkError as error:
                 failure = error
                 if isinstance(error, NoReply | MalformedReply):
@@ -79,12 +89,17 @@ class LineLink:
     def send_at_once(self, requests: Sequence[str], what: str) -> None:
         """Send requests without waiting for anything, whatever is under way; their replies are dropped later.
 
-        Each is sent twice: the first may end a line that another process left half sent. Raises LinkError.
+        Each is sent twice: the first may end a line that another process left half sent. Without a line end there is
+        none, and two requests would be one. A link on which a slow request is under way takes no other: it is opened
+        anew. Raises LinkError.
         """
         try:
+            if self.awaits_slow:
+                self.close()
+            self.awaits_slow = False
             port = self._opened()
             for request in requests:
-                port.write(self._encoded(request) * 2)
+                port.write(self._encoded(request) * (2 if self._syntax.end else 1))
         except BROKEN as error:
             raise self._broken(what, error) from error
         finally:
@@ -97,9 +112,9 @@ class LineLink:
             self._port.close()
             self._port = None
 
-    def _ask_once(self, request: str, reply: str, what: str) -> re.Match[str]:
+    def _ask_once(self, request: str, reply: str, what: str, timeout_s: float) -> re.Match[str]:
         try:
-            found = self._receive(self._send(request), what)
+            found = self._receive(self._send(request), what, timeout_s)
         except BROKEN as error:
             raise self._broken(what, error) from error
         finally:
@@ -133,16 +148,20 @@ class LineLink:
             self.openings += 1
         return self._port
 
+    @property
+    def _reply_end(self) -> bytes:
+        return re.escape(self._syntax.reply_end.encode(self._syntax.encoding)) or rb"[\r\n]+"
+
     def _encoded(self, request: str) -> bytes:
         return (request + self._syntax.end).encode(self._syntax.encoding)
 
-    def _receive(self, port: SerialPort, what: str) -> str:
+    def _receive(self, port: SerialPort, what: str, timeout_s: float) -> str:
         """Return the next line that is not empty, without its end; raises NoReply, MalformedReply, one of BROKEN."""
-        deadline_s = self._clock.now_s() + self._timeout_s
-        data = b""
+        deadline_s = self._clock.now_s() + timeout_s
+        data, end = b"", self._reply_end
         while True:
             data += port.read(max(port.in_waiting, 1))
-            lines = re.split(rb"[\r\n]+", data.lstrip(b"\r\n"))
+            lines = re.split(end, data.lstrip(b"\r\n"))
             if len(lines) > 1:
                 return lines[0].decode(self._syntax.encoding, errors="replace").strip()
             if len(data) > LONGEST_REPLY_BYTES:
@@ -151,6 +170,8 @@ class LineLink:
                     f"sent {len(data)} bytes without a line end when asked to {what}; check the baud rate and that "
                     f"{self.url} is this device",
                 )
+            if timeout_s > self._timeout_s:
+                self._clock.sleep(0.0)  # a stop ends a long wait
             if self._clock.now_s() >= deadline_s - 1e-9:
                 raise self._silent(data, what)
 

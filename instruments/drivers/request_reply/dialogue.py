@@ -85,11 +85,19 @@ class Dialogue:
         for template in lines:
             self._forget_old_errors()
             request = self.request(template, values)
-            if self._line.acknowledged is not None:
-                self.link.ask(request, self._line.acknowledged, f"{what} ({request})", tries=tries)
-            else:
-                self.link.tell(request, what)
-            self._check(request, what)
+            try:
+                self._send(template, request, what, tries)
+            except RequestRejected:
+                if template not in self._line.may_refuse:
+                    raise
+
+    def _send(self, template: str, request: str, what: str, tries: int) -> None:
+        if self._line.acknowledged is not None:
+            timeout_s = self._line.slow_s if template in self._line.slow else None
+            self.link.ask(request, self._line.acknowledged, f"{what} ({request})", tries=tries, timeout_s=timeout_s)
+        else:
+            self.link.tell(request, what)
+        self._check(request, what)
 
     def stop(self, lines: Sequence[str]) -> None:
         """Send the commands of a stop before anything else; raises LinkError."""

@@ -132,7 +132,8 @@ class DescribedTable:
     def stop(self) -> None:
         """Control the table to rest. The stop is sent before anything is asked; raises LinkError."""
         self._rate_dps, self._last = 0.0, None
-        self.dialogue.stop(self._described.stop)
+        slow = self.dialogue.link.awaits_slow and self._described.stop_slow
+        self.dialogue.stop(slow or self._described.stop)
 
     def is_moving(self) -> bool:
         """Get whether the table moves; raises RequestRejected, MalformedReply, NoReply, LinkError."""

@@ -160,7 +160,8 @@ class LineDescription(Strict):
 
     baudrate: int = Field(default=9600, gt=0, le=4_000_000)
     tcp_port: int | None = Field(default=None, gt=0, le=65535)
-    end: Literal["\r", "\n", "\r\n"] = "\r\n"  #: of a request; a reply may end with either
+    end: Literal["\r", "\n", "\r\n", ""] = "\r\n"  #: of a request; a reply may end with either
+    reply_end: str = Field(default="", max_length=20)  #: a text that ends a reply, in place of a line end
     encoding: Literal["ascii", "latin-1", "utf-8"] = "ascii"
     timeout_s: float = Field(default=1.0, ge=0.05, le=30)  #: of a reply
     pause_s: float = Field(default=0.0, ge=0, le=10)  #: least time between two requests
@@ -168,6 +169,9 @@ class LineDescription(Strict):
     refusal: str = ""  #: pattern of a reply that refuses, with the group `why`
     reasons: dict[str, str] = Field(default_factory=dict)  #: what a reason means
     acknowledged: Pattern | None = None  #: pattern of the reply to a command; none: a command has no reply
+    slow: Commands = ()  #: commands that are answered when what they do is done
+    slow_s: float = Field(default=120.0, gt=0, le=3600)  #: longest time of these
+    may_refuse: Commands = ()  #: commands whose refusal is no error: the instrument is as they would make it
     check: Check | None = None
 
     @field_validator("refusal")
@@ -178,7 +182,9 @@ class LineDescription(Strict):
     @property
     def syntax(self) -> LineSyntax:
         """The syntax of its link."""
-        return LineSyntax(self.end, self.encoding, self.refusal, tuple(self.reasons.items()), self.pause_s)
+        return LineSyntax(
+            self.end, self.reply_end, self.encoding, self.refusal, tuple(self.reasons.items()), self.pause_s
+        )
 
 
 class Description(Strict):

@@ -48,6 +48,7 @@ class TableDescription(Description):
     positive: str = "+"  #: `{sign}` of a positive rate
     negative: str = "-"
     stop: Commands = Field(min_length=1)
+    stop_slow: Commands = ()  #: in place of `stop`, over a new link, while a slow command is not answered yet
     standing: AskState
     position: AskNumber
     rate: AskNumber | None = None

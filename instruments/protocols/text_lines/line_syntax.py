@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class LineSyntax:
-    """A reply ends with a carriage return or a line feed, whichever comes first."""
+    """A reply ends with a carriage return or a line feed, whichever comes first, or with a text of its own."""
 
-    end: str = "\r\n"  #: of a request
+    end: str = "\r\n"  #: of a request; may be empty
+    reply_end: str = ""  #: a text that ends a reply; empty: a line end
     encoding: str = "ascii"
     #: A reply that refuses the request; its group `why` says why.
     refusal: str = ""

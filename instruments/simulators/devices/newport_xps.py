@@ -1,0 +1,132 @@
+"""A simulated Newport XPS with one group of one rotary positioner: its states, its jog mode and its error codes."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+from instruments.simulators.servo_axis import QueuedReplies, ServoAxis
+from instruments.simulators.setup import InstrumentSetup
+
+#: A function and its arguments: nothing else ends a request.
+CALL = re.compile(rb"\s*([A-Za-z]\w*)\s*\(([^()]*)\)\s*")
+ERROR, NAME, NOT_ALLOWED, RANGE, ARGUMENTS = -4, -19, -22, -17, -9
+NOT_INITIALISED, NOT_REFERENCED, READY_HOMED, READY_ABORTED, JOGGING, AFTER_ERROR = 0, 42, 11, 10, 47, 2
+MAX_DPS, MAX_DPS2, INITIALISATION_S = 720.0, 4000.0, 1.5
+LONGEST = 4096
+
+
+class SimulatedXps(QueuedReplies):
+    """One controller; each link to it runs one function after the other."""
+
+    def __init__(self, setup: InstrumentSetup) -> None:
+        super().__init__()
+        self.axis, self.faults = ServoAxis(setup, 5001), setup.faults
+        self.group = str(self.axis.parameters["group"])
+        self.status = NOT_INITIALISED
+        self._data = b""
+        self._busy_until_s = 0.0
+        self._jog_dps2 = MAX_DPS2
+        self._functions: dict[str, Callable[[list[str], float], tuple[int, str, float]]] = {
+            "GroupInitialize": self._initialize,
+            "GroupHomeSearch": self._home_search,
+            "GroupKill": self._kill,
+            "GroupJogModeEnable": self._jog_mode_enable,
+            "GroupJogModeDisable": self._jog_mode_disable,
+            "GroupJogParametersSet": self._jog_parameters_set,
+            "GroupMoveAbort": self._move_abort,
+            "GroupStatusGet": self._status_get,
+            "GroupPositionCurrentGet": self._position_current_get,
+            "GroupVelocityCurrentGet": self._velocity_current_get,
+        }
+
+    def receive(self, data: bytes, t_s: float) -> None:
+        """Take bytes; a function is run once its bracket closes."""
+        self._data = self._data[-LONGEST:] + data
+        while (found := CALL.match(self._data)) is not None:
+            self._data = self._data[found.end() :]
+            self._run(found[1].decode(), [each.strip() for each in found[2].decode("latin-1").split(",")], t_s)
+
+    def _run(self, name: str, arguments: list[str], t_s: float) -> None:
+        if name == "GroupKill":  # it ends what another link waits for, which was closed
+            self._busy_until_s, self._replies = t_s, []
+        begin_s = max(t_s, self._busy_until_s)
+        stalls = self.faults.trigger(["stall"], t_s) is not None
+        if stalls and self.status == JOGGING:
+            self.axis.run(t_s, 0.0, MAX_DPS2)
+            self.status = AFTER_ERROR
+        lost = self.faults.trigger(["lost_reply", "silence"], t_s) is not None
+        refused = self.faults.trigger(["refusal"], t_s) is not None
+        code, value, done_s = (RANGE, "", begin_s) if refused else self._result(name, arguments, begin_s)
+        self._busy_until_s = done_s
+        if not lost:
+            self.reply(f"{code},{value},EndOfAPI".encode(), done_s + self.axis.reply_s)
+
+    def _result(self, name: str, arguments: list[str], t_s: float) -> tuple[int, str, float]:
+        """Return the error code, what is returned, and when the function is done."""
+        if name == "FirmwareVersionGet":
+            return 0, "XPS-D Firmware V1.4.1 (simulated)", t_s
+        function = self._functions.get(name)
+        if function is None:
+            return ERROR, "", t_s
+        if arguments[0] != self.group:
+            return NAME, "", t_s
+        return function(arguments[1:], t_s)
+
+    def _initialize(self, _: list[str], t_s: float) -> tuple[int, str, float]:
+        if self.status not in {NOT_INITIALISED, AFTER_ERROR}:
+            return NOT_ALLOWED, "", t_s
+        self.status = NOT_REFERENCED
+        return 0, "", t_s + INITIALISATION_S
+
+    def _home_search(self, _: list[str], t_s: float) -> tuple[int, str, float]:
+        if self.status != NOT_REFERENCED:
+            return NOT_ALLOWED, "", t_s
+        self.status = READY_HOMED
+        return 0, "", self.axis.search_home(t_s, 100.0)
+
+    def _kill(self, _: list[str], t_s: float) -> tuple[int, str, float]:
+        self.status = NOT_INITIALISED
+        self.axis.run(t_s, 0.0, MAX_DPS2)
+        return 0, "", t_s
+
+    def _jog_mode_enable(self, _: list[str], t_s: float) -> tuple[int, str, float]:
+        if not 10 <= self.status < 20:
+            return NOT_ALLOWED, "", t_s
+        self.status = JOGGING
+        return 0, "", t_s
+
+    def _jog_mode_disable(self, _: list[str], t_s: float) -> tuple[int, str, float]:
+        if self.status != JOGGING or self.axis.motion.moving(t_s):
+            return NOT_ALLOWED, "", t_s
+        self.status = READY_ABORTED
+        return 0, "", t_s
+
+    def _jog_parameters_set(self, arguments: list[str], t_s: float) -> tuple[int, str, float]:
+        if self.status != JOGGING:
+            return NOT_ALLOWED, "", t_s
+        try:
+            rate, acceleration = (float(each) for each in arguments)
+        except ValueError:
+            return ARGUMENTS, "", t_s
+        if abs(rate) > MAX_DPS or not 0 < acceleration <= MAX_DPS2:
+            return RANGE, "", t_s
+        self._jog_dps2 = acceleration
+        self.axis.run(t_s, rate, acceleration)
+        return 0, "", t_s
+
+    def _move_abort(self, _: list[str], t_s: float) -> tuple[int, str, float]:
+        if self.status != JOGGING:
+            return NOT_ALLOWED, "", t_s
+        self.status = READY_ABORTED
+        self.axis.run(t_s, 0.0, self._jog_dps2)
+        return 0, "", t_s
+
+    def _status_get(self, _: list[str], t_s: float) -> tuple[int, str, float]:
+        return 0, str(self.status), t_s
+
+    def _position_current_get(self, _: list[str], t_s: float) -> tuple[int, str, float]:
+        return 0, f"{self.axis.position_deg(t_s):.9g}", t_s
+
+    def _velocity_current_get(self, _: list[str], t_s: float) -> tuple[int, str, float]:
+        return 0, f"{self.axis.rate_dps(t_s):.9g}", t_s
