@@ -138,11 +138,10 @@ def criticise(
 ) -> Criticism:
     """Compare a model with a recording. Without `full` only the verdict is computed, for long studies.
 
-    `points` are the recording's means, and `fitted` the fit to them, where they are already known. The noise of single
-    readings is not that of averages: where the readings are such (`is_decimated`), `static` is the static record by all
-    of them, None where there is none. Raises
-    NotEnoughData only where the model cannot even be fitted; too little for a verdict is a verdict. Raises Cancelled
-    at a stage that finds it cancelled.
+    `points` are the recording's means, and `fitted` the fit to them, where they are already known. Averages do not show
+    the noise of readings: where the readings are averages (`is_decimated`), `static` is the static record by all, or
+    None. Raises NotEnoughData only where the model cannot even be fitted; too little for a verdict is a verdict. Raises
+    Cancelled at a stage that finds it cancelled.
     """
     if fitted is None and full:
         fitted = fit_means(points or recording, model)
