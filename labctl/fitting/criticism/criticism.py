@@ -126,16 +126,10 @@ def fit_means(points: Recording, model: ErrorModel) -> FittedMeans:
 
 @single_threaded
 def criticise(
-    recording: Recording,
-    model: ErrorModel,
-    catalogue: Mapping[str, Effect] = CATALOGUE,
-    *,
-    points: Recording | None = None,
-    fitted: FittedMeans | None = None,
-    full: bool = True,
-    is_decimated: bool = False,
+    recording: Recording, model: ErrorModel, catalogue: Mapping[str, Effect] = CATALOGUE, *,
+    points: Recording | None = None, fitted: FittedMeans | None = None, full: bool = True, is_decimated: bool = False,
     static: StaticRecord | None = None,
-) -> Criticism:
+) -> Criticism:  # fmt: skip
     """Compare a model with a recording. Without `full` only the verdict is computed, for long studies.
 
     `points` are the recording's means, and `fitted` the fit to them, where they are already known. Averages do not show
