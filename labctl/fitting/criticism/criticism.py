@@ -126,23 +126,16 @@ def fit_means(points: Recording, model: ErrorModel) -> FittedMeans:
 
 @single_threaded
 def criticise(
-    recording: Recording,
-    model: ErrorModel,
-    catalogue: Mapping[str, Effect] = CATALOGUE,
-    *,
-    points: Recording | None = None,
-    fitted: FittedMeans | None = None,
-    full: bool = True,
-    is_decimated: bool = False,
+    recording: Recording, model: ErrorModel, catalogue: Mapping[str, Effect] = CATALOGUE, *,
+    points: Recording | None = None, fitted: FittedMeans | None = None, full: bool = True, is_decimated: bool = False,
     static: StaticRecord | None = None,
-) -> Criticism:
+) -> Criticism:  # fmt: skip
     """Compare a model with a recording. Without `full` only the verdict is computed, for long studies.
 
-    `points` are the recording's means, and `fitted` the fit to them, where they are already known. The noise of single
-    readings is not that of averages: where the readings are such (`is_decimated`), `static` is the static record by all
-    of them, None where there is none. Raises
-    NotEnoughData only where the model cannot even be fitted; too little for a verdict is a verdict. Raises Cancelled
-    at a stage that finds it cancelled.
+    `points` are the recording's means, and `fitted` the fit to them, where they are already known. Averages do not show
+    the noise of readings: where the readings are averages (`is_decimated`), `static` is the static record by all, or
+    None. Raises NotEnoughData only where the model cannot even be fitted; too little for a verdict is a verdict. Raises
+    Cancelled at a stage that finds it cancelled.
     """
     if fitted is None and full:
         fitted = fit_means(points or recording, model)
