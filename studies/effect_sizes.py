@@ -1,13 +1,16 @@
 """Which size of a hidden effect gives which z on which protocol: effect_sizes.json, by `-m studies.effect_sizes`.
 
-A size belongs to a schedule, a simulated unit and a model, so it is worked out once and kept with the code.
+A size belongs to a schedule, a simulated unit and a model, so it is worked out once and kept with the code. With names
+of effects after the command only their sizes are worked out anew.
 """
 
 from __future__ import annotations
 
 import json
+import sys
+from collections.abc import Collection
 from concurrent.futures import ProcessPoolExecutor
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -97,23 +100,32 @@ def _factor(sizing: Sizing, effect: str, default: float, z: float, seen: dict[fl
     return None
 
 
-def make(name: str) -> Sizes:
-    """Work out every size on one protocol."""
-    sizing = sizing_of(name)
+def drawn(name: str) -> dict[str, float]:
+    """Return the usual size of every effect that may be hidden on a protocol, by its id."""
     one_axis = len(protocol(name).gyro.axes) == 1
-    made = {
-        effect: sizes_of(sizing, effect, default)
-        for effect, default in sorted(hidden_defaults().items())
-        if effect not in NOT_DRAWN and not (one_axis and effect in ONE_AXIS_NOT)
-    }
+    absent = NOT_DRAWN | (ONE_AXIS_NOT if one_axis else frozenset())
+    return {effect: size for effect, size in sorted(hidden_defaults().items()) if effect not in absent}
+
+
+def make(name: str, effects: Collection[str] = ()) -> Sizes:
+    """Work out the sizes of some effects on one protocol; of all where none are named."""
+    sizing = sizing_of(name)
+    asked = {effect: default for effect, default in drawn(name).items() if not effects or effect in effects}
+    made = {effect: sizes_of(sizing, effect, default) for effect, default in asked.items()}
     return {effect: by_z for effect, by_z in made.items() if len(by_z) == len(Z_LEVELS)}
 
 
-def main() -> None:
-    """Work out every size on every protocol, and keep them."""
+def main(effects: Collection[str] = ()) -> None:
+    """Work out sizes on every protocol, and keep them: of all effects, or anew those of the named ones."""
+    unknown = set(effects) - set(hidden_defaults())
+    if unknown:
+        sys.exit(f"no effects: {', '.join(sorted(unknown))}; give some of {', '.join(sorted(hidden_defaults()))}")
     with ProcessPoolExecutor(max_workers=2) as pool:
         longest_first = sorted(PROTOCOLS, key=lambda name: -len(protocol(name).gyro.axes))
-        made = dict(zip(longest_first, pool.map(make, longest_first), strict=True))
+        made = dict(zip(longest_first, pool.map(partial(make, effects=effects), longest_first), strict=True))
+    if effects:
+        others = {name: {each: by_z for each, by_z in _kept()[name].items() if each not in effects} for name in made}
+        made = {name: dict(sorted((others[name] | made[name]).items())) for name in made}
     document = {"made_by": COMMAND, "sizes": {name: made[name] for name in PROTOCOLS}}
     FILE.write_text(json.dumps(document, indent=1) + "\n", encoding="utf-8")
     for name in PROTOCOLS:
@@ -121,4 +133,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])

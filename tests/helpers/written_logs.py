@@ -34,6 +34,16 @@ def csv_text(rows: np.ndarray, header: str = HEADER, separator: str = ",", decim
     return "\n".join(lines) + "\n"
 
 
+def spiked_on_table() -> str:
+    """Return a log of a rate table as CSV: z at five rates of 20 s each, with three spikes."""
+    random = np.random.default_rng(5)
+    rate = np.repeat([0.0, 20.0, -20.0, 40.0, -40.0], 400)
+    output = 0.2 + 1.002 * rate + 0.05 * random.standard_normal(len(rate))
+    output[[150, 950, 1700]] += 5.0
+    lines = [f"{k / 20:.2f},{output[k]:.6f},{rate[k]:.1f},25.0" for k in range(len(rate))]
+    return "\n".join(["time (s),gyro_z (deg/s),table_rate (deg/s),temperature (degC)", *lines]) + "\n"
+
+
 def in_poses(n_poses: int = 9) -> np.ndarray:
     """Return time, outputs in deg/s and specific force in m/s2 of a unit that rests in poses between turns by hand."""
     random = np.random.default_rng(3)

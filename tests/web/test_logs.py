@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from tests.helpers.browser import Faults, Service
-from tests.helpers.written_logs import at_rest, csv_text, moved, resting_ulog
+from tests.helpers.written_logs import at_rest, csv_text, moved, resting_ulog, spiked_on_table
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page
@@ -81,3 +81,17 @@ def test_free_motion_is_refused_on_the_page_too(service: Service, visit: Callabl
     expect(page.get_by_role("alert")).to_contain_text("the file is empty")
     assert service.get("/api/recordings") == []
     faults.clear()  # the browser notes the refusal as an error
+
+
+def test_readings_of_a_rate_table_are_left_out_by_choice(service: Service, visit: Callable[..., Page]) -> None:
+    from playwright.sync_api import expect
+
+    page = visit("/recordings")
+    drop(page, "table.csv", spiked_on_table().encode())
+    choices = page.get_by_role("group", name="Leave out of every fit (the readings are kept)")
+    choices.get_by_label("spikes: 3 of gyro_z (of 2,000 readings)").check()
+    page.get_by_role("button", name="Import", exact=True).click()
+    expect(page.get_by_text("Left out: 3 of 2,000 readings of gyro_z (3 single readings are far from")).to_be_visible()
+    assert service.get("/api/recordings/1/inspection")["left_out"][0]["n"] == 3
+    page.get_by_role("link", name="Show it").click()
+    expect(page.get_by_text("Left out: 3 of 2,000 readings of gyro_z")).to_be_visible()

@@ -23,6 +23,20 @@ export function leaveOutChoices(warnings, rows) {
 }
 
 /**
+ * Put a kind into the chosen ones, or take it out; whether the log has to be looked at anew.
+ *
+ * Rows that go back in time have no place in a recording: without them the other findings are others.
+ * @param {Set<string>} chosen
+ * @param {string} kind
+ * @param {boolean} isChosen
+ */
+export function choose(chosen, kind, isChosen) {
+  if (isChosen) chosen.add(kind);
+  else chosen.delete(kind);
+  return kind === "time_back";
+}
+
+/**
  * What was left out, as the command line says it.
  * @param {Left} left
  */

@@ -61,3 +61,15 @@ export function withKey(map, key, value) {
   const { [key]: _, ...rest } = map;
   return value === null || value === "" || value === undefined ? rest : { ...rest, [key]: value };
 }
+
+/**
+ * What is sent with a log, to look at it and to import it alike: its map, and what is left out of it by choice.
+ * @param {MapDocument | string | null} map as a document or as text; null: labctl proposes one
+ * @param {{ modified_ms: number, options: readonly string[], leaveOut: Iterable<string> }} more
+ */
+export const logFields = (map, { modified_ms, options, leaveOut }) => ({
+  column_map: typeof map === "string" ? map : map ? JSON.stringify(map) : "",
+  modified_ms: String(modified_ms),
+  option: [...options],
+  leave_out: [...leaveOut],
+});

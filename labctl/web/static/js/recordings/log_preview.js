@@ -8,8 +8,8 @@ import { axisColour, colour, figure } from "../core/figure.js";
 import { count, duration } from "../core/format.js";
 import { busyIndicator, button, notice, table } from "../core/components.js";
 import { labelledField, option, selectField } from "../core/fields.js";
-import { leaveOutChoices } from "./leave_out.js";
-import { entryOf, withKey, withTarget, withUnit } from "./log_map.js";
+import { choose, leaveOutChoices } from "./leave_out.js";
+import { entryOf, logFields, withKey, withTarget, withUnit } from "./log_map.js";
 
 /** @import { Imported, LogPreview } from "../../../types/api.js" */
 /** @import { MapDocument } from "./log_map.js" */
@@ -44,12 +44,7 @@ export function logPreview(file, taken) {
   const leaveOut = new Set();
 
   /** @param {MapDocument | string | null} map */
-  const fields = (map) => ({
-    column_map: typeof map === "string" ? map : map ? JSON.stringify(map) : "",
-    modified_ms: String(file.lastModified),
-    option: options,
-    leave_out: [...leaveOut],
-  });
+  const fields = (map) => logFields(map, { modified_ms: file.lastModified, options, leaveOut });
 
   /** @param {MapDocument | string | null} map */
   async function look(map) {
@@ -187,9 +182,7 @@ function readingsNotice(seen, chosen, lookAgain) {
       type: "checkbox",
       checked: chosen.has(kind),
       onchange: () => {
-        if (box.checked) chosen.add(kind);
-        else chosen.delete(kind);
-        if (kind === "time_back") lookAgain(); // such rows have no place in a recording: the others are looked at anew
+        if (choose(chosen, kind, box.checked)) lookAgain();
       },
     });
     return h("label", { class: "check" }, box, text);
