@@ -100,7 +100,13 @@ def _steps(
         within = {"min_c": description.min_c, "max_c": description.max_c, "safe_c": safe_c}
         chamber = DescribedChamber(DescribedChamberSettings.model_validate({**within, **section}), Ports(clock), clock)
         actions = [("set", lambda: _moved_set_point(chamber))] if move else []
-        return [*_questions(description, chamber.dialogue), *actions], chamber.close
+
+        def give_back() -> None:
+            with closing(chamber), suppress(InstrumentError):
+                if move:
+                    chamber.dialogue.command(description.end, "end remote operation")
+
+        return [*_questions(description, chamber.dialogue), *actions], give_back
     document = description.model_dump(exclude_unset=True)
     readout = LineReference(LineReferenceSettings.model_validate({**section, "format": document}), Ports(clock), clock)
     return [("identity", readout.identify), ("quantities", lambda: _quantities(readout))], readout.close

@@ -8,7 +8,8 @@ from dataclasses import replace
 from instruments.clock import Clock
 from instruments.drivers.chambers.setpoint_chamber import SetpointChamber
 from instruments.drivers.driver import ChamberDriver, Trial
-from instruments.protocols.text_lines.chamber_dialects import ESPEC, SIMSERV, THERMOTRON, Dialect
+from instruments.errors import InstrumentError, RequestRejected
+from instruments.protocols.text_lines.chamber_dialects import ESPEC, SIMSERV, THERMOTRON, Dialect, PanelLock
 from instruments.protocols.text_lines.chamber_settings import (
     EspecSettings,
     LineChamberSettings,
@@ -69,8 +70,10 @@ class LineChamber(TextChamber):
         names: dict[str, object],
         *,
         acknowledges: bool = True,
+        locks_panel: bool = False,
     ) -> None:
         super().__init__(settings, ports, clock, dialect.syntax)
+        self._panel_lock = dialect.panel_lock if locks_panel else None
         self._dialect, self._names, self._acknowledges = dialect, names, acknowledges
 
     def identify(self) -> str:
@@ -78,6 +81,44 @@ class LineChamber(TextChamber):
         text = self._ask(self._dialect.identity)
         self._read_air()
         return f"{self._dialect.maker} {text}"
+
+    def set_temperature_c(self, temperature_c: float) -> float:
+        """Control the set point, with the panel locked afterwards where the bench file says so.
+
+        Raises as every chamber does, and RequestRejected where the panel is not locked after the command.
+        """
+        lock = self._panel_lock
+        if lock is None:
+            return super().set_temperature_c(temperature_c)
+        self._checked(temperature_c)
+        self._unlock(lock)  # a protected controller may refuse a set point
+        found = super().set_temperature_c(temperature_c)
+        self._command(lock.lock, "lock its panel")
+        if not lock.is_locked(self._ask(lock.question)):
+            raise RequestRejected(
+                self.name, "the panel is not locked after the command; leave lock_panel out of the bench file"
+            )
+        return found
+
+    def make_safe(self) -> float:
+        """Control the panel, which is unlocked first, and the chamber to its safe state; returns the value read back.
+
+        A panel that cannot be unlocked keeps no set point from being written. Raises as `set_temperature_c` does.
+        """
+        failure: InstrumentError | None = None
+        if self._panel_lock is not None:
+            try:
+                self._unlock(self._panel_lock)
+            except InstrumentError as error:
+                failure = error
+        found = super().make_safe()
+        if failure is not None:
+            raise failure
+        return found
+
+    def _unlock(self, lock: PanelLock) -> None:
+        if lock.is_locked(self._ask(lock.question)):
+            self._command(lock.unlock, "unlock its panel")
 
     def _controller_limits(self) -> tuple[float, float]:
         low, high = self._dialect.low, self._dialect.high
@@ -139,7 +180,7 @@ class Espec(LineChamber):
 
     def __init__(self, settings: EspecSettings, ports: Ports, clock: Clock) -> None:
         prefix = "" if settings.unit is None else f"{settings.unit},"
-        super().__init__(settings, ports, clock, ESPEC, {"prefix": prefix})
+        super().__init__(settings, ports, clock, ESPEC, {"prefix": prefix}, locks_panel=settings.lock_panel)
 
 
 class SimServ(LineChamber):

@@ -36,6 +36,18 @@ class DescribedChamber(TextChamber):
         self._read_air()
         return text
 
+    def make_safe(self) -> float:
+        """Control the chamber to its safe state, then end its remote operation; returns the set point read back.
+
+        What ends the remote operation is sent also where the safe state is refused. Raises as `set_temperature_c`.
+        """
+        try:
+            return super().make_safe()
+        finally:
+            if self._described.end:
+                self.dialogue.command(self._described.end, "end remote operation")
+                self.dialogue.ended()
+
     def _controller_limits(self) -> tuple[float, float]:
         described = self._described
         low = described.min_c if described.low is None else self._ask_c(described.low, "read the lower limit")

@@ -35,6 +35,10 @@ class Dialogue:
         """Note that everything that has to be sent over a new link was sent."""
         self._started_at = self.link.openings
 
+    def ended(self) -> None:
+        """Note that what was sent over the link is undone: it has to be sent again before the next command."""
+        self._started_at = 0
+
     def identity(self, ask: AskText) -> str:
         """Return what the instrument says it is; raises WrongInstrument for a reply that does not fit."""
         said = self.link.ask(self.request(ask.send), r".*\S.*", "say what it is")[0]

@@ -23,6 +23,7 @@ class ChamberDescription(Description):
     max_c: float
     resolution: float = Field(default=0.1, gt=0)  #: step of a set point, in `unit`
     start: Commands = ()  #: sent once after the link was opened, before the first set point: remote operation ...
+    end: Commands = ()  #: sent whenever the safe state was sought: operation at the panel again ...
     identity: AskText
     air: AskNumber
     setpoint: AskNumber

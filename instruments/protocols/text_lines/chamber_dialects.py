@@ -15,6 +15,16 @@ C = rf"(?P<c>{NUMBER})"
 
 
 @dataclass(frozen=True)
+class PanelLock:
+    """Protection of the panel against changes."""
+
+    lock: str
+    unlock: str
+    question: Question  #: group `text`
+    is_locked: Callable[[str], bool]
+
+
+@dataclass(frozen=True)
 class Dialect:
     """What a chamber is asked and commanded, and what its replies mean."""
 
@@ -38,6 +48,7 @@ class Dialect:
     end_program: str
     acknowledged: str  #: pattern of the reply to a command
     resolution_c: float = 0.1
+    panel_lock: PanelLock | None = None  #: None: none is documented
 
 
 def _espec_alarms(text: str) -> tuple[str, ...]:
@@ -56,6 +67,7 @@ ESPEC = Dialect(
             ("CONT NOT READY-1", "the chamber has no such control"),
             ("CONT NOT READY-2", "no program runs"),
             ("CONT NOT READY-3", "the controller has no such command"),
+            ("CONT NOT READY-4", "the panel cannot be locked while the controller is off"),
             ("DATA OUT OF RANGE", "the value is out of its range"),
             ("PARA ERR", "a parameter is missing or unknown"),
             ("PROTECT ON", "its panel is protected against changes"),
@@ -79,6 +91,12 @@ ESPEC = Dialect(
     stop="{prefix}MODE,STANDBY",
     end_program="{prefix}MODE,STANDBY",
     acknowledged=r"OK:.*",
+    panel_lock=PanelLock(
+        "{prefix}KEYPROTECT,ON",
+        "{prefix}KEYPROTECT,off",
+        Question("{prefix}KEYPROTECT?", r"(?P<text>ON|OFF|on|off)", "read whether its panel is locked"),
+        lambda state: state.upper() == "ON",
+    ),
 )
 
 _SIMSERV_OK = "1\u00b6"

@@ -44,6 +44,8 @@ class EspecSettings(LineChamberSettings):
 
     tcp_port: int = 10001
     unit: int | None = Field(default=None, ge=1, le=16)  #: number on an RS-485 line; not on TCP, nor on RS-232
+    #: Whether the panel is locked while labctl controls the chamber. Not by default: a person may need it for a stop.
+    lock_panel: bool = False
 
 
 class SimServSettings(LineChamberSettings):

@@ -24,13 +24,14 @@ SEPARATOR = "\u00b6"
 
 
 class SimulatedEspec(LineDevice):
-    """An Espec P-300."""
+    """An Espec P-300. While its panel is locked it refuses changes: whether a real one does is not known."""
 
     def __init__(self, setup: InstrumentSetup) -> None:
         super().__init__(ESPEC.syntax, setup.faults)
         unit = part_of(setup.instrument("chamber"), EspecSettings).unit
         self._prefix = "" if unit is None else f"{unit},"
         self.chamber = ChamberState(setup)
+        self.is_locked = False
 
     def answer(self, request: str, t_s: float) -> str | None:
         """Return the reply to a request; a request to another unit gets none."""
@@ -43,10 +44,18 @@ class SimulatedEspec(LineDevice):
             "TEMP?": lambda: f"{chamber.air_c(t_s):.1f},{chamber.setpoint_c:.1f},{limits}",
             "MODE?": lambda: "RUN" if chamber.program else "CONSTANT" if chamber.runs else "STANDBY",
             "ALARM?": lambda: ",".join(str(each) for each in (len(chamber.alarms), *chamber.alarms)),
+            "KEYPROTECT?": lambda: "ON" if self.is_locked else "OFF",
         }
         return values[request]() if request in values else self._command(request, t_s)
 
     def _command(self, request: str, t_s: float) -> str:
+        if (given := re.fullmatch(r"KEYPROTECT,(ON|OFF)", request, re.IGNORECASE)) is not None:
+            if given[1].upper() == "ON" and not self.chamber.runs:
+                return "NA:CONT NOT READY-4"
+            self.is_locked = given[1].upper() == "ON"
+            return f"OK:{request}"
+        if self.is_locked:
+            return "NA:PROTECT ON"
         if (given := re.fullmatch(r"TEMP, S(-?\d+\.\d)", request)) is not None:
             return f"OK:{request}" if self.chamber.set(float(given[1]), t_s) else "NA:DATA OUT OF RANGE"
         if (given := re.fullmatch(r"MODE,(CONSTANT|STANDBY|OFF)", request)) is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from instruments.drivers.can_bus import TRIAL
 from instruments.protocols.can.settings import CanSettings
 from instruments.protocols.can.units import unit_of_text
 from instruments.protocols.stream_formats.units import UNITS
+from tests.helpers.paths import ROOT
 
 GIVEN = {"driver": "can", "name": "imu", "serial": "C-1", "max_rate_dps": 300, **TRIAL}
 
@@ -100,3 +102,12 @@ def test_a_bench_file_names_a_dbc_file_beside_it(tmp_path: Path, encoding: str) 
 def test_units_as_dbc_files_spell_them(spelling: str, unit: str | None) -> None:
     assert unit_of_text(spelling) == unit
     assert unit is None or unit in UNITS
+
+
+def test_the_example_of_the_documentation_is_one() -> None:
+    page = (ROOT / "docs" / "how-to" / "can.md").read_text(encoding="utf-8")
+    (section,) = tomllib.loads(page.partition("```toml\n")[2].partition("```")[0])["gyros"]
+    assert section["dbc"] == "imu.dbc"
+    found = CanSettings.model_validate({**section, "dbc": TRIAL["dbc"]})
+    assert found.axes == ("x", "y", "z")
+    assert found.signals == TRIAL["signals"]
