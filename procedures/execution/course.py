@@ -20,6 +20,8 @@ from procedures.monitoring.course_reference import CourseLog, course_event
 
 #: From angle to angle, s; the units are read in between.
 READ_EVERY_S = 0.1
+#: Readings count from this long after a course began, s: until then the streams are cleared of what came before.
+LEAD_S = 0.5
 
 
 def take_course(context: ExecutionContext, step: Acquire) -> dict[str, float]:
@@ -46,12 +48,12 @@ def take_course(context: ExecutionContext, step: Acquire) -> dict[str, float]:
 def _follow(
     context: ExecutionContext, step: Acquire, table: CourseTable, run: CourseRun, log: CourseLog
 ) -> dict[str, float]:
-    gate = run.began_s, run.ends_s
+    gate = run.began_s + LEAD_S, run.ends_s
     counts = {
         name: ReadingCounts(gyro.sample_rate_hz * (gate[1] - gate[0])) for name, gyro in context.bench.gyros.items()
     }
     with context.monitor.taking_readings(counts=counts):
-        number = context.recorder.journal.dataset_opened(_header(context, step, run))
+        number = context.recorder.journal.dataset_opened(_header(context, step, run, gate))
         try:
             run = _read(context, table, run, log, number, gate, counts)
             table.end_course(run)
@@ -106,15 +108,15 @@ def _note_course(context: ExecutionContext, run: CourseRun, log: CourseLog, numb
     return found
 
 
-def _header(context: ExecutionContext, step: Acquire, run: CourseRun) -> DataSetHeader:
+def _header(context: ExecutionContext, step: Acquire, run: CourseRun, gate: tuple[float, float]) -> DataSetHeader:
     turned_deg = float(run.course.angle_deg(np.array([run.course.duration_s]))[0])
     mean_dps = turned_deg / run.course.duration_s
     return DataSetHeader(
         step=step,
         rate_dps=mean_dps,
         asked_dps=mean_dps,
-        gate_from_s=context.recorder.time.of(run.began_s),
-        gate_until_s=context.recorder.time.of(run.ends_s),
+        gate_from_s=context.recorder.time.of(gate[0]),
+        gate_until_s=context.recorder.time.of(gate[1]),
         angle_from_deg=None,
         setpoint_c=context.monitor.setpoint_c,
         run=step.run + context.added_runs,
