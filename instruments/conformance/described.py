@@ -23,7 +23,7 @@ from instruments.protocols.request_reply.reference import ReferenceDescription
 from instruments.protocols.request_reply.settings import DescribedChamberSettings, DescribedTableSettings
 from instruments.protocols.request_reply.table import TableDescription
 from instruments.protocols.text_lines.reference_lines import LineReferenceSettings
-from instruments.transport.factory import Ports
+from instruments.transport.factory import Ports, Wire
 
 #: A table is tried at this rate, deg/s, and acceleration, deg/s2, or at its limit, steady for so long, s.
 TRIED_DPS, TRIED_DPS2, TRIED_S = 10.0, 20.0, 2.0
@@ -60,14 +60,16 @@ def requests_of(description: Described) -> list[tuple[str, str]]:
 
 
 def try_description(
-    description: Described, address: dict[str, object], clock: Clock, *, move: bool = False
+    description: Described, address: dict[str, object], clock: Clock, *, move: bool = False, wire: Wire | None = None
 ) -> Iterator[Tried]:
-    """Yield what each request of a description gives. `address`: port, or host and tcp_port, as in a bench file.
+    """Yield what each request of a description gives. `address`: port, or host and tcp_port, as in a bench file;
+    `wire` records what passes.
 
     `move` also sends the commands: a table homes, turns both ways and is stopped; a chamber's set point is moved by its
     resolution and back. Raises pydantic.ValidationError for an address that is none.
     """
-    steps, close = _steps(description, {"driver": "described", "format": description, **address}, clock, move=move)
+    section: dict[str, object] = {"driver": "described", "format": description, **address}
+    steps, close = _steps(description, section, clock, Ports(clock, wire=wire), move=move)
     try:
         for what, act in steps:
             try:
@@ -79,14 +81,14 @@ def try_description(
 
 
 def _steps(
-    description: Described, section: dict[str, object], clock: Clock, *, move: bool
+    description: Described, section: dict[str, object], clock: Clock, ports: Ports, *, move: bool
 ) -> tuple[list[Step], Callable[[], None]]:
     if isinstance(description, TableDescription):
         limits = {
             "max_rate_dps": description.max_rate_dps,
             "acceleration_dps2": min(TRIED_DPS2, description.max_acceleration_dps2),
         }
-        table = DescribedTable(DescribedTableSettings.model_validate({**limits, **section}), Ports(clock), clock)
+        table = DescribedTable(DescribedTableSettings.model_validate({**limits, **section}), ports, clock)
         actions = _turns(table, clock) if move else []
 
         def leave() -> None:
@@ -98,7 +100,7 @@ def _steps(
     if isinstance(description, ChamberDescription):
         safe_c = min(max(25.0, description.min_c), description.max_c)
         within = {"min_c": description.min_c, "max_c": description.max_c, "safe_c": safe_c}
-        chamber = DescribedChamber(DescribedChamberSettings.model_validate({**within, **section}), Ports(clock), clock)
+        chamber = DescribedChamber(DescribedChamberSettings.model_validate({**within, **section}), ports, clock)
         actions = [("set", lambda: _moved_set_point(chamber))] if move else []
 
         def give_back() -> None:
@@ -108,7 +110,7 @@ def _steps(
 
         return [*_questions(description, chamber.dialogue), *actions], give_back
     document = description.model_dump(exclude_unset=True)
-    readout = LineReference(LineReferenceSettings.model_validate({**section, "format": document}), Ports(clock), clock)
+    readout = LineReference(LineReferenceSettings.model_validate({**section, "format": document}), ports, clock)
     return [("identity", readout.identify), ("quantities", lambda: _quantities(readout))], readout.close
 
 

@@ -27,6 +27,12 @@ WireLog = Annotated[
         help="File for every byte between labctl and the instruments, compressed; `labctl replay FILE` does it again.",
     ),
 ]
+WireLogOnly = Annotated[
+    Path | None,
+    typer.Option(
+        "--wire-log", metavar="FILE", help="File for every byte between labctl and the instruments, compressed."
+    ),
+]
 Serial = Annotated[str, typer.Argument(metavar="SERIAL", help="Serial number of the unit.")]
 AcceptWarnings = Annotated[
     bool,

@@ -83,7 +83,9 @@ def _runner(settings: BenchSettings, store: Store, calendar: Clock) -> BenchRunn
         return clock_for(bench, None if own_pace else settings.speed, start)
 
     make_clock()  # a date that this bench cannot have is refused now
-    return BenchRunner(store, bench, make_clock, hold_bench(store, bench), safe_within_s=ANSWER_WITHIN_S)
+    return BenchRunner(
+        store, bench, make_clock, hold_bench(store, bench), safe_within_s=ANSWER_WITHIN_S, wire_logs=settings.wire_logs
+    )
 
 
 class BenchProcess:

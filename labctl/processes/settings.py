@@ -41,6 +41,7 @@ class ServeRequest:
     database: str | None = None
     require_keys: bool = False
     max_upload_mib: int = 2048
+    wire_logs: Path | None = None  #: folder for a log of each campaign
 
     @property
     def location(self) -> str:
@@ -66,6 +67,11 @@ class ServeRequest:
                 f"--simulated-start {self.simulated_start.isoformat()}: this service has no simulated bench; give "
                 "--simulate, or leave the option out"
             )
+        if self.wire_logs is not None and self.bench_name is None:
+            raise BadInput(
+                f"--wire-logs {self.wire_logs}: this service drives no bench; give --bench or --simulate, or leave the "
+                "option out"
+            )
         if not 0 <= self.port <= LAST_PORT:
             raise BadInput(f"--port {self.port}: give a port from 1 to {LAST_PORT}, or 0 for a free port")
         if not 1 <= self.max_upload_mib <= 1 << 20:
@@ -89,6 +95,7 @@ class BenchSettings:
     host: str = "127.0.0.1"  #: at which the service listens
     at: str = "127.0.0.1"  #: that address, as a Host header names it
     asks_for_keys: bool = False  #: whether a request needs a key
+    wire_logs: Path | None = None  #: folder for a log of each campaign
 
     @property
     def drives(self) -> tuple[str, str | None, float, datetime | None]:

@@ -203,6 +203,7 @@ class Supervisor:
             request.simulated_start, self._ahead, os.getpid(),
             "" if self._guardian is None else str(self._guardian.socket),
             request.host, self._at.name, request.asks_for_keys,
+            None if request.wire_logs is None else request.wire_logs.absolute(),
         )  # fmt: skip
 
     def _open_bench(self) -> BenchLine:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from pydantic import ValidationError
@@ -16,7 +16,9 @@ from instruments.protocols.request_reply.settings import shipped_descriptions
 from instruments.protocols.request_reply.table import TableDescription
 from instruments.toml_documents import listed, read_toml, shown
 from labctl.errors import BadInput
+from labctl.services.benches.wire_log import recording
 from labctl.services.schemas.admin import DescribedCheckResponse, DescriptionTestResponse
+from labctl.services.schemas.wire_logs import RecordedSession
 
 MODELS: dict[str, type[Described]] = {
     "table": TableDescription, "chamber": ChamberDescription, "reference": ReferenceDescription
@@ -57,24 +59,22 @@ def check_description(
     *,
     move: bool = False,
     clock: Clock | None = None,
+    wire_log: Path | None = None,
 ) -> DescriptionTestResponse:
     """Check a description, and try it on a serial port or on a host (HOST:PORT); `done` is called after each request.
 
-    Without an address nothing is sent, and the answer lists the requests. `move` also sends the commands. Raises
-    BadInput for a description or an address that is none.
+    Without an address nothing is sent, and the answer lists the requests. `move` also sends the commands;
+    `wire_log` is the file that gets every byte. Raises BadInput for a description or an address that is none.
     """
     description = read_description(source)
     address = _address(port, host)
     checks: list[DescribedCheckResponse] = []
-    if address is None:
-        if move:
-            raise BadInput("--move needs an instrument to move; add --port or --host")
-        found = (DescribedCheckResponse(what=key, answer=text) for key, text in requests_of(description))
-    else:
-        tried = try_description(description, address, clock or SystemClock(), move=move)
-        found = (DescribedCheckResponse(what=each.what, answer=each.answer, problem=each.problem) for each in tried)
+    if address is None and move:
+        raise BadInput("--move needs an instrument to move; add --port or --host")
+    if address is None and wire_log is not None:
+        raise BadInput(f"--wire-log {wire_log}: nothing is sent without an instrument; add --port or --host")
     try:
-        for each in found:
+        for each in _found(description, address, clock or SystemClock(), move=move, wire_log=wire_log):
             checks.append(each)
             if done is not None:
                 done(each)
@@ -84,6 +84,20 @@ def check_description(
         file=source, name=description.name, kind=description.kind, address=port or host,
         ok=not any(each.problem for each in checks), checks=checks,
     )  # fmt: skip
+
+
+def _found(
+    description: Described, address: dict[str, object] | None, clock: Clock, *, move: bool, wire_log: Path | None
+) -> Iterator[DescribedCheckResponse]:
+    """Yield the requests of a description, and what came of each where there is an address."""
+    if address is None:
+        yield from (DescribedCheckResponse(what=key, answer=text) for key, text in requests_of(description))
+        return
+    document = description.model_dump(mode="json", exclude_unset=True)
+    with recording(wire_log, None, clock, RecordedSession(kind="driver test", description=document)) as log:
+        wire = None if log is None else log.wire
+        for each in try_description(description, address, clock, move=move, wire=wire):
+            yield DescribedCheckResponse(what=each.what, answer=each.answer, problem=each.problem)
 
 
 def _complaint(place: tuple[str | int, ...], message: str, kind: str, given: object) -> str:

@@ -66,6 +66,11 @@ def _opened(path: Path) -> Session:
     header = record.header
     try:
         what = RecordedSession.model_validate(header["session"])
+        if not what.can_be_replayed:
+            raise BadInput(
+                f"{path} is the log of a session of kind {what.kind!r}, which depends on more than its bytes, so it "
+                f"cannot be replayed; read it with `zcat {path}`"
+            )
         bench = with_drivers(BenchFile.model_validate(header["bench"]))
         start, now_s = datetime.fromisoformat(str(header["clock_start"])), float(str(header["now_s"]))
         clock = VirtualClock(start, now_s=now_s)

@@ -63,6 +63,10 @@ class WireLogFile:
             if self._queued_bytes >= WRITE_FROM_BYTES:
                 self._changed.notify_all()
 
+    def rename(self, path: Path) -> None:
+        """Give the file another name in the same file system; what is there is replaced. Raises OSError."""
+        self.path = self.path.replace(path)
+
     def close(self, t_s: float, result: Mapping[str, object] | None = None) -> None:
         """Write what is queued, and the end of the session where it has a result; safe to call twice."""
         with self._changed:

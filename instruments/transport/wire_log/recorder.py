@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from pathlib import Path
 
 from pymodbus.client import ModbusSerialClient, ModbusTcpClient
 
@@ -44,6 +45,10 @@ class WireRecorder:
     def unit_handler(self, handler: UnitHandler) -> UnitHandler:
         """Return a unit handler that notes what is asked of it; a person's work is not noted."""
         return RecordedUnitHandler(handler, partial(self.note, UNIT_HANDLER))
+
+    def rename(self, path: Path) -> None:
+        """Give the file of the log another name. Raises OSError."""
+        self._log.rename(path)
 
     def note(self, port: str, kind: Kind, data: bytes = b"", **more: object) -> None:
         """Add an event of a port, dated now."""

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from labctl.cli.error_reporting import one_clear_line
-from labctl.cli.options import BenchName, CampaignId, Database, Json
+from labctl.cli.options import BenchName, CampaignId, Database, Json, WireLogOnly
 from labctl.cli.output import console, print_json, stderr
 from labctl.cli.printing.campaigns import print_campaign, print_drafts, print_end
 from labctl.cli.turn_text import turn_text
@@ -101,6 +101,7 @@ def resume(
             "--speed", metavar="X", help="Speed of a simulated bench: X times real time; default: as fast as possible."
         ),
     ] = None,
+    wire_log: WireLogOnly = None,
     by: By = None,
     as_json: Json = False,
     database: Database = None,
@@ -114,7 +115,7 @@ def resume(
 
     with one_clear_line():
         request = ResumeRequest.model_validate({"by": person(by), "power": power})
-        asked = CampaignResume(campaign_to_resume(database, campaign), request, bench, speed)
+        asked = CampaignResume(campaign_to_resume(database, campaign), request, bench, speed, wire_log)
         with open_commands(database, campaign_terminal(quiet=as_json)) as commands:
             answer = commands.execute(RESUME_CAMPAIGN, asked)
     print_end(answer, as_json=as_json)

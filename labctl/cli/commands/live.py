@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -9,7 +10,7 @@ import typer
 
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.interrupts import ending_is_an_interrupt
-from labctl.cli.options import BenchName, Database, DriverOptions, Json
+from labctl.cli.options import BenchName, Database, DriverOptions, Json, WireLogOnly
 from labctl.cli.output import print_json
 
 if TYPE_CHECKING:
@@ -102,6 +103,7 @@ def live(
     poses: Poses = 18,
     rest_s: Rest = 2.0,
     out: Out = None,
+    wire_log: WireLogOnly = None,
     as_json: Json = False,
     database: Database = None,
 ) -> None:
@@ -116,22 +118,20 @@ def live(
     from labctl.services.live.calibrate import calibrate_live, usual_folder
 
     printer = LivePrinter()
-    with one_clear_line():
+    with one_clear_line(), ExitStack() as opened:
         target = Target(target_u, target_bias_dps, poses, rest_s)
         source = (
-            _gyro_source(serial, bench, driver, port, option or [], latitude_deg, speed)
+            opened.enter_context(_gyro_source(serial, bench, driver, port, option or [], latitude_deg, speed, wire_log))
             if lines is None
-            else _line_source(serial, lines, topic, columns, rate_hz, latitude_deg, speed)
+            else _line_source(serial, lines, topic, columns, rate_hz, latitude_deg, speed, wire_log)
         )
         assessor = InlineAssessor() if source.is_simulated else BackgroundAssessor()  # a real stream goes on meanwhile
         folder = out or usual_folder(database, source.serial, f"{source.clock.utc():%Y%m%dT%H%M%SZ}")
-        try:
-            answer = calibrate_live(
-                DatabaseCommands(database), source, target, assessor, folder, keep_folder=out is not None,
-                show=printer.show, say=printer.say, attended=ending_is_an_interrupt(),
-            )  # fmt: skip
-        finally:
-            printer.close()
+        opened.callback(printer.close)
+        answer = calibrate_live(
+            DatabaseCommands(database), source, target, assessor, folder, keep_folder=out is not None,
+            show=printer.show, say=printer.say, attended=ending_is_an_interrupt(),
+        )  # fmt: skip
     (print_json if as_json else print_live)(answer)
     if answer.fit is None:
         raise typer.Exit(1)
@@ -139,7 +139,7 @@ def live(
 
 def _line_source(
     serial: str | None, lines: str, topic: str, columns: str | None, rate_hz: float | None, latitude_deg: float | None,
-    speed: float | None,
+    speed: float | None, wire_log: Path | None,
 ) -> LiveSource:  # fmt: skip
     from instruments.clock import SystemClock
     from labctl.errors import BadInput
@@ -149,6 +149,11 @@ def _line_source(
 
     if speed is not None:
         raise BadInput(f"--speed {speed:g}: lines arrive as they are sent; leave the option out")
+    if wire_log is not None:
+        raise BadInput(
+            f"--wire-log {wire_log}: lines come from another program and not from an instrument; keep them with `tee`, "
+            "and leave the option out"
+        )
     if serial is None:
         raise BadInput("the lines do not say which unit it is; give its serial number: labctl live SERIAL --lines ...")
     clock = SystemClock()
@@ -159,11 +164,11 @@ def _line_source(
 
 def _gyro_source(
     serial: str | None, bench: str | None, driver: str | None, port: str | None, options: list[str],
-    latitude_deg: float | None, speed: float | None,
-) -> LiveSource:  # fmt: skip
+    latitude_deg: float | None, speed: float | None, wire_log: Path | None,
+) -> AbstractContextManager[LiveSource]:  # fmt: skip
     from labctl.errors import BadInput
     from labctl.services.campaigns.preparation import clock_for
-    from labctl.services.live.gyro_source import GyroSource, bench_of_driver
+    from labctl.services.live.gyro_source import bench_of_driver, recorded_source
     from labctl.services.planning.loading import load_bench
 
     if (bench is None) == (driver is None):
@@ -172,8 +177,8 @@ def _gyro_source(
         )
     if bench is not None:
         loaded = load_bench(bench)
-        return GyroSource(loaded, serial, clock_for(loaded, speed))
+        return recorded_source(loaded, serial, clock_for(loaded, speed), wire_log)
     if serial is None or port is None or driver is None:
         raise BadInput("--driver needs the serial number of the unit and its --port: labctl live SERIAL --driver ...")
     made = bench_of_driver(driver, port, serial, options, latitude_deg)
-    return GyroSource(made, serial, clock_for(made, speed))
+    return recorded_source(made, serial, clock_for(made, speed), wire_log)

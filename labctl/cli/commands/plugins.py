@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -10,6 +11,15 @@ from rich.text import Text
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import Database, Json
 from labctl.cli.output import console, print_json, stderr, table
+
+TriedWireLog = Annotated[
+    Path | None,
+    typer.Option(
+        "--wire-log",
+        metavar="FILE",
+        help="With a FILE and its instrument: file for every byte between labctl and the instrument, compressed.",
+    ),
+]
 
 driver_app = typer.Typer(no_args_is_help=True, help="The drivers of tables, chambers and gyros.")
 
@@ -66,6 +76,7 @@ def driver_checks(
             "of the chamber moves by one step and back.",
         ),
     ] = False,
+    wire_log: TriedWireLog = None,
     as_json: Json = False,
     database: Database = None,  # noqa: ARG001  every command takes it
 ) -> None:
@@ -73,17 +84,19 @@ def driver_checks(
     if name.endswith(".toml"):
         if bench is not None:
             raise typer.BadParameter("a description is tried on --port or --host, not on a bench file; leave it out")
-        _try_description(name, port, host, move=move, as_json=as_json)
-    elif port is not None or host is not None or move:
+        _try_description(name, port, host, wire_log, move=move, as_json=as_json)
+    elif port is not None or host is not None or move or wire_log is not None:
         raise typer.BadParameter(
-            "a driver of a package is tried on its simulator; --port, --host and --move belong to the description of "
-            "an instrument, a .toml file"
+            "a driver of a package is tried on its simulator; --port, --host, --move and --wire-log belong to the "
+            "description of an instrument, a .toml file"
         )
     else:
         _try_driver(name, bench, as_json=as_json)
 
 
-def _try_description(file: str, port: str | None, host: str | None, *, move: bool, as_json: bool) -> None:
+def _try_description(
+    file: str, port: str | None, host: str | None, wire_log: Path | None, *, move: bool, as_json: bool
+) -> None:
     from labctl.services.described_instruments import check_description
     from labctl.services.schemas.admin import DescribedCheckResponse
 
@@ -96,7 +109,7 @@ def _try_description(file: str, port: str | None, host: str | None, *, move: boo
             console.print(f"{each.what:18} {each.problem or each.answer}", soft_wrap=True, markup=False)
 
     with one_clear_line():
-        answer = check_description(file, port, host, show, move=move)
+        answer = check_description(file, port, host, show, move=move, wire_log=wire_log)
     if as_json:
         print_json(answer)
     elif not sends:

@@ -21,6 +21,15 @@ MaxUpload = Annotated[
     int, typer.Option("--max-upload-mib", metavar="N", help="Largest recording that may be sent, in MiB.")
 ]
 
+WireLogs = Annotated[
+    Path | None,
+    typer.Option(
+        "--wire-logs",
+        metavar="DIR",
+        help="Folder for a wire log of each campaign: campaign-7.jsonl.gz, campaign-7-resumed.jsonl.gz.",
+    ),
+]
+
 RequireKeys = Annotated[
     bool,
     typer.Option(
@@ -46,6 +55,7 @@ def serve(
     port: Annotated[int, typer.Option("--port", metavar="N", help="TCP port; 0 chooses a free port.")] = 8420,
     require_keys: RequireKeys = False,
     max_upload_mib: MaxUpload = 2048,
+    wire_logs: WireLogs = None,
     as_json: Json = False,
     database: Database = None,
 ) -> None:
@@ -58,7 +68,7 @@ def serve(
         start_at = simulated_start(simulated_from)
     request = ServeRequest(
         bench=bench, simulate=simulate, speed=speed, simulated_start=start_at, host=host, port=port, database=database,
-        require_keys=require_keys, max_upload_mib=max_upload_mib,
+        require_keys=require_keys, max_upload_mib=max_upload_mib, wire_logs=wire_logs,
     )  # fmt: skip
 
     def ready(service: Ready) -> None:

@@ -33,12 +33,12 @@ class SessionLog:
 
 @contextmanager
 def recording(
-    path: Path | None, bench: BenchFile, clock: Clock, session: RecordedSession
+    path: Path | None, bench: BenchFile | None, clock: Clock, session: RecordedSession
 ) -> Iterator[SessionLog | None]:
-    """Yield the wire log of a session; None without a path. `session` says what is done, as a replay does it again.
+    """Yield the wire log of a session; None without a path. `bench`: None where there is no bench file.
 
-    The end of the session is written when the block is left, also by an error. Raises BadInput where the file cannot be
-    written.
+    `session` says what is done, as a replay does it again. The end of the session is written when the block is left,
+    also by an error. Raises BadInput where the file cannot be written.
     """
     if path is None:
         yield None
@@ -64,15 +64,17 @@ def recording(
             )  # fmt: skip
 
 
-def header_of(bench: BenchFile, clock: Clock, session: RecordedSession) -> dict[str, object]:
+def header_of(bench: BenchFile | None, clock: Clock, session: RecordedSession) -> dict[str, object]:
     """Return the header of a log that begins now."""
     now_s = clock.now_s()
-    return {
+    header: dict[str, object] = {
         "labctl": version("labctl"),
         "python": platform.python_version(),
         "system": platform.platform(),
         "clock_start": (clock.utc() - timedelta(seconds=now_s)).isoformat(),
         "now_s": now_s,
         "session": session.model_dump(exclude_defaults=True),
-        "bench": bench.model_dump(mode="json", exclude_none=True, exclude=LEFT_OUT),
     }
+    if bench is not None:
+        header["bench"] = bench.model_dump(mode="json", exclude_none=True, exclude=LEFT_OUT)
+    return header

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from pathlib import Path
 
 from instruments.bench_config import BenchFile
 from instruments.clock import Clock
@@ -17,12 +18,12 @@ from labctl.services.benches.start_confirmation import confirmation_text
 from labctl.services.benches.stops import BenchStops
 from labctl.services.campaigns.bench_lending import BenchLending
 from labctl.services.campaigns.campaign_job import CampaignJob
-from labctl.services.campaigns.execution import run
 from labctl.services.campaigns.listeners import ChangeListeners
 from labctl.services.campaigns.live_loan import LiveLoan
-from labctl.services.campaigns.preparation import Prepared, prepare, refuse_unconfirmed
+from labctl.services.campaigns.preparation import Prepared, refuse_unconfirmed
+from labctl.services.campaigns.recorded_campaigns import RecordedCampaigns
 from labctl.services.campaigns.recovery import CampaignRecovery, secure_bench
-from labctl.services.campaigns.resume import prepare_resume, with_original_simulation
+from labctl.services.campaigns.resume import with_original_simulation
 from labctl.services.campaigns.status import answer_of, campaign_status, outlives_its_process
 from labctl.services.campaigns.stop_execution import StopExecution
 from labctl.services.planning.loading import with_drivers
@@ -63,8 +64,11 @@ class BenchRunner:
         hold: BenchHold | None = None,
         *,
         safe_within_s: float = SAFE_WITHIN_S,
+        wire_logs: Path | None = None,
     ) -> None:
+        """Drive a bench; `wire_logs` is a folder for one log of each campaign. Raises BadInput for that folder."""
         self._store = store
+        self._campaigns = RecordedCampaigns(store, wire_logs)
         self.safe_within_s = safe_within_s  #: how long an abort waits before it says how far it is
         self._hold = hold
         self._bench = bench
@@ -147,10 +151,7 @@ class BenchRunner:
             self._let_move(request.confirmed_by or actor().name if attended else None, known)
             control = self._new_control()
             clock = stoppable(self._make_clock(), control)
-            prepared = prepare(
-                self._store, request.recipe, bench, clock, clip=request.clip, fit=request.fit, bench_clear=clear
-            )
-            self._begin(prepared, control)
+            self._begin(prepared := self._campaigns.prepare(request, bench, clock, clear), control)
         return campaign_status(self._store, prepared.id)
 
     def _let_move(self, by: str | None, known: frozenset[str]) -> None:
@@ -215,7 +216,7 @@ class BenchRunner:
                 self._let_move(request.by if attended else None, known)
                 control = self._new_control()
                 clock = stoppable(self._make_clock(), control)
-                self._begin(prepare_resume(self._store, campaign, bench, lambda _: clock, request), control)
+                self._begin(self._campaigns.resume(campaign, bench, clock, request), control)
         return self.status(campaign) or campaign_status(self._store, campaign)
 
     def resume_unfinished(self) -> None:
@@ -284,7 +285,7 @@ class BenchRunner:
             self._listeners.notify()
 
         try:
-            answer = run(self._store, prepared, job.control, seen, job.lending)
+            answer = self._campaigns.run(prepared, job.control, seen, job.lending)
             if answer.state is CampaignState.INTERRUPTED:
                 self._recovery.expect_resume()
         except StoreError as error:

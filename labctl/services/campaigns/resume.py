@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from datetime import datetime
+from pathlib import Path
 
 from pydantic import ValidationError
 
 from instruments.bench import Bench, open_bench
 from instruments.bench_config import BenchFile, SimulationSettings
 from instruments.clock import Clock, SystemClock
+from instruments.transport.factory import Wire
 from labctl.config import default_database
 from labctl.errors import Conflict
 from labctl.log import get_logger
@@ -17,6 +19,7 @@ from labctl.services.benches.confirmation import SafeStateRetry
 from labctl.services.benches.identity import pinned, reported_in
 from labctl.services.benches.lease import holding, open_for
 from labctl.services.benches.power_failure import boot_id, power_failed
+from labctl.services.benches.wire_log import recording
 from labctl.services.campaigns.execution import Attend, Observe, run_attended
 from labctl.services.campaigns.foreground_stop import let_move
 from labctl.services.campaigns.preparation import (
@@ -26,8 +29,10 @@ from labctl.services.campaigns.preparation import (
     operator_of,
     refuse_unconfirmed,
 )
+from labctl.services.campaigns.readings_digest import readings_digest
 from labctl.services.planning.loading import load_bench, with_drivers
 from labctl.services.schemas.campaigns import CampaignResponse, ResumeRequest
+from labctl.services.schemas.wire_logs import RecordedSession
 from labctl.store import CampaignRow, ResumePoint, Resumption, Store, open_store
 from procedures.contracts.campaign_state import CampaignState
 from procedures.execution.resume import Restart
@@ -74,11 +79,12 @@ def prepare_resume(
     make_clock: Callable[[ResumePoint], Clock],
     request: ResumeRequest,
     opened: Bench | None = None,
+    wire: Wire | None = None,
 ) -> Prepared:
     """Mark a campaign as resumed, and return it ready to run; nothing has moved when this returns.
 
-    `opened` is the bench where it is open already. Raises Conflict when the campaign is done, when the bench carries
-    other units, or when it waits to be inspected.
+    `opened` is the bench where it is open already; `wire` records it. Raises Conflict when the campaign is done, when
+    the bench carries other units, or when it waits to be inspected.
     """
     load_libraries()
     row = store.campaigns.get(campaign)
@@ -99,7 +105,7 @@ def prepare_resume(
     power = "the power failed during the interruption" if lost else "the units stayed on"
     changed = _other_drivers(row, bench_file)
     reason = f"resumed by {request.by} after {gap_s:.0f} s without supervision; {power}{changed}"
-    bench = opened or open_bench(bench_file, clock)
+    bench = opened or open_bench(bench_file, clock, wire=wire)
     try:
         _mark_resumed(store, row, standing, Resumption(t_s, clock.utc(), reason, added, new_session, boot_id()))
         if new_world and (position := plan.mounted_at(standing.start_at)):
@@ -158,8 +164,12 @@ def resume_here(
     request: ResumeRequest,
     observe: Observe | None = None,
     attend: Attend | None = None,
+    wire_log: Path | None = None,
 ) -> CampaignResponse:
-    """Resume a campaign in this process and run it to its end; without a number the newest that is not over."""
+    """Resume a campaign in this process and run it to its end; without a number the newest that is not over.
+
+    `wire_log` is the file that gets every byte between labctl and the bench.
+    """
     location = database or default_database()
     with open_store(location, write=False) as store:
         row = store.campaigns.get(campaign) if campaign is not None else _newest_unfinished(store)
@@ -172,8 +182,17 @@ def resume_here(
 
         SafeStateRetry(store, bench_file, lambda: clock_for(bench_file, speed)).attempt()
         let_move(store, bench_file.name, request.by, SystemClock().utc())
-        prepared = prepare_resume(store, row.id, bench_file, make_clock, request)
-        return run_attended(store, prepared, control, observe, attend)
+        clock = make_clock(store.resume_points.of_campaign(row.id))
+        with recording(
+            wire_log, bench_file, clock, RecordedSession(kind="campaign resume", campaign=row.id)
+        ) as recorded:
+            wire = None if recorded is None else recorded.wire
+            prepared = prepare_resume(store, row.id, bench_file, lambda _: clock, request, wire=wire)
+            answer = run_attended(store, prepared, control, observe, attend, wire)
+            if recorded is not None:
+                recorded.result.state = answer.state.value
+                recorded.result.readings = readings_digest(store, answer.id)
+            return answer
 
 
 def _simulated_start(bench_file: BenchFile, speed: float | None, last_at: datetime) -> datetime | None:

@@ -107,8 +107,9 @@ class ForegroundControl:
         """Resume a campaign in this process and run it until it is over."""
         with self._open_terminal() as terminal:
             answer = resume_here(
-                self._database, asked.campaign, asked.bench, asked.speed, asked.body, terminal.observe, terminal.attend
-            )
+                self._database, asked.campaign, asked.bench, asked.speed, asked.body, terminal.observe, terminal.attend,
+                asked.wire_log,
+            )  # fmt: skip
         return self._with_drafts(answer)
 
     def pause(self, context: CommandContext, asked: ToCampaign[ReasonRequest]) -> CampaignResponse:

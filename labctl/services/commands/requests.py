@@ -118,10 +118,13 @@ class CampaignStart(Addressed):
 class CampaignResume(Addressed):
     """A campaign to resume; in the foreground without a number the newest unfinished one."""
 
+    local_only: ClassVar[tuple[str, ...]] = ("wire_log",)
+
     campaign: int | None
     body: ResumeRequest
     bench: str | None = None
     speed: float | None = None
+    wire_log: Path | None = None  #: file that gets every byte between labctl and the bench
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,14 +16,17 @@ from instruments.clock import Clock
 from instruments.configuration import configuration_of
 from instruments.interfaces.gyro import Readings
 from instruments.simulation import lay_simulated
+from instruments.transport.factory import Wire
 from labctl.errors import BadInput
 from labctl.fitting.live import PoseRequest
 from labctl.recording import RecordingInfo
 from labctl.recording.columns import BY_NAME
 from labctl.services.benches.standards import standards_of
+from labctl.services.benches.wire_log import recording
 from labctl.services.live.source import Block
 from labctl.services.planning.loading import with_drivers
 from labctl.services.recordings.importers import parsed_options
+from labctl.services.schemas.wire_logs import RecordedSession
 
 #: Limits of a unit that is named by driver and port alone: no table turns it.
 USUAL_RATE_DPS = 2000.0
@@ -30,7 +35,7 @@ USUAL_RATE_DPS = 2000.0
 class GyroSource:
     """One gyro of a bench. Table and chamber of the bench are not touched."""
 
-    def __init__(self, bench: BenchFile, serial: str | None, clock: Clock) -> None:
+    def __init__(self, bench: BenchFile, serial: str | None, clock: Clock, wire: Wire | None = None) -> None:
         """Choose a gyro by its serial number, default the first. Raises BadInput for an unknown one."""
         chosen = [each for each in bench.gyros if serial in (None, each.serial)]
         if not chosen:
@@ -39,7 +44,7 @@ class GyroSource:
         self._settings = chosen[0]
         # the simulated world and the seed of a unit do not depend on the other units of the bench
         self._bench_file = bench.model_copy(update={"table": None, "chamber": None, "gyros": (self._settings,)})
-        self._bench = open_bench(self._bench_file.model_copy(update={"references": ()}), clock)
+        self._bench = open_bench(self._bench_file.model_copy(update={"references": ()}), clock, wire=wire)
         self._gyro = self._bench.gyros[self._settings.name]
         self.clock = clock
         self.is_simulated = bench.is_simulated
@@ -99,6 +104,13 @@ class GyroSource:
     def stop(self) -> None:
         """Close the ports."""
         self._bench.close()
+
+
+@contextmanager
+def recorded_source(bench: BenchFile, serial: str | None, clock: Clock, wire_log: Path | None) -> Iterator[GyroSource]:
+    """Yield a gyro of a bench; `wire_log` gets every byte between labctl and it. Raises BadInput as GyroSource does."""
+    with recording(wire_log, bench, clock, RecordedSession(kind="live", unit=serial or "")) as log:
+        yield GyroSource(bench, serial, clock, None if log is None else log.wire)
 
 
 def bench_of_driver(

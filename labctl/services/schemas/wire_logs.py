@@ -6,6 +6,7 @@ from typing import Literal
 
 from pydantic import BaseModel, Field
 
+from labctl.json_types import JsonObject
 from labctl.services.schemas.base import ResponseModel
 
 
@@ -20,10 +21,18 @@ class ReadingsDigest(ResponseModel):
 class RecordedSession(BaseModel):
     """What a session does, in the header of its wire log: enough to do it again."""
 
-    kind: Literal["campaign", "bench check"]
+    kind: Literal["campaign", "bench check", "campaign resume", "live", "driver test"]
     recipe: str = ""  #: of a campaign: a shipped name, or its own TOML text
     clip: bool = False
     fit: bool = False
+    campaign: int | None = None  #: that is resumed, by its number in the database of the session
+    unit: str = ""  #: serial number, of a live calibration
+    description: JsonObject = Field(default_factory=dict)  #: of an instrument, which is tried
+
+    @property
+    def can_be_replayed(self) -> bool:
+        """Whether a log of it alone is enough to do it again."""
+        return self.kind in {"campaign", "bench check"}
 
 
 class SessionResult(BaseModel):

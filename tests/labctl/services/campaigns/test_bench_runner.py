@@ -254,7 +254,7 @@ def test_what_cannot_be_resumed_waits_for_a_person_and_the_queue_continues(
     due = lab.enter(at="now")
     lab.hold.renew()
 
-    def silent(*_: Any) -> None:
+    def silent(*_: Any, **__: Any) -> None:
         raise NoReply("table", "no answer")
 
     monkeypatch.setattr(recovery, "open_bench", silent)

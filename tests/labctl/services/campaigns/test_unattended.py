@@ -77,7 +77,7 @@ def test_a_bench_that_is_silent_when_its_campaign_is_to_be_resumed_is_not_report
 ) -> None:
     left_running(store)
 
-    def silent(*_: Any) -> None:
+    def silent(*_: Any, **__: Any) -> None:
         raise NoReply("table", "no answer")
 
     monkeypatch.setattr(recovery, "open_bench", silent)
