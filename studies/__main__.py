@@ -25,6 +25,7 @@ STUDIES = (
     "rest_verdicts",
     "rest_peers",
     "real",
+    "public_records",
     "profiles",
     "crash_recovery",
     "process_kill",
