@@ -157,8 +157,10 @@ def remedy(url: str, error: Exception) -> str:
         address = parsed(url)
     except ValueError:
         return "the address"
-    down = getattr(error, "errno", None) in (errno.ENETDOWN, errno.ENODEV)
-    if address.interface == "socketcan" and down:
+    number = getattr(error, "errno", None)
+    if number == errno.EAFNOSUPPORT:
+        return "that the kernel of this computer has CAN: `sudo modprobe can_raw`"
+    if address.interface == "socketcan" and number in (errno.ENETDOWN, errno.ENODEV):
         rate = address.options.get("bitrate", 500000)
         name = address.channel
         return (

@@ -40,7 +40,7 @@ def test_two_units_are_never_taken_for_one(what: str) -> None:
     [
         ("table", ("table", "driver"), "acutrol-3000 (labctl {version}), arrick-c4"),
         ("chamber", ("chamber", "driver"), "binder (labctl {version}), espec"),
-        ("gyros", ("gyros", 0, "driver"), "gyrostar (labctl {version}), kvh-dsp3000"),
+        ("gyros", ("gyros", 0, "driver"), "can (labctl {version}), gyrostar (labctl {version}), kvh-dsp3000"),
     ],
 )
 def test_an_unknown_driver_is_refused_with_its_place_what_is_installed_and_what_to_do(

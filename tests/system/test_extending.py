@@ -85,7 +85,7 @@ def test_a_driver_with_its_simulator(outside: Callable[[str], Outside]) -> None:
     user = outside(GYRO)
     refused = user.labctl("labctl bench check acme-gyro/bench.toml", status=2)
     assert refused.stderr.count("\n") == 1
-    assert "gyros.0.driver: no driver 'acme-g1' is installed (installed: gyrostar (labctl " in refused.stderr
+    assert "gyros.0.driver: no driver 'acme-g1' is installed (installed: can (labctl " in refused.stderr
     printed = user.follow()
     assert "[acme-g1 of acme-gyro 0.1.0]" in printed["labctl bench check acme-gyro/bench.toml"]
     tried = printed["labctl driver test acme-g1"].splitlines()

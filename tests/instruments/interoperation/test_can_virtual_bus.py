@@ -166,6 +166,7 @@ def test_a_bus_that_cannot_be_opened_is_one_line(address: str, text: str) -> Non
 def test_an_interface_of_the_kernel_that_is_down_is_told_how_to_set_up(number: int) -> None:
     text = remedy("can://socketcan/can3?bitrate=250000", OSError(number, "down"))
     assert "`sudo ip link set can3 up type can bitrate 250000 restart-ms 100`" in text
+    assert "modprobe can_raw" in remedy("can://socketcan/can3", OSError(errno.EAFNOSUPPORT, "no CAN"))
 
 
 def test_an_interface_that_fails_is_a_lost_link(place: Any, monkeypatch: pytest.MonkeyPatch) -> None:
