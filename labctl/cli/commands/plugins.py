@@ -97,7 +97,7 @@ def driver_checks(
 def _try_description(
     file: str, port: str | None, host: str | None, wire_log: Path | None, *, move: bool, as_json: bool
 ) -> None:
-    from labctl.services.described_instruments import check_description
+    from labctl.services.benches.described_instruments import check_description
     from labctl.services.schemas.admin import DescribedCheckResponse
 
     sends = port is not None or host is not None

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,7 +17,7 @@ def is_thermometer(target: str) -> bool:
     return target.endswith("_c") and not target.endswith("_setpoint_c")
 
 
-def fill_between(columns: dict[str, Any], t_s: Array, problems: Problems) -> str:
+def fill_between(columns: dict[str, NDArray[np.generic]], t_s: Array, problems: Problems) -> str:
     """Fill empty cells of thermometers, at times (n,) s, by straight lines between their readings; says which.
 
     Before the first and after the last reading the nearest one stands. A problem where readings are too few or too far

@@ -9,6 +9,9 @@ from pydantic import BaseModel, Field
 from labctl.json_types import JsonObject
 from labctl.services.schemas.base import ResponseModel
 
+#: What a session does.
+SessionKind = Literal["campaign", "bench check", "campaign resume", "live", "driver test"]
+
 
 class ReadingsDigest(ResponseModel):
     """What a session has measured, as far as it is needed to compare two sessions."""
@@ -21,7 +24,7 @@ class ReadingsDigest(ResponseModel):
 class RecordedSession(BaseModel):
     """What a session does, in the header of its wire log: enough to do it again."""
 
-    kind: Literal["campaign", "bench check", "campaign resume", "live", "driver test"]
+    kind: SessionKind
     recipe: str = ""  #: of a campaign: a shipped name, or its own TOML text
     clip: bool = False
     fit: bool = False
@@ -53,7 +56,7 @@ class ReplayResponse(ResponseModel):
         description="Whether labctl sent what it sent in the session, and the result is that of the session, as far as "
         "the log tells."
     )
-    session: Literal["campaign", "bench check"] = Field(description="What the session did.")
+    session: SessionKind = Field(description="What the session did.")
     labctl: str = Field(description="Release of labctl that wrote the log.")
     bench: str
     duration_s: float = Field(description="Time from the begin of the session to the end of the log, s of its clock.")

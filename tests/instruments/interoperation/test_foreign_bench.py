@@ -19,7 +19,7 @@ from instruments.bench import open_bench
 from instruments.bench_config import BenchFile, read_bench
 from instruments.clock import ScaledClock, SystemClock
 from instruments.errors import RequestRejected
-from labctl.services.described_instruments import check_description
+from labctl.services.benches.described_instruments import check_description
 from labctl.stop.instruments_stop import stop_instruments
 from labctl.store import open_store
 from tests.helpers.forked_commands import run_labctl

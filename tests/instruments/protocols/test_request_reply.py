@@ -19,7 +19,7 @@ from instruments.protocols.request_reply.templates import as_written, filled
 from instruments.protocols.request_reply.units import TEMPERATURES, temperature_unit
 from instruments.toml_documents import read_toml
 from labctl.errors import BadInput
-from labctl.services.described_instruments import check_description, read_description
+from labctl.services.benches.described_instruments import check_description, read_description
 from tests.helpers.paths import ROOT
 
 FOLDER = ROOT / "examples" / "line-instruments"

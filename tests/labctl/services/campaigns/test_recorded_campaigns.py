@@ -14,9 +14,9 @@ from instruments.clock import VirtualClock
 from labctl.cli.app import app
 from labctl.errors import BadInput
 from labctl.processes.settings import ServeRequest
+from labctl.services.benches.described_instruments import check_description
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.recorded_campaigns import RecordedCampaigns
-from labctl.services.described_instruments import check_description
 from labctl.services.live.gyro_source import recorded_source
 from labctl.services.planning.loading import load_bench
 from labctl.services.schemas.campaigns import CampaignRequest, ResumeRequest
