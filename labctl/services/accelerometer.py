@@ -7,20 +7,27 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from labctl.errors import BadInput, BadRecording
+from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.poses.at_rest.accelerometer import Accelerometer, calibrate_accelerometer, different_poses
 from labctl.fitting.poses.at_rest.adequacy import Adequacy, adequacy_of
 from labctl.fitting.poses.at_rest.fewer_poses import ByFewer, Known, by_fewer_poses
 from labctl.fitting.poses.at_rest.gravity import STANDARD_GRAVITY
 from labctl.fitting.poses.at_rest.rests import Rests, find_rests
+from labctl.fitting.poses.at_rest.temperature import OverTemperature, calibrate_over_temperature
 from labctl.fitting.poses.readings import AXES, GAP, LEAST_READINGS, PoseReadings, readings_of
 from labctl.fitting.poses.triad import UPPER
 from labctl.recording import RecordingInfo
 from labctl.recording.data_files import read_table
 from labctl.recording.files import read_recording
 from labctl.recording.info import NO_DATE
-from labctl.services.schemas.reports.accelerometer import AccelerometerResponse, EarlierVersion
+from labctl.services.schemas.reports.accelerometer import (
+    AccelerometerResponse,
+    AccelerometerTemperature,
+    EarlierVersion,
+)
 from labctl.services.schemas.reports.magnetometer import Estimate
 from labctl.services.table_readings import numbers_of
 
@@ -36,12 +43,14 @@ class Source:
     columns: Sequence[str] = COLUMNS  #: time in s, then x, y and z
     unit: str = "g"
     latitude_deg: float | None = None
+    temperature: str | None = None  #: column of the temperature, deg C; None: it is not read
 
     @property
     def text(self) -> str:
         """What was read, in one line."""
         local = "" if self.latitude_deg is None else f", gravity at latitude {self.latitude_deg:g} deg"
-        return f"columns {', '.join(self.columns)} in {self.unit}{local}"
+        warm = "" if self.temperature is None else f", temperature {self.temperature} in deg C"
+        return f"columns {', '.join(self.columns)} in {self.unit}{local}{warm}"
 
 
 @dataclass(frozen=True)
@@ -114,6 +123,10 @@ def accelerometer_of_files(
             )
     readings = _joined(parts)
     rests = find_rests(readings)
+    if source.temperature is not None:
+        if earlier is not None:
+            raise BadInput("--temperature with --earlier: coefficients of temperature need all poses; leave one out")
+        return temperature_response(calibrate_over_temperature(readings, rests), rests)
     if earlier is None:
         found = calibrate_accelerometer(readings, rests)
         return _response(found, rests, adequacy_of(found, rests))
@@ -132,7 +145,8 @@ def _readings(path: Path, source: Source) -> PoseReadings:
     if not path.is_file():
         raise BadRecording(f"{path}: not found; name a CSV or Parquet file of readings, or the folder of a recording")
     table = read_table(path)
-    rows = numbers_of(path, table, source.columns, "time, x, y and z")
+    warm = [] if source.temperature is None else [source.temperature]
+    rows = numbers_of(path, table, [*source.columns, *warm], "time, x, y and z" + ", and temperature" * len(warm))
     if len(rows) < LEAST_READINGS:
         raise BadRecording(f"{path}: {len(rows)} rows; rests in poses need at least {LEAST_READINGS}; record longer")
     steps = np.diff(rows[:, 0])
@@ -146,7 +160,8 @@ def _readings(path: Path, source: Source) -> PoseReadings:
     breaks = np.concatenate([[False], steps > GAP * float(np.median(steps))])
     # without a gyro nothing tells a turn about the vertical, which leaves the specific force as it is
     return PoseReadings(
-        info, rows[:, 0], UNITS_G[source.unit] * rows[:, 1:], np.zeros((len(rows), 3)), None, breaks
+        info, rows[:, 0], UNITS_G[source.unit] * rows[:, 1:4], np.zeros((len(rows), 3)),
+        rows[:, 4] if warm else None, breaks,
     )  # fmt: skip
 
 
@@ -172,10 +187,43 @@ def _joined(parts: Sequence[PoseReadings]) -> PoseReadings:
             t_s=np.concatenate([whole.t_s, later]),
             accel_g=np.vstack([whole.accel_g, part.accel_g]),
             gyro_dps=np.vstack([whole.gyro_dps, part.gyro_dps]),
-            temperature_c=None,
+            temperature_c=_both(whole.temperature_c, part.temperature_c),
             breaks=np.concatenate([whole.breaks, breaks]),
         )
     return whole
+
+
+def _both(first: Array | None, then: Array | None) -> Array | None:
+    return None if first is None or then is None else np.concatenate([first, then])
+
+
+def temperature_response(found: OverTemperature, rests: Rests) -> AccelerometerResponse:
+    """Return a calibration over temperature as a response."""
+    u = np.sqrt(np.diag(found.covariance))
+    begin = len(found.reference.covariance)
+
+    def terms(values: NDArray[np.float64], first: int) -> dict[str, list[Estimate]]:
+        of = u[first : first + values.size].reshape(values.shape)
+        return {
+            a: [Estimate(value=float(value), u=float(each)) for value, each in zip(values[:, i], of[:, i], strict=True)]
+            for i, a in enumerate(AXES)
+        }
+
+    low, high = found.range_c
+    answer = _response(found.reference, rests, found.adequacy)
+    said = (
+        f"Over {low:.1f} to {high:.1f} deg C ({found.temperatures} temperatures), about {found.reference_c:g} deg C: "
+        f"bias to the power {len(found.bias_g)}, scale factors to the power {len(found.scale_factor)}; constants would "
+        f"leave {found.constant_g:.2g} g."
+    )
+    return answer.model_copy(update={
+        "text": [*answer.text, said],
+        "temperature": AccelerometerTemperature(
+            reference_c=found.reference_c, range_c=found.range_c, temperatures=found.temperatures,
+            bias_g=terms(found.bias_g, begin), scale_factor=terms(found.scale_factor, begin + found.bias_g.size),
+            covariance=found.covariance.tolist(), constant_g=found.constant_g,
+        ),
+    })  # fmt: skip
 
 
 def _response(found: Accelerometer, rests: Rests, worth: Adequacy) -> AccelerometerResponse:

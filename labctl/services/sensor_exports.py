@@ -8,11 +8,15 @@ import numpy as np
 
 from labctl.errors import BadInput
 from labctl.exports.sensors.formats import written
-from labctl.exports.sensors.parameters import AccelerometerParameters, MagnetometerParameters
+from labctl.exports.sensors.parameters import (
+    AccelerometerParameters,
+    MagnetometerParameters,
+    TemperatureParameters,
+)
 from labctl.fitting.magnetometer.calibrate import AXES
 from labctl.fitting.magnetometer.ellipsoid import PLACES
 from labctl.fitting.poses.triad import UPPER
-from labctl.services.schemas.reports.accelerometer import AccelerometerResponse
+from labctl.services.schemas.reports.accelerometer import AccelerometerResponse, AccelerometerTemperature
 from labctl.services.schemas.reports.magnetometer import MagnetometerResponse
 
 Calibrated = AccelerometerResponse | MagnetometerResponse
@@ -51,7 +55,16 @@ def _accelerometer(answer: AccelerometerResponse) -> AccelerometerParameters:
     return AccelerometerParameters(
         np.array([answer.bias_g[axis].value for axis in AXES]), errors, answer.gravity_g,
         np.array(answer.covariance), max(answer.noise_density_m_s2.values()),
+        None if answer.temperature is None else _temperature(answer.temperature),
     )  # fmt: skip
+
+
+def _temperature(answer: AccelerometerTemperature) -> TemperatureParameters:
+    bias, scale = (
+        np.array([[each.value for each in terms[axis]] for axis in AXES]).T
+        for terms in (answer.bias_g, answer.scale_factor)
+    )
+    return TemperatureParameters(answer.reference_c, answer.range_c, bias, scale)
 
 
 def _magnetometer(answer: MagnetometerResponse) -> MagnetometerParameters:

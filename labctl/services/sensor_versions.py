@@ -20,7 +20,7 @@ from labctl.fitting.poses.triad import UPPER
 from labctl.json_types import JsonDocument
 from labctl.recording.files import FILE_NAMES
 from labctl.recording.info import SERIAL_PATTERN
-from labctl.services.schemas.reports.accelerometer import AccelerometerResponse
+from labctl.services.schemas.reports.accelerometer import AccelerometerResponse, AccelerometerTemperature
 from labctl.services.schemas.reports.magnetometer import Estimate, MagnetometerResponse
 from labctl.services.schemas.sensors import (
     AccelerometerRequest,
@@ -77,6 +77,10 @@ def _kept(
         )
     result = asked.result.model_dump(mode="json")
     problem = _problem(_estimates(asked.result), asked.result.covariance) or _not_json(result)
+    if problem is None and isinstance(asked.result, AccelerometerResponse) and asked.result.temperature is not None:
+        problem = _problem(
+            _over_temperature(asked.result, asked.result.temperature), asked.result.temperature.covariance
+        )
     if problem is not None:
         raise BadInput(f"result of the {sensor}: {problem}; send what `labctl {sensor} FILE --json` prints, unchanged")
     data = asked.data.model_dump(mode="json")
@@ -142,6 +146,15 @@ def _estimates(result: AccelerometerResponse | MagnetometerResponse) -> list[Est
         *(result.hard_iron_ut.get(a) for a in AXES), *(result.soft_iron.get(AXES[i] + AXES[j]) for i, j in PLACES),
         result.field_ut,
     ]  # fmt: skip
+
+
+def _over_temperature(result: AccelerometerResponse, warm: AccelerometerTemperature) -> list[Estimate | None]:
+    """Return the nine estimates and those of temperature, by power and axis, in the order of the covariance."""
+    found = _estimates(result)
+    for terms in (warm.bias_g, warm.scale_factor):
+        powers = max((len(each) for each in terms.values()), default=0)
+        found += [dict(enumerate(terms.get(axis, []))).get(power) for power in range(powers) for axis in AXES]
+    return found
 
 
 def _not_json(result: JsonDocument) -> str | None:

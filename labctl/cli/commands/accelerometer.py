@@ -25,6 +25,15 @@ Earlier = Annotated[
         help="Use version N of this unit (--serial) too, 0: its newest; four poses are then enough.",
     ),
 ]
+Temperature = Annotated[
+    str | None,
+    typer.Option(
+        "--temperature",
+        metavar="COLUMN",
+        help="Fit bias and scale factors over the temperature in this column, deg C (of a recording: its own): poses "
+        "at two temperatures or more that span 5 K.",
+    ),
+]
 ScaleChange = Annotated[
     float,
     typer.Option(
@@ -50,6 +59,7 @@ def accelerometer(
         float | None,
         typer.Option("--latitude", metavar="DEG", help="Latitude, for the local gravity; default: 9.80665 m/s2."),
     ] = None,
+    temperature: Temperature = None,
     serial: SensorSerial = None,
     earlier: Earlier = None,
     scale_change: ScaleChange = 1e-3,
@@ -70,7 +80,7 @@ def accelerometer(
     kept = None
     with one_clear_line():
         check_export(export, out)
-        source = Source([name.strip() for name in columns.split(",")], unit, latitude_deg)
+        source = Source([name.strip() for name in columns.split(",")], unit, latitude_deg, temperature)
         before = _earlier(database, serial, earlier, (scale_change, misalignment_change))
         answer = accelerometer_of_files(paths, source, serial, before)
         write_export(answer, export, out, instance, device_id)

@@ -50,6 +50,13 @@ def _print_accelerometer(answer: AccelerometerResponse) -> None:
     ):
         for place, found in values.items():
             rows.add_row(f"{name} {place}", unit, format_number(found.value, 5), format_number(found.u, 2))
+    if answer.temperature is not None:
+        for name, unit, terms in (("bias", "g", answer.temperature.bias_g),
+                                  ("scale factor", "1", answer.temperature.scale_factor)):  # fmt: skip
+            for axis, found_terms in terms.items():
+                for power, found in enumerate(found_terms, start=1):
+                    per = f"{unit}/K" + (f"^{power}" if power > 1 else "")
+                    rows.add_row(f"{name} {axis}", per, format_number(found.value, 3), format_number(found.u, 2))
     console.print(rows)
     _print_verdict(answer)
     density = max(answer.noise_density_m_s2.values())

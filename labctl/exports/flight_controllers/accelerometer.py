@@ -8,13 +8,16 @@ for misalignments; how much of gravity's size that loses is in the head of the f
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import comb
 
 import numpy as np
+from numpy.typing import NDArray
 
 from labctl.errors import BadInput
 from labctl.exports.comments import commented, plain
+from labctl.exports.flight_controllers.ardupilot import LIMITS_C, REFERENCE_C, SCALE, parameter_names
 from labctl.exports.options import check_instance
-from labctl.exports.sensors.parameters import ForceParameters
+from labctl.exports.sensors.parameters import ForceParameters, TemperatureParameters
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.poses.at_rest.gravity import STANDARD_GRAVITY
 from labctl.fitting.poses.readings import AXES
@@ -23,6 +26,15 @@ from labctl.fitting.poses.readings import AXES
 FLOAT, INTEGER = 9, 6
 #: Priority of a sensor as PX4 gives it by itself: medium.
 PRIORITY = 50
+#: Largest power of temperature that both have.
+ORDER = 3
+PX4_NOTES = (
+    "TC_A*: what the bias differs by from that at TREF, which is in CAL_ACC*OFF.",
+    "PX4 applies a new offset when the temperature has moved by 1 K. Calibrate the offsets again only at TREF.",
+)
+ARDUPILOT_NOTE = (
+    "INS_TCAL* holds for the gyros too: their coefficients (GYR*) are not in this file; TMIN and TMAX limit both."
+)
 #: Ranges that ArduPilot documents for its parameters.
 LARGEST_OFFSET_M_S2, SCALES = 3.5, (0.8, 1.2)
 
@@ -43,7 +55,11 @@ def px4(found: ForceParameters, head: Sequence[str], instance: int, device_id: i
     rows.append((f"{name}PRIO", str(PRIORITY), INTEGER))
     rows += [(f"{name}{axis.upper()}OFF", f"{value:.9g}", FLOAT) for axis, value in zip(AXES, offset, strict=True)]
     rows += [(f"{name}{axis.upper()}SCALE", f"{value:.9g}", FLOAT) for axis, value in zip(AXES, scale, strict=True)]
+    warm = found.temperature
+    if warm is not None:
+        rows += _px4_temperature(warm, instance, device_id)
     notes = [
+        *([] if warm is None else [warm.lost(found.gravity_g, bias=False), *PX4_NOTES]),
         _lost(found, "PX4"),
         "Axes are the sensor's own, as in its raw output, before the rotations of sensor and board.",
         "Vehicle, component, parameter, value, type (6: integer, 9: float):",
@@ -62,6 +78,8 @@ def ardupilot(found: ForceParameters, head: Sequence[str], instance: int, device
     check_instance("ardupilot", instance, 1, 3)
     number = "" if instance == 1 else str(instance)
     offset, scale = _offset_and_scale(found)
+    if found.temperature is not None:  # the constant is that at ACC_CALTEMP, by the parameters as they are written
+        offset = offset + found.temperature.bias_change_g(np.array([_cal_c(found.temperature)]))[0] * STANDARD_GRAVITY
     for axis, value, factor in zip(AXES, offset, scale, strict=True):
         if abs(value) > LARGEST_OFFSET_M_S2 or not SCALES[0] <= factor <= SCALES[1]:
             raise BadInput(
@@ -73,11 +91,60 @@ def ardupilot(found: ForceParameters, head: Sequence[str], instance: int, device
     for kind, values in (("OFFS", offset), ("SCAL", scale)):
         rows += [(f"INS_ACC{number}{kind}_{axis.upper()}", f"{value:.9g}")
                  for axis, value in zip(AXES, values, strict=True)]  # fmt: skip
+    warm = found.temperature
+    if warm is not None:
+        rows += _ardupilot_temperature(warm, instance)
     notes = [
+        *([] if warm is None else [warm.lost(found.gravity_g, bias=False), ARDUPILOT_NOTE]),
         _lost(found, "ArduPilot"),
         "Axes are the sensor's own after the rotation by its driver, before that of the board.",
     ]
     return commented([*map(plain, head), *notes]) + "".join(f"{row},{value}\n" for row, value in rows)
+
+
+def _px4_temperature(warm: TemperatureParameters, instance: int, device_id: int | None) -> list[tuple[str, str, int]]:
+    """Return TC_A*: what the bias differs by from that at TREF, which is CAL_ACCn_*OFF, m/s2."""
+    name = f"TC_A{instance}_"
+    low, high = warm.range_c
+    rows = [("TC_A_ENABLE", "1", INTEGER)]
+    rows += [] if device_id is None else [(f"{name}ID", str(device_id), INTEGER)]
+    rows += [(f"{name}{key}", f"{value:.9g}", FLOAT) for key, value in
+             (("TREF", warm.reference_c), ("TMIN", low), ("TMAX", high))]  # fmt: skip
+    terms = np.zeros((ORDER + 1, len(AXES)))
+    terms[1 : len(warm.bias_g) + 1] = warm.bias_g * STANDARD_GRAVITY
+    rows += [(f"{name}X{power}_{axis}", f"{terms[power, axis]:.9g}", FLOAT)
+             for power in range(ORDER, -1, -1) for axis in range(len(AXES))]  # fmt: skip
+    return rows
+
+
+def _ardupilot_temperature(warm: TemperatureParameters, instance: int) -> list[tuple[str, str]]:
+    """Return INS_TCALn_*: the same polynomial about 35 deg C, 1e-6 m/s2, without its constant."""
+    low, high = warm.range_c
+    if low < LIMITS_C[0] or high > LIMITS_C[1]:
+        raise BadInput(
+            f"format ardupilot: calibrated from {low:g} to {high:g} deg C; TMIN and TMAX of ArduPilot go only from "
+            f"{LIMITS_C[0]:g} to {LIMITS_C[1]:g} deg C; use --export json or px4"
+        )
+    thermal = parameter_names(instance)[0]
+    terms = _about(warm, REFERENCE_C) * STANDARD_GRAVITY * SCALE
+    rows = [(f"{thermal}ENABLE", "1"), (f"{thermal}TMIN", f"{low:.9g}"), (f"{thermal}TMAX", f"{high:.9g}")]
+    rows += [(f"{thermal}ACC{power}_{axis.upper()}", f"{terms[power, i]:.9g}")
+             for power in range(1, ORDER + 1) for i, axis in enumerate(AXES)]  # fmt: skip
+    return [*rows, (f"INS_ACC{instance}_CALTEMP", f"{_cal_c(warm):.9g}")]
+
+
+def _cal_c(warm: TemperatureParameters) -> float:
+    return float(np.clip(REFERENCE_C, *warm.range_c))
+
+
+def _about(warm: TemperatureParameters, about_c: float) -> NDArray[np.float64]:
+    """Return the bias by powers of the temperature from `about_c`, (4, 3) g/K^k."""
+    away = about_c - warm.reference_c
+    terms = np.zeros((ORDER + 1, len(AXES)))
+    for power, row in enumerate(warm.bias_g, start=1):
+        for k in range(power + 1):
+            terms[k] += comb(power, k) * away ** (power - k) * row
+    return terms
 
 
 def _offset_and_scale(found: ForceParameters) -> tuple[Array, Array]:

@@ -21,6 +21,8 @@ class ForceParameters(Protocol):
     def errors(self) -> NDArray[np.float64]: ...
     @property
     def gravity_g(self) -> float: ...
+    @property
+    def temperature(self) -> TemperatureParameters | None: ...
 
 
 class FieldParameters(Protocol):
@@ -33,6 +35,44 @@ class FieldParameters(Protocol):
 
 
 @dataclass(frozen=True)
+class TemperatureParameters:
+    """Bias (n, 3) g/K^k and scale factor (m, 3) 1/K^k by powers of the temperature from a reference, k from 1."""
+
+    reference_c: float
+    range_c: tuple[float, float]
+    bias_g: NDArray[np.float64]
+    scale_factor: NDArray[np.float64]
+
+    def grid(self) -> Array:
+        """Temperatures of the range, deg C, close enough to find the largest value of a cubic."""
+        return np.linspace(*self.range_c, 101)
+
+    def bias_change_g(self, temperature_c: Array) -> NDArray[np.float64]:
+        """Return what the bias differs by from that at the reference, (k, 3) g, at temperatures (k,) deg C."""
+        return powers_of(temperature_c - self.reference_c, len(self.bias_g)) @ self.bias_g
+
+    def scale_change(self, temperature_c: Array) -> NDArray[np.float64]:
+        """Return the same of the scale factors, (k, 3)."""
+        return powers_of(temperature_c - self.reference_c, len(self.scale_factor)) @ self.scale_factor
+
+    def lost(self, gravity_g: float, *, bias: bool) -> str:
+        """Return the line that says what a format without scale factors over temperature loses, and the `bias` too."""
+        low, high = self.range_c
+        warm = self.grid()
+        scale = gravity_g * float(np.abs(self.scale_change(warm)).max())
+        of_bias = f"the bias by up to {float(np.abs(self.bias_change_g(warm)).max()):.2g} g and " * bias
+        return (
+            f"LOST temperature: over {low:.1f} to {high:.1f} deg C {of_bias}the scale factors by up to {scale:.2g} g "
+            f"of 1 g differ from those here, of {self.reference_c:g} deg C."
+        )
+
+
+def powers_of(away: Array, order: int) -> NDArray[np.float64]:
+    """Return the powers 1 to `order` of differences (k,), (k, order)."""
+    return np.asarray(away[:, None] ** np.arange(1, order + 1), dtype=np.float64)
+
+
+@dataclass(frozen=True)
 class AccelerometerParameters:
     """An accelerometer: reading = bias + (1 + errors) force."""
 
@@ -41,6 +81,7 @@ class AccelerometerParameters:
     gravity_g: float
     covariance: NDArray[np.float64]  #: (9, 9) of the parameters in the order of `labels`
     noise_density_m_s2: float  #: the largest of the axes, m/s2/sqrt(Hz)
+    temperature: TemperatureParameters | None = None  #: None: the parameters are constants
 
     sensor = "accelerometer"
     unit = "m/s2"

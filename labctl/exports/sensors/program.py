@@ -6,7 +6,8 @@ import json
 from collections.abc import Sequence
 
 from labctl.exports.comments import commented, plain
-from labctl.exports.sensors.parameters import Parameters
+from labctl.exports.sensors.parameters import AccelerometerParameters, Parameters
+from labctl.fitting.poses.at_rest.gravity import STANDARD_GRAVITY
 
 SCHEMA = "labctl-sensor/1"
 FORMULA = "corrected = matrix (reading - offset), along x, y, z of the sensor"
@@ -14,17 +15,30 @@ FORMULA = "corrected = matrix (reading - offset), along x, y, z of the sensor"
 
 def json_text(found: Parameters, head: Sequence[str]) -> str:
     """Return offset and matrix, with the parameters' covariance, as a JSON document."""
-    document = {
+    warm = found.temperature if isinstance(found, AccelerometerParameters) else None
+    document: dict[str, object] = {
         "schema": SCHEMA, "sensor": found.sensor, "formula": FORMULA, "unit": found.unit,
         "offset": found.offset.tolist(), "matrix": found.matrix.tolist(),
         "covariance": {"of": list(found.labels), "values": found.covariance.tolist()}, "text": list(head),
     }  # fmt: skip
+    if warm is not None:
+        document["temperature"] = {
+            "formula": "offset and scale factors (diagonal of the inverse of matrix) as polynomials of T - reference_c",
+            "reference_c": warm.reference_c, "range_c": list(warm.range_c),
+            "offset_per_k": (warm.bias_g * STANDARD_GRAVITY).tolist(), "scale_factor_per_k": warm.scale_factor.tolist(),
+        }  # fmt: skip
     return json.dumps(document, indent=2) + "\n"
+
+
+def _lost(found: Parameters) -> list[str]:
+    if not isinstance(found, AccelerometerParameters) or found.temperature is None:
+        return []
+    return [found.temperature.lost(found.gravity_g, bias=True)]
 
 
 def python_text(found: Parameters, head: Sequence[str]) -> str:
     """Return a module that needs nothing but Python."""
-    lines = [*map(plain, head), f"{FORMULA}; offset, readings and results in {found.unit}."]
+    lines = [*map(plain, head), f"{FORMULA}; offset, readings and results in {found.unit}.", *_lost(found)]
     return commented(lines) + (
         f"OFFSET = {found.offset.tolist()!r}\n"
         f"MATRIX = {found.matrix.tolist()!r}\n\n\n"
@@ -38,7 +52,7 @@ def python_text(found: Parameters, head: Sequence[str]) -> str:
 def c_text(found: Parameters, head: Sequence[str]) -> str:
     """Return a C99 header with one function; `#define LABCTL_REAL float` before it for single precision."""
     name = found.sensor
-    lines = [*map(plain, head), f"{FORMULA}; offset, readings and results in {found.unit}."]
+    lines = [*map(plain, head), f"{FORMULA}; offset, readings and results in {found.unit}.", *_lost(found)]
     comment = "\n * ".join(line.replace("*/", "* /") for line in lines)
     rows = ", ".join("{" + ", ".join(f"{value:.17g}" for value in row) + "}" for row in found.matrix)
     offset = ", ".join(f"{value:.17g}" for value in found.offset)

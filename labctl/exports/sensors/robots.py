@@ -30,6 +30,7 @@ def kalibr(found: AccelerometerParameters, head: Sequence[str]) -> str:
         f"LOST bias: Kalibr estimates it over time; here x, y, z = {offset} m/s2.",
         "accelerometer_random_walk is not in this file: rests of seconds do not tell it.",
     ]
+    notes += _lost_temperature(found)
     body = ["model: scale-misalignment", "accelerometers:", "  M:"]
     body += ["  - [" + ", ".join(f"{value:.12g}" for value in row) + "]" for row in lower_triangle(found.errors)]
     body.append(f"accelerometer_noise_density: {found.noise_density_m_s2:.9e}  # m/s^2/sqrt(Hz), the largest axis")
@@ -40,8 +41,13 @@ def ros(found: AccelerometerParameters, head: Sequence[str]) -> str:
     """Return the file that the node apply_calib of imu_calib reads: corrected = SM reading - bias, in m/s2."""
     matrix = found.matrix
     notes = ["For the node apply_calib of the ROS package imu_calib: corrected = SM reading - bias, m/s2."]
+    notes += _lost_temperature(found)
     body = [
         "SM: [" + ", ".join(f"{value:.12g}" for value in matrix.ravel()) + "]",
         "bias: [" + ", ".join(f"{value:.12g}" for value in matrix @ found.offset) + "]",
     ]
     return commented([*map(plain, head), *notes]) + "\n".join(body) + "\n"
+
+
+def _lost_temperature(found: AccelerometerParameters) -> list[str]:
+    return [] if found.temperature is None else [found.temperature.lost(found.gravity_g, bias=True)]

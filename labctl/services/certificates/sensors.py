@@ -26,7 +26,7 @@ from labctl.services.schemas.documents.certificates import (
     OrderedMagnetometer,
     OrderedSensor,
 )
-from labctl.services.schemas.reports.accelerometer import AccelerometerResponse
+from labctl.services.schemas.reports.accelerometer import AccelerometerResponse, AccelerometerTemperature
 from labctl.services.schemas.sensors import AccelerometerVersion, MagnetometerVersion, SensorName
 from labctl.services.sensor_versions import one_accelerometer, one_magnetometer
 from labctl.store import Store
@@ -39,6 +39,7 @@ NOT_FORCE = (
     "Not measured, and not stated: other temperatures, larger forces, nonlinearity, vibration, and the change from one "
     "power-on to the next or with time."
 )
+NOT_FORCE_WARM = NOT_FORCE.replace("other temperatures", "temperatures outside the range")
 NOT_FIELD = (
     "Not measured, and not stated: other temperatures, iron and currents that come near later, change with time."
 )
@@ -121,19 +122,40 @@ def accelerometer_result(
         value = ratio * (own + was.value) - own
         named = f"scale factor {AXES[i]}" if i == j else f"misalignment {name}"
         found.append(_coefficient(named, value, "1", (ratio * u[place], freedom), (own + value) * relative_u))
+    found += [] if result.temperature is None else _over_temperature(result.temperature, ratio, freedom)
     reference = SensorReference(
         quantity="local gravity", value=ordered.gravity_m_s2, u=ordered.gravity_u_m_s2, unit="m/s^2",
         traceability=ordered.traceability.strip(),
     )  # fmt: skip
+    warm = "" if result.temperature is None else (
+        f" from {result.temperature.range_c[0]:.1f} °C to {result.temperature.range_c[1]:.1f} °C, the coefficients "
+        f"without a power those at {result.temperature.reference_c:g} °C,"
+    )  # fmt: skip
     holds_for = (
-        f"Specific forces of the size of gravity in any direction, at the conditions of the "
+        f"Specific forces of the size of gravity in any direction,{warm} at the conditions of the "
         f"{result.rests - result.left_out} rests in {result.poses} poses."
     )
     converted = (
         f"The fit took the local gravity as {used:.7g} m/s²; the coefficients here are for that of the reference."
     )
-    notes = (FORCE, holds_for, NOT_FORCE)
+    notes = (FORCE, holds_for, NOT_FORCE if result.temperature is None else NOT_FORCE_WARM)
     return _result("accelerometer", version, ordered, included_by, reference, found, notes, [converted])
+
+
+def _over_temperature(warm: AccelerometerTemperature, ratio: float, freedom: float) -> list[SensorCoefficient]:
+    """Return the coefficients of temperature; the uncertainty of gravity is too small a share of them to count."""
+    found = []
+    for name, unit, terms, factor in (
+        ("bias", "m/s^2", warm.bias_g, STANDARD_GRAVITY), ("scale factor", "1", warm.scale_factor, ratio)
+    ):  # fmt: skip
+        for axis in AXES:
+            for power, each in enumerate(terms[axis], start=1):
+                per = f"{unit}/K" + (f"^{power}" if power > 1 else "")
+                fit = (factor * (each.u or 0.0), freedom)
+                found.append(
+                    _coefficient(f"{name} {axis}, power {power} of temperature", factor * each.value, per, fit, 0.0)
+                )
+    return found
 
 
 def magnetometer_result(version: MagnetometerVersion, ordered: OrderedMagnetometer, included_by: str) -> SensorResult:
@@ -180,7 +202,9 @@ def magnetometer_result(version: MagnetometerVersion, ordered: OrderedMagnetomet
 def _freedom_of(result: AccelerometerResponse) -> float:
     """Return the degrees of freedom of the fit: rests beyond what the parameters take."""
     known = KNOWN_BEFORE if result.earlier is not None else 0
-    return max(float(result.rests - result.left_out + known - ACCELEROMETER_PARAMETERS), 1.0)
+    warm = result.temperature
+    parameters = ACCELEROMETER_PARAMETERS if warm is None else len(warm.covariance)
+    return max(float(result.rests - result.left_out + known - parameters), 1.0)
 
 
 def _coefficient(

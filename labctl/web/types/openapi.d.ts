@@ -2093,6 +2093,8 @@ export interface components {
             };
             /** @description Earlier version that was used too; null: the poses alone. */
             earlier?: components["schemas"]["EarlierVersion"] | null;
+            /** @description Over temperature; null: it was not asked for, and the parameters are constants. */
+            temperature?: components["schemas"]["AccelerometerTemperature"] | null;
             /** Text */
             text: string[];
         };
@@ -2176,8 +2178,58 @@ export interface components {
             };
             /** @description Earlier version that was used too; null: the poses alone. */
             earlier: components["schemas"]["EarlierVersion"] | null;
+            /** @description Over temperature; null: it was not asked for, and the parameters are constants. */
+            temperature: components["schemas"]["AccelerometerTemperature"] | null;
             /** Text */
             text: string[];
+        };
+        /**
+         * AccelerometerTemperature
+         * @description Bias and scale factors as polynomials of the temperature about a reference; misalignments are constant.
+         */
+        AccelerometerTemperature: {
+            /**
+             * Reference C
+             * @description Temperature at which the other parameters of the result hold, deg C.
+             */
+            reference_c: number;
+            /**
+             * Range C
+             * @description Lowest and highest temperature of the rests, deg C.
+             */
+            range_c: [
+                number,
+                number
+            ];
+            /**
+             * Temperatures
+             * @description Temperatures of the rests that are more than 2 K apart.
+             */
+            temperatures: number;
+            /**
+             * Bias G
+             * @description By axis, of T - reference to the power 1, 2, ...: g/K, ...
+             */
+            bias_g: {
+                [key: string]: components["schemas"]["Estimate"][];
+            };
+            /**
+             * Scale Factor
+             * @description The same of the scale factor, 1/K.
+             */
+            scale_factor: {
+                [key: string]: components["schemas"]["Estimate"][];
+            };
+            /**
+             * Covariance
+             * @description Of the nine parameters at the reference, bias by power and axis, scale factor by power and axis.
+             */
+            covariance: number[][];
+            /**
+             * Constant G
+             * @description What nine parameters without temperature leave of the used rests, RMS, g.
+             */
+            constant_g: number;
         };
         /**
          * AccelerometerVersion

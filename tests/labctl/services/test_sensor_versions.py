@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 from labctl.cli.app import app
 from labctl.recording.files import write_recording
 from labctl.store import check
+from studies.accelerometer_simulation import TrueUnit, poses_at_temperatures
 from studies.poses_simulation import Session, simulate_session
 from tests.helpers.magnetic_turns import fields, readings_of
 from tests.helpers.poses_at_rest import BIAS_G, poses, readings_in, write_readings
@@ -84,6 +85,30 @@ def test_four_poses_are_enough_with_an_earlier_version(tmp_path: Path, database:
         each = found["bias_g"][axis]
         assert each["value"] == pytest.approx(BIAS_G[i], abs=4 * each["u"])
     assert "--scale-change -1" in run("accelerometer", few, *options, "--scale-change", "-1", status=2).stderr
+    assert database.is_file()
+
+
+def test_coefficients_of_temperature_are_kept_shown_and_exported(tmp_path: Path, database: Path) -> None:
+    unit = TrueUnit.drawn(np.random.default_rng(5))
+    path = tmp_path / "warm.csv"
+    head = "t_s,accel_x_g,accel_y_g,accel_z_g,temp_c"
+    np.savetxt(path, poses_at_temperatures(1, unit), delimiter=",", header=head, comments="", fmt="%.7f")
+    out = tmp_path / "acc.params"
+    options = ("--temperature", "temp_c", "--serial", "IMU-7")
+    kept = answer("accelerometer", str(path), *options, "--export", "px4", "--out", str(out))
+    found = kept["result"]["temperature"]
+    assert found["temperatures"] == 4
+    assert kept["data"]["read_as"].endswith("temperature temp_c in deg C")
+    for i, axis in enumerate("xyz"):
+        each = found["scale_factor"][axis][0]
+        assert each["value"] == pytest.approx(unit.scale_powers[0, i], abs=4 * each["u"])
+    assert "TC_A0_X3_2" in out.read_text(encoding="ascii")
+    assert answer("sensors", "show", "IMU-7", "accelerometer") == kept
+    text = run("sensors", "show", "IMU-7", "accelerometer").stdout
+    assert "g/K^3" in text
+    assert "constants would leave" in text
+    assert "leave one out" in run("accelerometer", str(path), *options, "--earlier", "0", status=2).stderr
+    assert "temp_f" in run("accelerometer", str(path), "--temperature", "temp_f", status=2).stderr
     assert database.is_file()
 
 

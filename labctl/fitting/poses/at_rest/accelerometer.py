@@ -7,6 +7,7 @@ the accelerometer's z axis as the body's. The direction of gravity in the body i
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,24 +51,10 @@ class Accelerometer:
 
 def calibrate_accelerometer(readings: PoseReadings, rests: Rests) -> Accelerometer:
     """Fit the nine parameters. Raises NotEnoughData where the poses do not determine them, with what to do."""
-    _require_poses(readings.info.serial, rests)
+    require_poses(readings.info.serial, rests)
     gravity = local_gravity_g(readings.info)
-    white = rests.accel_white_var.mean(axis=1)
-    used = np.ones(len(rests), dtype=np.bool_)
-    theta = _fitted(rests.accel_g, gravity, np.ones(len(rests)), robust=True)
-    for turn in range(ROUNDS):
-        residual = _sizes(theta, rests.accel_g) - gravity
-        jacobian = _jacobian(theta, rests.accel_g)
-        extra = between_variance(jacobian[used], residual[used], np.diag(white[used]))
-        sigma = np.sqrt(white + extra)
-        # at first a wrong rest would hide in the scatter that it makes itself
-        usual = 1.4826 * float(np.median(np.abs(residual))) * np.sqrt(len(rests) / max(len(rests) - PARAMETERS, 1))
-        wrong = np.abs(residual) > WRONG * (np.hypot(usual, np.sqrt(white)) if turn == 0 else sigma)
-        if (turn > 0 and np.array_equal(wrong, ~used)) or np.count_nonzero(~wrong) < LEAST_POSES:
-            break
-        used = ~wrong
-        theta = _fitted(rests.accel_g[used], gravity, sigma[used], robust=False, start=theta)
-    theta = _fitted(rests.accel_g[used], gravity, sigma[used], robust=False, start=theta)
+    law = SizeLaw(rests.accel_g)
+    theta, sigma, used = fit_sizes(law, gravity, rests.accel_white_var.mean(axis=1), LEAST_POSES)
     jacobian = _jacobian(theta, rests.accel_g[used]) / sigma[used][:, None]
     covariance = _covariance(readings.info.serial, jacobian, rests.accel_g[used])
     left = _sizes(theta, rests.accel_g[used]) - gravity
@@ -76,6 +63,61 @@ def calibrate_accelerometer(readings: PoseReadings, rests: Rests) -> Acceleromet
         errors, bias, covariance, unit(corrected(rests.accel_g, errors, bias)), sigma, used,
         float(np.sqrt(np.mean(left**2))), gravity,
     )  # fmt: skip
+
+
+class Law(Protocol):
+    """Sizes of the forces behind the means of k rests, by parameters, and their derivative."""
+
+    @property
+    def parameters(self) -> int: ...
+    def take(self, rows: NDArray[np.bool_]) -> Law: ...
+    def sizes(self, theta: Array) -> Array: ...
+    def jacobian(self, theta: Array) -> NDArray[np.float64]: ...
+
+
+@dataclass(frozen=True)
+class SizeLaw:
+    """The nine parameters, the same in all k rests."""
+
+    accel_g: NDArray[np.float64]  #: (k, 3)
+    parameters = PARAMETERS
+
+    def take(self, rows: NDArray[np.bool_]) -> SizeLaw:
+        return SizeLaw(self.accel_g[rows])
+
+    def sizes(self, theta: Array) -> Array:
+        return _sizes(theta, self.accel_g)
+
+    def jacobian(self, theta: Array) -> NDArray[np.float64]:
+        return _jacobian(theta, self.accel_g)
+
+    @staticmethod
+    def columns(pull: NDArray[np.float64], force: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the derivative (k, 9) of the sizes of forces (k, 3), which an error of a reading changes by `pull`."""
+        return np.column_stack([pull, *(pull[:, i] * force[:, j] for i, j in UPPER)])
+
+
+def fit_sizes(law: Law, gravity: float, white: Array, least: int) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Return the parameters that make the sizes gravity, the standard uncertainty (k,) of a size, and which are used.
+
+    Rests that do not agree with gravity are left out, as long as `least` are kept. `white` (k,) is the variance of each
+    mean by its noise, g^2.
+    """
+    k = len(white)
+    used = np.ones(k, dtype=np.bool_)
+    theta = _fitted(law, gravity, np.ones(k), robust=True)
+    for turn in range(ROUNDS):
+        residual, jacobian = law.sizes(theta) - gravity, law.jacobian(theta)
+        extra = between_variance(jacobian[used], residual[used], np.diag(white[used]))
+        sigma = np.sqrt(white + extra)
+        # at first a wrong rest would hide in the scatter that it makes itself
+        usual = 1.4826 * float(np.median(np.abs(residual))) * np.sqrt(k / max(k - law.parameters, 1))
+        wrong = np.abs(residual) > WRONG * (np.hypot(usual, np.sqrt(white)) if turn == 0 else sigma)
+        if (turn > 0 and np.array_equal(wrong, ~used)) or np.count_nonzero(~wrong) < least:
+            break
+        used = ~wrong
+        theta = _fitted(law.take(used), gravity, sigma[used], robust=False, start=theta)
+    return _fitted(law.take(used), gravity, sigma[used], robust=False, start=theta), sigma, used
 
 
 def matrices(theta: Array) -> tuple[NDArray[np.float64], Array]:
@@ -99,27 +141,23 @@ def size_jacobian(errors: NDArray[np.float64], bias: Array, accel_g: NDArray[np.
     inverse = np.linalg.inv(np.eye(3) + errors)
     force = corrected(accel_g, errors, bias)
     pull = -unit(force) @ inverse  # what one g of error in a reading changes of the size
-    return np.column_stack([pull, *(pull[:, i] * force[:, j] for i, j in UPPER)])
+    return SizeLaw.columns(pull, force)
 
 
-def _fitted(
-    accel_g: NDArray[np.float64], gravity: float, sigma: Array, *, robust: bool, start: Array | None = None
-) -> Array:
-    """Return the nine parameters by least squares; robust: a rest in which the unit moved has a bounded influence."""
+def _fitted(law: Law, gravity: float, sigma: Array, *, robust: bool, start: Array | None = None) -> Array:
+    """Return the parameters by least squares; robust: a rest in which the unit moved has a bounded influence."""
     from scipy.optimize import least_squares
 
-    begin = np.zeros(PARAMETERS) if start is None else start
+    begin = np.zeros(law.parameters) if start is None else start
     scale = 1.0
     if robust:
-        first = least_squares(
-            lambda theta: _sizes(theta, accel_g) - gravity, begin, lambda theta: _jacobian(theta, accel_g)
-        )
+        first = least_squares(lambda theta: law.sizes(theta) - gravity, begin, law.jacobian)
         scale = max(1.4826 * float(np.median(np.abs(first.fun))), 1e-9)
         begin = first.x
     found = least_squares(
-        lambda theta: (_sizes(theta, accel_g) - gravity) / sigma,
+        lambda theta: (law.sizes(theta) - gravity) / sigma,
         begin,
-        lambda theta: _jacobian(theta, accel_g) / sigma[:, None],
+        lambda theta: law.jacobian(theta) / sigma[:, None],
         loss="cauchy" if robust else "linear",
         f_scale=scale,
         x_scale="jac",
@@ -137,7 +175,8 @@ def different_poses(directions: NDArray[np.float64]) -> int:
     return len(kept)
 
 
-def _require_poses(serial: str, rests: Rests) -> None:
+def require_poses(serial: str, rests: Rests) -> None:
+    """Raise NotEnoughData for rests in fewer than LEAST_POSES different poses, with the faces that none has up."""
     poses = different_poses(rests.accel_g)
     if poses < LEAST_POSES:
         raise NotEnoughData(

@@ -39,16 +39,27 @@ def adequacy_of(found: Accelerometer, rests: Rests, known: NDArray[np.float64] |
     accel_g, sigma = rests.accel_g[found.used], found.u_rest_g[found.used]
     forces = np.linalg.solve(np.eye(3) + found.errors, (accel_g - found.bias_g).T).T
     residual = np.linalg.norm(forces, axis=1) - found.gravity_g
-    white = np.sqrt(rests.accel_white_var.mean(axis=1))[found.used]
+    white = rests.accel_white_var.mean(axis=1)[found.used]
     jacobian = size_jacobian(found.errors, found.bias_g, accel_g) / sigma[:, None]
-    hat = jacobian @ found.covariance @ jacobian.T
+    before = np.linalg.norm(accel_g, axis=1) - found.gravity_g
+    return left_out_adequacy(residual, jacobian, found.covariance, sigma, white, before, known)
+
+
+def left_out_adequacy(
+    residual: Array, jacobian: NDArray[np.float64], covariance: NDArray[np.float64], sigma: Array, white: Array,
+    before: Array, known: NDArray[np.float64] | None = None,
+) -> Adequacy:  # fmt: skip
+    """Return the adequacy of a fit to k sizes, g: what is left, (k,), and its derivative over `sigma` (k, p).
+
+    `white` (k,) is the variance of a mean by its noise, g^2, `before` (k,) what was left before the fit.
+    """
+    hat = jacobian @ covariance @ jacobian.T
     kept = np.maximum(1 - np.diag(hat), 1e-6)
     # residual / sigma = (1 - hat) noise / sigma: the noise of every rest is in what the others predict of one
-    spread = (np.eye(len(hat)) - hat) * (white / sigma)
+    spread = (np.eye(len(hat)) - hat) * (np.sqrt(white) / sigma)
     if known is not None:
-        spread = np.hstack([spread, jacobian @ found.covariance @ known.T])
+        spread = np.hstack([spread, jacobian @ covariance @ known.T])
     expected = sigma * np.linalg.norm(spread, axis=1) / kept
-    before = np.linalg.norm(accel_g, axis=1) - found.gravity_g
     return Adequacy(_rms(before), _rms(residual / kept), _rms(expected))
 
 

@@ -21,6 +21,20 @@ class EarlierVersion(ResponseModel):
     )
 
 
+class AccelerometerTemperature(ResponseModel):
+    """Bias and scale factors as polynomials of the temperature about a reference; misalignments are constant."""
+
+    reference_c: float = Field(description="Temperature at which the other parameters of the result hold, deg C.")
+    range_c: tuple[float, float] = Field(description="Lowest and highest temperature of the rests, deg C.")
+    temperatures: int = Field(description="Temperatures of the rests that are more than 2 K apart.")
+    bias_g: dict[str, list[Estimate]] = Field(description="By axis, of T - reference to the power 1, 2, ...: g/K, ...")
+    scale_factor: dict[str, list[Estimate]] = Field(description="The same of the scale factor, 1/K.")
+    covariance: list[list[float]] = Field(
+        description="Of the nine parameters at the reference, bias by power and axis, scale factor by power and axis."
+    )
+    constant_g: float = Field(description="What nine parameters without temperature leave of the used rests, RMS, g.")
+
+
 class AccelerometerResponse(ResponseModel):
     """Nine parameters of an accelerometer: reading = bias + (1 + errors) force, by gravity in poses at rest."""
 
@@ -43,5 +57,8 @@ class AccelerometerResponse(ResponseModel):
     noise_density_m_s2: dict[str, float] = Field(description="White noise by axis, m/s2/sqrt(Hz), from the rests.")
     earlier: EarlierVersion | None = Field(
         default=None, description="Earlier version that was used too; null: the poses alone."
+    )
+    temperature: AccelerometerTemperature | None = Field(
+        default=None, description="Over temperature; null: it was not asked for, and the parameters are constants."
     )
     text: list[str]

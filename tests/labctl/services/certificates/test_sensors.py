@@ -23,6 +23,7 @@ from labctl.services.magnetometer import magnetometer_of_file
 from labctl.services.schemas.sensors import AccelerometerRequest, MagnetometerRequest
 from labctl.services.sensor_versions import keep_accelerometer, keep_magnetometer, measured_data
 from labctl.store import Store, open_store
+from studies.accelerometer_simulation import TrueUnit, poses_at_temperatures
 from tests.helpers.certificates import AT, SERIAL, add_version, request
 from tests.helpers.magnetic_turns import FIELD_UT, HARD_IRON_UT, SOFT_IRON, fields, readings_of
 from tests.helpers.poses_at_rest import BIAS_G, ERRORS, poses, readings_in, write_readings
@@ -121,6 +122,27 @@ def test_all_three_forms_state_both(store: Store) -> None:
     found = SchematronValidator.for_dcc().validate_str(xml)
     assert [each.text for each in [*found.failed_assertions, *found.successful_reports]
             if each.role != "information"] == []  # fmt: skip
+
+
+def test_coefficients_of_temperature_are_stated_with_their_range(store: Store, tmp_path: Path) -> None:
+    unit = TrueUnit.drawn(np.random.default_rng(5))
+    path = tmp_path / "warm.csv"
+    head = "t_s,accel_x_g,accel_y_g,accel_z_g,temp_c"
+    np.savetxt(path, poses_at_temperatures(1, unit), delimiter=",", header=head, comments="", fmt="%.7f")
+    source = ForceSource(temperature="temp_c")
+    found = accelerometer_of_files([path], source)
+    data = measured_data([path], source.text)
+    kept = keep_accelerometer(store, SERIAL, AccelerometerRequest(data=data, result=found, by="Ada"), AT)
+    _, (stated,) = sensors_of(store, accelerometer=ACCELEROMETER | {"version": kept.version})
+    by_name = {each.name: each for each in stated.coefficients}
+    assert len(by_name) == 21
+    for i, axis in enumerate("xyz"):
+        cubic = by_name[f"bias {axis}, power 3 of temperature"]
+        assert (cubic.unit, abs(cubic.value - STANDARD * unit.bias_powers[2, i]) < 1.5 * cubic.expanded) == (
+            "m/s^2/K^3", True,
+        )  # fmt: skip
+    assert "from -10.0 °C to 60.9 °C" in stated.holds_for
+    assert "temperatures outside the range" in stated.not_stated
 
 
 def test_what_the_order_has_to_state_is_named(store: Store) -> None:
