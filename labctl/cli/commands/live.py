@@ -37,8 +37,8 @@ Lines = Annotated[
     typer.Option(
         "--lines",
         metavar="SOURCE",
-        help="Readings as lines of JSON or CSV: - for standard input, or tcp://HOST:PORT; of a rosbridge server: "
-        "ws://HOST:PORT.",
+        help="Readings as lines of JSON or CSV: - for standard input, tcp:// or udp://HOST:PORT; of a rosbridge "
+        "server: ws://HOST:PORT.",
     ),
 ]
 LineColumns = Annotated[

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from labctl.services.live.line_feed import DescriptorFeed, LineFeed, TcpFeed
 from labctl.services.live.rosbridge_feed import SCHEMES, RosbridgeFeed
+from labctl.services.live.udp_feed import UDP, UdpFeed
 
 
 def feed_of(given: str, topic: str) -> LineFeed:
@@ -12,5 +13,10 @@ def feed_of(given: str, topic: str) -> LineFeed:
 
 
 def network_feed(address: str, topic: str) -> LineFeed:
-    """Return the feed of an address: tcp://HOST:PORT, or ws://HOST:PORT with a topic. Raises BadInput for another."""
+    """Return the feed of an address: tcp:// or udp://HOST:PORT, or ws://HOST:PORT with a topic.
+
+    Raises BadInput for another.
+    """
+    if address.startswith(UDP):
+        return UdpFeed(address)
     return RosbridgeFeed(address, topic) if address.startswith(SCHEMES) else TcpFeed(address)

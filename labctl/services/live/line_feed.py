@@ -69,8 +69,8 @@ class TcpFeed:
         host, _, port = address.removeprefix(TCP).rpartition(":")
         if not address.startswith(TCP) or not host or not port.isdecimal() or not 0 < int(port) < 65536:
             raise BadInput(
-                f"{address}: no address of a stream; give tcp://HOST:PORT, ws://HOST:PORT of a rosbridge server, or, "
-                "at the terminal, - for standard input"
+                f"{address}: no address of a stream; give tcp:// or udp://HOST:PORT, ws://HOST:PORT of a rosbridge "
+                "server, or, at the terminal, - for standard input"
             )
         self.name, self._place = address, (host.strip("[]"), int(port))
         self._socket: socket.socket | None = None

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
 from instruments.clock import Clock
 from labctl.errors import BadInput
 from labctl.fitting.live import PoseRequest
@@ -10,6 +15,8 @@ from labctl.recording.line_stream import LineDecoder
 from labctl.services.live.line_feed import LineFeed
 from labctl.services.live.source import Block, StreamEnded
 
+#: Times further apart than this many of their usual spacings, which so many steps show, have a reading lost between.
+GAP, LEAST_STEPS = 1.5, 5
 #: A stream without a reading for so long has ended, s; before the first it may take longer to begin.
 SILENCE_S, FIRST_WITHIN_S = 10.0, 60.0
 
@@ -31,6 +38,7 @@ class LineSource:
         self._feed, self._decoder, self._info, self.clock = feed, decoder, info, clock
         self.name, self.serial = feed.name, info.serial
         self._last_s, self._begun = 0.0, False
+        self._newest_s, self._spacing_s = np.empty(0), 0.0
 
     def start(self) -> RecordingInfo:
         """Open the feed; raises BadInput."""
@@ -59,7 +67,19 @@ class LineSource:
             self._last_s, self._begun = now_s, True
         elif now_s - self._last_s > (SILENCE_S if self._begun else FIRST_WITHIN_S):
             raise StreamEnded(self._silence(now_s - self._last_s, found.example))
-        return Block(found.columns if len(found) else {}, 0, found.damaged, found.example)
+        columns = found.columns if len(found) else {}
+        return Block(columns, self._lost(columns), found.damaged, found.example)
+
+    def _lost(self, columns: Mapping[str, NDArray[np.generic]]) -> int:
+        """Return how many readings of a feed that may lose some are missing, by the times that the lines carry."""
+        if not getattr(self._feed, "may_lose", False) or "t_s" not in columns:
+            return 0
+        t_s = np.concatenate([self._newest_s, np.asarray(columns["t_s"], dtype=np.float64)])
+        self._newest_s, steps = t_s[-1:], np.diff(t_s)
+        self._spacing_s = self._spacing_s or (float(np.median(steps)) if len(steps) >= LEAST_STEPS else 0.0)
+        if self._spacing_s <= 0:
+            return 0
+        return int(np.sum(np.rint(steps[steps > GAP * self._spacing_s] / self._spacing_s) - 1))
 
     def _silence(self, silence_s: float, example: str) -> str:
         seen = f"; what arrived is no reading: {example}" if example else ""

@@ -28,8 +28,8 @@ class LiveRequest(Request):
     address: str | None = Field(
         default=None,
         max_length=500,
-        description="A stream of the network: `tcp://HOST:PORT` sends lines of JSON or CSV, `ws://HOST:PORT` is a "
-        "rosbridge server. Default: the gyro of this service's bench.",
+        description="A stream of the network: `tcp://HOST:PORT` sends lines of JSON or CSV, at `udp://HOST:PORT` they "
+        "arrive as datagrams, `ws://HOST:PORT` is a rosbridge server. Default: the gyro of this service's bench.",
     )
     topic: str = Field(
         default="/imu/data",

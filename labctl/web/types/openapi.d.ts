@@ -6990,7 +6990,7 @@ export interface components {
             serial?: string | null;
             /**
              * Address
-             * @description A stream of the network: `tcp://HOST:PORT` sends lines of JSON or CSV, `ws://HOST:PORT` is a rosbridge server. Default: the gyro of this service's bench.
+             * @description A stream of the network: `tcp://HOST:PORT` sends lines of JSON or CSV, at `udp://HOST:PORT` they arrive as datagrams, `ws://HOST:PORT` is a rosbridge server. Default: the gyro of this service's bench.
              */
             address?: string | null;
             /**

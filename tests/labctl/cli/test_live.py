@@ -84,7 +84,10 @@ def test_an_incomplete_one_says_what_is_missing_and_keeps_the_recording(
         ((), "name the stream of the unit by one of --bench FILE, --driver NAME with --port, or --lines SOURCE"),
         (("--bench", "by-hand-sim", "--driver", "stim300"), "by one of --bench FILE"),
         (("--lines", "-"), "give its serial number: labctl live SERIAL --lines ..."),
-        (("A", "--lines", "udp://x:1"), "udp://x:1: no address of a stream; give tcp://HOST:PORT, ws://HOST:PORT"),
+        (
+            ("A", "--lines", "sctp://x:1"),
+            "sctp://x:1: no address of a stream; give tcp:// or udp://HOST:PORT, ws://HOST:PORT",
+        ),
         (("A", "--driver", "stim300"), "--driver needs the serial number of the unit and its --port"),
         (("--bench", "by-hand-sim"), "driver stim300 gives no accel_x_g, accel_y_g, accel_z_g"),
         (("B", "--bench", "by-hand-sim"), "B: bench by-hand-sim has no such unit; choose one of STIM-0001"),

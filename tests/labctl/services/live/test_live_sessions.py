@@ -254,7 +254,10 @@ def test_readings_that_cannot_be_stored_are_kept_and_said(service: Service, monk
     ("request_", "said"),
     [
         (LiveRequest(address="tcp://127.0.0.1:1"), "the stream does not say which unit it is; give its serial number"),
-        (LiveRequest(address="udp://x:1", serial="A"), "udp://x:1: no address of a stream; give tcp://HOST:PORT"),
+        (
+            LiveRequest(address="sctp://x:1", serial="A"),
+            "sctp://x:1: no address of a stream; give tcp:// or udp://HOST:PORT",
+        ),
         (LiveRequest(serial="B"), "B: bench poses-sim has no such unit; choose one of IMU-0001"),
         (LiveRequest(poses=3), "--poses 3: give 12 to 26"),
     ],

@@ -11,9 +11,11 @@ import pytest
 from instruments.clock import VirtualClock
 from labctl.errors import BadInput
 from labctl.fitting.live import LiveCalibration, LiveState
+from labctl.recording.line_stream import LineDecoder
 from labctl.services.live.feeds import feed_of
 from labctl.services.live.gyro_source import GyroSource, bench_of_driver
 from labctl.services.live.line_feed import DescriptorFeed, TcpFeed
+from labctl.services.live.line_source import LineSource, info_of
 from labctl.services.planning.loading import load_bench
 
 
@@ -54,6 +56,43 @@ def test_a_server_that_is_not_there_is_said() -> None:
         port = server.getsockname()[1]
     with pytest.raises(BadInput, match=rf"^tcp://127.0.0.1:{port}: cannot connect .* check address"):
         feed_of(f"tcp://127.0.0.1:{port}", "").open()
+
+
+def free_port() -> int:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("127.0.0.1", 0))
+        return int(taken.getsockname()[1])
+
+
+def test_datagrams_are_lines_of_one_sender_and_what_is_lost_is_counted() -> None:
+    port, clock = free_port(), VirtualClock()
+    columns = ("t_s", *(f"gyro_{a}_dps" for a in "xyz"), *(f"accel_{a}_g" for a in "xyz"))
+    source = LineSource(feed_of(f"udp://:{port}", ""), LineDecoder(columns), info_of("U-1", clock, None), clock)
+    source.start()
+    lines = [f"{0.01 * k:.2f},0,0,0,0,0,1" for k in range(40)]
+    with (
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other,
+    ):
+        sender.sendto("\n".join(lines[:10]).encode(), ("127.0.0.1", port))  # no line end after the last
+        first = source.read(0.1)
+        other.sendto(b"9.0,0,0,0,0,0,1\n", ("127.0.0.1", port))
+        for k in (10, 11, 15, 16, 17, 20):
+            sender.sendto((lines[k] + "\n").encode(), ("127.0.0.1", port))
+        then = source.read(0.1)
+    source.stop()
+    assert (len(first), first.lost, first.damaged) == (10, 0, 0)
+    assert (len(then), then.lost, then.damaged) == (6, 3 + 2, 0)
+
+
+def test_a_port_that_is_taken_and_an_address_that_is_none_are_said() -> None:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as taken:
+        taken.bind(("127.0.0.1", 0))
+        feed = feed_of(f"udp://127.0.0.1:{taken.getsockname()[1]}", "")
+        with pytest.raises(BadInput, match=r"cannot listen there.*a free port"):
+            feed.open()
+    with pytest.raises(BadInput, match="give udp://HOST:PORT"):
+        feed_of("udp://127.0.0.1", "")
 
 
 def test_a_simulated_gyro_by_driver_and_port() -> None:
