@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import stdtrit
 
 from labctl.errors import LabctlError
 from labctl.fitting.data.fit_data import FitData
@@ -36,6 +37,8 @@ BEYOND_K = 1.0
 #: What is exported has to become better by this share: less is chance. A record at rest has few independent errors: a
 #: drift that is correlated over half an hour has a dozen in three hours of three axes.
 LEAST_GAIN, LEAST_GAIN_AT_REST = 0.01, 0.15
+#: From so many parts on the gain also has to exceed what their scatter explains, at this probability (Student's t).
+PARTS_THAT_SCATTER, CERTAIN = 3, 0.95
 Mask = NDArray[np.bool_]
 
 
@@ -46,11 +49,12 @@ class Exported:
     before_dps: float | None
     after_dps: float | None
     least_gain: float = LEAST_GAIN
+    is_chance: bool = False  #: whether the gain differs so from part to part that it may be none
 
     @property
     def is_better(self) -> bool:
         """Whether the export with the effect is better; not where one of the two cannot be had."""
-        if self.before_dps is None or self.after_dps is None:
+        if self.before_dps is None or self.after_dps is None or self.is_chance:
             return False
         return self.after_dps < (1.0 - self.least_gain) * self.before_dps
 
@@ -94,9 +98,10 @@ def _why_not_better(found: Exported) -> str:
         return ""
     if found.before_dps is None or found.after_dps is None:
         return "no part of these data can be left out to check it"
+    scatter = ", and from part to part the difference scatters by more" if found.is_chance else ""
     return (
         f"what would be exported does not become clearly better on parts left out of the fit: {found.after_dps:.3g} "
-        f"deg/s in place of {found.before_dps:.3g} deg/s"
+        f"deg/s in place of {found.before_dps:.3g} deg/s{scatter}"
     )
 
 
@@ -121,7 +126,28 @@ def exported_errors(data: FitData, model: ErrorModel, beside: tuple[Term, ...], 
         for parts, values in zip(errors, both, strict=True):
             parts.append(values)
     before, after = (_pooled(parts) for parts in errors)
-    return Exported(before, after, LEAST_GAIN if np.any(data.channels.table_rate_dps()) else LEAST_GAIN_AT_REST)
+    least_gain = LEAST_GAIN if np.any(data.channels.table_rate_dps()) else LEAST_GAIN_AT_REST
+    return Exported(before, after, least_gain, _is_chance(*errors))
+
+
+def _is_chance(before: Sequence[dict[str, Array]], after: Sequence[dict[str, Array]]) -> bool:
+    """Return whether the gain is within its scatter from part to part, as a difference and as a ratio of squares.
+
+    A ratio is as clear in parts with small errors as in those with large ones; a difference is clear where one part has
+    nearly all of the error.
+    """
+    squares = np.array([[_squares(part) for part in parts] for parts in (before, after)])
+    squares = np.maximum(squares, np.finfo(np.float64).tiny)  # of data without noise
+    n = squares.shape[1]
+    if n < PARTS_THAT_SCATTER:
+        return False
+    factor = float(stdtrit(n - 1, CERTAIN)) / np.sqrt(n)
+    gains = squares[0] - squares[1], np.log(squares[0] / squares[1])
+    return all(bool(np.mean(gain) < factor * np.std(gain, ddof=1)) for gain in gains)
+
+
+def _squares(errors: dict[str, Array]) -> float:
+    return sum(float(values @ values) for values in errors.values())
 
 
 def _pooled(parts: Sequence[dict[str, Array]]) -> float | None:
