@@ -27,6 +27,7 @@ class Shutdown:
     def __init__(self, context: ExecutionContext) -> None:
         self._context = context
         self.complaints: tuple[str, ...] = ()  #: set before the journal is written, so known when writing fails
+        self._open: dict[str, str] = {}  #: what is not confirmed yet, and why, in the order in which it was tried
 
     def end(
         self, state: CampaignState, reason: str, on_ending: Callable[[], None] = lambda: None, *, bench_is_safe: bool
@@ -49,9 +50,11 @@ class Shutdown:
         if not bench_is_safe:
             recorder.tracker.update(step_text="setting the bench to its safe state")
         self.complaints = ()
+        self._open = {}
         if not bench_is_safe:
             self.complaints = make_safe(self._context.full_bench, self._context.clock, note=self._note)
         self._context.control.note_safe_state("; ".join(self.complaints), at_rest=bench_is_safe)
+        self._context.monitor.tell_stalls(at_the_end=True)
         if self.complaints:
             text = NOT_SAFE + "; ".join(self.complaints)
             reason = f"{reason}. {text}"
@@ -61,8 +64,12 @@ class Shutdown:
         return Outcome(state, reason, safe=not self.complaints)
 
     def _note(self, what: str, complaint: str) -> None:
-        """Show how far the safe state is: an instrument that is silent is no campaign that runs."""
-        hindrance = f"{what}: {complaint}" if complaint else ""
-        self._context.control.note_safe_state(hindrance, at_rest=what == TABLE and not complaint)
+        """Show how far the safe state is, with all that is open: a silent instrument is no campaign that runs."""
         if complaint:
+            self._open[what] = complaint
+        else:
+            self._open.pop(what, None)
+        hindrance = "; ".join(f"{part}: {why}" for part, why in self._open.items())
+        self._context.control.note_safe_state(hindrance, at_rest=what == TABLE and not complaint)
+        if hindrance:
             self._context.recorder.tracker.update(step_text=f"stopping: {hindrance}", last_error=hindrance)

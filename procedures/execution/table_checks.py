@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 from instruments.interfaces.table import HomeCheck, OpenLoopTable
@@ -174,7 +175,9 @@ def check_home(context: ExecutionContext, step: CheckHome) -> dict[str, float]:
 
 
 def _missing_text(name: str, found: HomeCheck, temperature_c: float) -> str:
-    size = f"{found.missed_steps:g} steps ({found.missed_steps * found.step_deg:.3g} deg)"
+    turn_steps = 360.0 / found.step_deg  # a table that stands beyond home homes by nearly a whole turn
+    missed_steps = math.remainder(found.missed_steps, turn_steps)
+    size = f"{missed_steps:g} steps ({missed_steps * found.step_deg:.3g} deg)"
     where = (
         f"about {size} were missed in the short turns from which the homing is learned"
         if found.learning

@@ -127,6 +127,8 @@ def _unit_temperature(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
 def _chamber_deviation(guards: Guards, now: BenchSnapshot) -> Iterator[Excess]:
     if now.chamber_c is None or now.setpoint_c is None:
         return
+    if any(True for _ in _foreign_change(guards, now)) and guards.rules.action_of("foreign_change") != "warn":
+        return  # the air follows what others have set: what is done about that also ends the data set
     off_c = abs(now.chamber_c - now.setpoint_c)
     if now.taking_readings and off_c > guards.rules.chamber_deviation_c:
         text = f"the air left its set point of {now.setpoint_c:g} deg C while readings were taken"

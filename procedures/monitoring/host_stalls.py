@@ -69,12 +69,15 @@ class HostStalls:
         """Return the same in seconds of the bench's clock."""
         return self.total_s() * self.speed
 
-    def news(self) -> Event | None:
-        """Return what is to be said of stalls since it was last said; None where there is nothing, or too soon."""
+    def news(self, *, at_the_end: bool = False) -> Event | None:
+        """Return what is to be said of stalls since it was last said; None where there is nothing, or too soon.
+
+        At the end of a campaign nothing is too soon.
+        """
         with self._lock:
             self._look()
             now_s = self._wall.now_s()
-            early = self._said_s is not None and now_s - self._said_s < SAY_EVERY_S
+            early = not at_the_end and self._said_s is not None and now_s - self._said_s < SAY_EVERY_S
             if self._longest_s < SAID_FROM_S or early:
                 return None
             longest_s, unsaid_s = self._longest_s, self._unsaid_s

@@ -184,7 +184,7 @@ class BenchMonitor:
 
     def check_guards(self) -> list[GuardViolation]:
         """Return every limit that is passed by what was read last; records what has changed since the last check."""
-        self._tell_stalls()
+        self.tell_stalls()
         violations = self._guards.check(self._snapshot())
         for violation in violations:
             if violation.kind == "stale":
@@ -250,8 +250,9 @@ class BenchMonitor:
             why = f"{device}: no answer in time, but {not_run(stalled_s)} meanwhile"
         self.links.change(device, "degraded", f"{why}; labctl asks again at the next check")
 
-    def _tell_stalls(self) -> None:
-        """Record the stalls of this computer that were not reported yet."""
-        if (event := self.stalls.news()) is not None:
+    def tell_stalls(self, *, at_the_end: bool = False) -> None:
+        """Record the stalls of this computer that were not reported yet, and how long they were in all."""
+        if (event := self.stalls.news(at_the_end=at_the_end)) is not None:
             self._recorder.event(event)
-            self._recorder.tracker.update(stalled_s=self._recorder.tracker.progress.stalled_s + (event.value or 0.0))
+        if (total_s := self.stalls.total_s()) != self._recorder.tracker.progress.stalled_s:
+            self._recorder.tracker.update(stalled_s=total_s)

@@ -38,7 +38,11 @@ def test_two_units_are_never_taken_for_one(what: str) -> None:
 @pytest.mark.parametrize(
     ("device", "place", "known"),
     [
-        ("table", ("table", "driver"), "acutrol-3000 (labctl {version}), arrick-c4"),
+        (
+            "table",
+            ("table", "driver"),
+            "acutrol-3000 (labctl {version}), aerotech-ensemble (labctl {version}), arrick-c4",
+        ),
         ("chamber", ("chamber", "driver"), "binder (labctl {version}), espec"),
         ("gyros", ("gyros", 0, "driver"), "can (labctl {version}), gyrostar (labctl {version}), kvh-dsp3000"),
     ],

@@ -174,6 +174,23 @@ def test_every_part_of_the_safe_state_is_tried_and_what_failed_is_said(
     assert any(event.kind == "safe_state" and event.level == "error" for event in rig.journal.events)
 
 
+def test_all_that_is_not_confirmed_yet_is_named_while_it_is_tried_again(rig: Any) -> None:
+    """Also what is tried before something that is confirmed."""
+
+    def break_it() -> None:
+        rig.table.fail("stop", NoReply("table", "silent"), times=2)
+        rig.chamber.fail("make_safe", NoReply("chamber", "silent too"), times=2)
+        rig.control.abort()
+
+    texts: list[str] = []
+    rig.when_step("acquire", break_it)
+    outcome = rig.run(observer=lambda progress: texts.append(progress.step_text))
+    assert outcome.safe
+    both = [text for text in texts if text.startswith("stopping: table to rest: ") and "; chamber to its safe" in text]
+    assert both
+    assert not rig.control.hindrance
+
+
 def test_a_chamber_that_reads_back_another_safe_set_point_is_not_safe(rig: Any) -> None:
     rig.when_step("safe_state", lambda: setattr(rig.chamber, "misread_c", 15.0))
     outcome = rig.run()

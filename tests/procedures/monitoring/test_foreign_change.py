@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -75,6 +76,17 @@ def test_a_profile_of_somebody_cannot_be_taken_back(rig: Any) -> None:
     outcome = rig.run(rig.recipe(guards={"actions": {"foreign_change": "take_back"}}))
     assert outcome.state == CampaignState.FAILED
     assert "the set point 30 deg C cannot be taken back: chamber: a profile is running" in outcome.reason
+
+
+@pytest.mark.parametrize("rule", ["take_back", "suspend"])
+def test_air_that_follows_it_within_one_poll_is_no_fault_of_the_chamber(rig: Any, rule: str) -> None:
+    """A fast chamber has left its set point by more than its limit when the change is seen."""
+    rig.chamber.limits = replace(rig.chamber.limits, ramp_c_per_min=600.0)
+    changed_in(rig, "readings", back_after_s=100.0 if rule == "suspend" else None)
+    rules = {"actions": {"foreign_change": rule}, "chamber_deviation_c": 2.0}
+    assert rig.run(rig.recipe(guards=rules, acquire={"duration_s": 20.0})).state == CampaignState.DONE
+    assert SEEN in rig.journal.kinds()
+    assert "guard.chamber_deviation" not in rig.journal.kinds()
 
 
 @pytest.mark.parametrize(("action", "state"), [("warn", CampaignState.DONE), ("fail", CampaignState.FAILED)])

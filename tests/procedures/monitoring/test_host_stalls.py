@@ -70,6 +70,27 @@ def test_many_stalls_are_said_together_and_not_at_once() -> None:
     assert event.message.startswith("this computer did not run labctl for 0.6 s at a time, 2.4 s in all (72 s of")
 
 
+def test_at_the_end_of_a_campaign_nothing_remains_unsaid() -> None:
+    stalls = stalls_of(wall := VirtualClock())
+    stall(stalls, wall, 1.3)
+    assert stalls.news() is not None
+    stall(stalls, wall, 5.0)
+    assert stalls.news() is None
+    event = stalls.news(at_the_end=True)
+    assert event is not None
+    assert event.value == pytest.approx(5.0)
+    assert stalls.news(at_the_end=True) is None
+
+
+def test_the_last_stall_of_a_campaign_is_recorded_and_counted() -> None:
+    rig = Busy()
+    rig.when_step("safe_state", lambda: (rig.stall(1.3), rig.engine._context.monitor.tell_stalls(), rig.stall(5.0)))
+    assert rig.run().state is CampaignState.DONE
+    said = [event.value for event in rig.journal.events if event.kind == "host_stalled"]
+    assert said == pytest.approx([1.3, 5.0], abs=0.2)
+    assert rig.engine.progress.stalled_s == pytest.approx(6.3, abs=0.3)
+
+
 class Busy(Rig):
     """The fake bench in time of which a second is 1/SPEED of a second of this computer; `stall` keeps both waiting."""
 
