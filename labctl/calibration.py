@@ -21,10 +21,10 @@ from labctl.fitting import FitResult, FittedModel, coefficients_json
 from labctl.fitting.models.force_sensitivity import ForceSensitivity, specific_force_json
 from labctl.fitting.models.memory import state_json
 from labctl.fitting.models.paper_units import in_paper_units
-from labctl.fitting.uncertainty import AxisEvidence, BenchConditions, conditions_of
+from labctl.fitting.uncertainty import AxisEvidence, BenchConditions, conditions_of, response_budgets
 from labctl.fitting.uncertainty.document import Covered, uncertainty_json
 from labctl.json_types import JsonObject
-from labctl.json_types.budget import UncertaintyJson
+from labctl.json_types.budget import BudgetJson, UncertaintyJson
 from labctl.json_types.calibrations import AxisEvidenceJson, CalibrationJson, OutputUnitJson
 from labctl.recording import OutputUnit, RecordingInfo
 from labctl.recording.info import Axis
@@ -212,6 +212,8 @@ def build_calibration(
         "how_to_use": HOW_TO_USE,
         "hash": "",
     }
+    if response := _response(result, use, bench):
+        document["response"] = response
     _add_where_known(document, info, result, exported)
     document["hash"] = hash_of(document)
     return Calibration(document)
@@ -234,8 +236,19 @@ def _uncertainty(
 ) -> UncertaintyJson | None:
     """Return the bound of a document, computed from the model as it is exported."""
     covered = Covered(_limits(result.rate_dps), _limits(result.temperature_c))
-    evidence = {axis: AxisEvidence.from_json(one) for axis, one in use.items()}
-    return uncertainty_json(exported, covered, evidence, bench)
+    return uncertainty_json(exported, covered, _evidence(use), bench)
+
+
+def _response(
+    result: FitResult, use: Mapping[str, AxisEvidenceJson], bench: BenchConditions
+) -> dict[str, dict[str, BudgetJson]]:
+    """Return axis -> budgets of delay and time constant, which a document leaves out of its model."""
+    found = response_budgets(result.fitted, evidence=_evidence(use), bench=bench)
+    return {axis: {name: budget.to_json() for name, budget in named.items()} for axis, named in found.items()}
+
+
+def _evidence(use: Mapping[str, AxisEvidenceJson]) -> dict[str, AxisEvidence]:
+    return {axis: AxisEvidence.from_json(one) for axis, one in use.items()}
 
 
 def with_certification(content: bytes, known: Certification) -> tuple[bytes, str]:

@@ -28,6 +28,7 @@ STUDIES = (
     "real",
     "public_records",
     "profiles",
+    "course_time",
     "crash_recovery",
     "process_kill",
     "process_pairs",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, Protocol, runtime_checkable
@@ -66,6 +67,15 @@ class TimedRun:
         return self.steps / self.step_hz
 
 
+def reply_time_u_s(duration_s: float) -> float:
+    """Return the standard uncertainty of the middle between request and reply as the time of what was done, s.
+
+    Controllers act as they take the request or as they make the reply, seldom half way: the error is U-shaped within
+    half of the duration (JCGM 101, 6.4.6), and has the same sign in every reply.
+    """
+    return duration_s / math.sqrt(8.0)
+
+
 @dataclass(frozen=True)
 class AngleReading:
     """One reading of a table's encoder."""
@@ -74,6 +84,7 @@ class AngleReading:
     angle_deg: float  #: unwrapped within a run
     u_deg: float  #: standard uncertainty of the angle against another one
     u_s: float  #: standard uncertainty of the time, without what all readings have in common
+    common_u_s: float = 0.0  #: that of what they have in common: when between question and answer it was read
 
 
 @dataclass(frozen=True)
@@ -218,7 +229,7 @@ class CourseRun:
 
     course: RateCourse
     began_s: float  #: clock time, the middle between command and reply
-    u_s: float  #: standard uncertainty of the time of an angle that all angles have in common
+    u_s: float  #: standard uncertainty of `began_s`
     is_whole: bool = False  #: whether nothing is left to be commanded
 
     @property

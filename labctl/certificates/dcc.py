@@ -254,7 +254,8 @@ def _results(parent: ET.Element, given: Certificate) -> None:
     for each in given.coefficients:
         where = "" if each.temperature_c is None else f" at {each.temperature_c:g} °C"
         alone = "" if each.has_standards or each.u is None else ", u of the fit alone"
-        name = f"Axis {each.axis}: {each.name}{where}{alone}"
+        own = each.name_text if each.unit == "s" else each.name
+        name = f"Axis {each.axis}: {own}{where}{alone}"
         quantity(made, name, [each.value], each.unit, u=each.u)
     _budget(parent, given)
     for sensor in given.sensors:

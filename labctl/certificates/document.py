@@ -141,6 +141,11 @@ class CoefficientResult(Part):
     unit: str
     has_standards: bool = False  #: whether u contains the standards of the bench; else it is that of the fit alone
 
+    @property
+    def name_text(self) -> str:
+        """The name as a person reads it; no correction undoes a delay or a finite bandwidth."""
+        return self.name.replace("_", " ") + (" (not corrected)" if self.name in {"delay", "time_constant"} else "")
+
 
 class AxisError(Part):
     """Errors of one axis over all data sets, deg/s."""

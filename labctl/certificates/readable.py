@@ -252,7 +252,7 @@ def _coefficient(given: CoefficientResult) -> list[str]:
     value, u = rounded(given.value, given.u or 0.0)
     warm = "" if given.temperature_c is None else _number(given.temperature_c)
     of_fit = "" if given.has_standards or u == "–" else FIT_ALONE
-    return [given.axis, given.name.replace("_", " "), warm, value, u + of_fit, readable(given.unit)]
+    return [given.axis, given.name_text, warm, value, u + of_fit, readable(given.unit)]
 
 
 def _sensor(given: SensorResult) -> Mapping[str, object]:

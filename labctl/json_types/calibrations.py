@@ -7,7 +7,7 @@ from typing import NotRequired
 from typing_extensions import TypedDict
 
 from instruments.datasheet import Convention
-from labctl.json_types.budget import BenchConditionsJson, UncertaintyJson
+from labctl.json_types.budget import BenchConditionsJson, BudgetJson, UncertaintyJson
 from labctl.json_types.models import (
     AxisNoiseJson,
     Coefficients,
@@ -97,6 +97,7 @@ class CalibrationJson(TypedDict):
     use: NotRequired[dict[str, AxisEvidenceJson]]
     standards: NotRequired[BenchConditionsJson]
     uncertainty: NotRequired[UncertaintyJson | None]
+    response: NotRequired[dict[str, dict[str, BudgetJson]]]  #: axis -> budgets of delay and time constant, s
     poses: NotRequired[PosesJson]
     configuration: NotRequired[dict[str, str]]  #: how the unit was set, as it said itself; absent where it says nothing
     provenance: dict[str, object]

@@ -69,6 +69,15 @@ class ErrorModelJson(TypedDict):
     held: NotRequired[HeldJson]
 
 
+class ErrorPartJson(TypedDict):
+    """A source of error in a covariance: `root` (k*m, j) is the change of the coefficients by each of its j errors."""
+
+    source: str
+    u: float
+    unit: str
+    root: list[list[float]]
+
+
 class AxisFitJson(TypedDict):
     """The coefficients of one output axis: k names by m temperature functions, covariance (k*m, k*m)."""
 
@@ -77,6 +86,7 @@ class AxisFitJson(TypedDict):
     units: list[str]
     values: list[list[float]]
     covariance: list[list[float | None]]
+    parts: NotRequired[list[ErrorPartJson]]  #: of the covariance, by errors of the reference; they are in it
 
 
 class FittedModelJson(ErrorModelJson):

@@ -30,6 +30,10 @@ RECORDING, WITHIN_S, OWN_DATASET = "recording", "recording_t_s", "recording_data
 #: Column of the data sets that no fit takes in.
 VERIFICATION = "verification"
 
+#: Standard uncertainties of the time of a reference rate that changes: of each data set, and what all have in common.
+TIME_U_S, TIME_COMMON_U_S = "table_time_u_s", "table_time_common_u_s"
+RATE_TIME_U = frozenset({TIME_U_S, TIME_COMMON_U_S})
+
 #: Times of a reading beside `t_s`, which is computed from them: no quantity that is measured.
 DEVICE_S, ARRIVAL_S = "device_s", "arrival_s"
 READING_TIMES = frozenset({DEVICE_S, ARRIVAL_S})
@@ -52,6 +56,8 @@ COLUMNS = (
     Column("computed_rate_dps", "number", "deg/s", "commanded rate of the table"),
     Column("encoder_rate_dps", "number", "deg/s", "rate by the table's encoder, of the whole data set"),
     Column("encoder_rate_u_dps", "number", "deg/s", "standard uncertainty of encoder_rate_dps"),
+    Column(TIME_U_S, "number", "s", "standard uncertainty of the time of table_rate_dps, of its own in each data set"),
+    Column(TIME_COMMON_U_S, "number", "s", "standard uncertainty of that time that all data sets have in common"),
     Column("turn_deg", "number", "deg", "angle that the unit turned by in a data set", _BOTH, frozenset({"turns"})),
     Column("turn_u_deg", "number", "deg", "standard uncertainty of turn_deg"),
     Column("duration_s", "number", "s", "length of the data set", frozenset({"points"}), frozenset({"turns"})),

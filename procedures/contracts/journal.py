@@ -49,6 +49,14 @@ class DataSetHeader:
 
 
 @dataclass(frozen=True)
+class CourseTime:
+    """Standard uncertainties of the time of a rate that changes, s: the whole course may be early or late by these."""
+
+    own_u_s: float  #: of one data set, independent of that of others
+    common_u_s: float  #: that all data sets have in common: when in its reply an angle is read
+
+
+@dataclass(frozen=True)
 class TableAngles:
     """What the table's encoder said during one data set, and the mean rate that follows from it."""
 
@@ -60,6 +68,7 @@ class TableAngles:
     computed_dps: float  #: the rate that the table was taken to run at
     is_reference: bool  #: whether the measured rate is the reference of the readings
     course: MeasuredCourse | None = None  #: of a rate that changes; `rate_dps` is then its mean
+    time: CourseTime | None = None  #: of a rate that changes: how well the time of its reference is known
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from instruments.clock import Clock
 from instruments.errors import NoReply
 from instruments.interfaces.table import AngleReading, CourseRun, CourseTable, RateTable
 from procedures.contracts.errors import StepFailed, TableStopped
-from procedures.contracts.journal import Event, TableAngles
+from procedures.contracts.journal import CourseTime, Event, TableAngles
 from procedures.contracts.measured_course import MeasuredCourse, regressors
 from procedures.monitoring.campaign_time import CampaignTime
 
@@ -90,10 +90,14 @@ class CourseLog:
         ends = measured.angle_deg(np.asarray(time.of(np.array([run.began_s, run.ends_s]))))
         mean_dps = float(ends[1] - ends[0]) / run.course.duration_s
         commanded = run.course.angle_deg(np.array([run.course.duration_s]))
+        common_u_s = float(np.mean([one.common_u_s for one in self.readings]))  # as early or late in each answer
+        by_encoder = CourseTime(_time_u_s(run, covariance), common_u_s)
         return TableAngles(
             tuple(np.asarray(time.of(t_s)).tolist()), tuple(angle_deg.tolist()), mean_dps,
-            _rate_u_dps(run, covariance), float(ends[0]), float(commanded[0]) / run.course.duration_s,
+            _rate_u_dps(run, covariance, common_u_s), float(ends[0]), float(commanded[0]) / run.course.duration_s,
             is_reference=is_reference, course=measured,
+            # when a command takes effect is known by its reply alone, and is as late in every data set
+            time=by_encoder if is_reference else CourseTime(0.0, run.u_s),
         )  # fmt: skip
 
 
@@ -109,16 +113,33 @@ def _fitted(design: Array, values: Array, u: Array) -> tuple[Array, Array, float
     return coefficients / scale, excess**2 * (inverse @ inverse.T) / np.outer(scale, scale), excess
 
 
-def _rate_u_dps(run: CourseRun, covariance: Array) -> float:
+def _rates(run: CourseRun) -> tuple[Array, Array]:
+    """Return how the rate follows the coefficients, (n, k) deg/s each, and its slope, (n,) deg/s^2, over a course."""
+    at = np.linspace(RATE_OVER_S, run.course.duration_s, POINTS)
+    change = (regressors(run.course, at) - regressors(run.course, at - RATE_OVER_S)) / RATE_OVER_S
+    slope = (run.course.rate_dps(at) - run.course.rate_dps(at - RATE_OVER_S)) / RATE_OVER_S
+    return change, np.asarray(slope)
+
+
+def _rate_u_dps(run: CourseRun, covariance: Array, common_u_s: float) -> float:
     """Return the standard uncertainty of the rate, deg/s: the root mean square over the course.
 
     By the scatter of the angles, and by the time that all of them have in common.
     """
-    at = np.linspace(RATE_OVER_S, run.course.duration_s, POINTS)
-    change = (regressors(run.course, at) - regressors(run.course, at - RATE_OVER_S)) / RATE_OVER_S
+    change, slope = _rates(run)
     by_scatter = np.einsum("nk,kl,nl->n", change, covariance, change)
-    slope = (run.course.rate_dps(at) - run.course.rate_dps(at - RATE_OVER_S)) / RATE_OVER_S
-    return math.sqrt(float(np.mean(np.maximum(by_scatter, 0.0) + (slope * run.u_s) ** 2)))
+    return math.sqrt(float(np.mean(np.maximum(by_scatter, 0.0) + (slope * common_u_s) ** 2)))
+
+
+def _time_u_s(run: CourseRun, covariance: Array) -> float:
+    """Return the standard uncertainty of the time of a course by the scatter of its angles, s.
+
+    Its error is the one delay that takes most of an error of the rate, by least squares: a delay of 1 s adds minus the
+    slope of the rate. 0 where the rate never changes.
+    """
+    change, slope = _rates(run)
+    along = slope @ change / max(float(slope @ slope), 1e-300)
+    return math.sqrt(max(float(along @ covariance @ along), 0.0))
 
 
 def course_event(table: RateTable, found: TableAngles, course: MeasuredCourse, duration_s: float) -> Event | None:

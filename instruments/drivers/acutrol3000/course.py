@@ -17,7 +17,7 @@ from instruments.drivers.acutrol3000 import checks
 from instruments.drivers.acutrol3000.link import AcutrolLink
 from instruments.errors import LimitError, RequestRejected
 from instruments.interfaces.rate_course import Ramp, RateCourse, SineSweep
-from instruments.interfaces.table import AngleReading, CourseRun
+from instruments.interfaces.table import AngleReading, CourseRun, reply_time_u_s
 from instruments.protocols.acutrol3000 import commands as acl
 from instruments.protocols.acutrol3000.settings import Acutrol3000Settings
 
@@ -55,7 +55,7 @@ class CourseFollower:
             self._link.ask(f"{self._sine(0.0, course.from_hz)};{acl.synthesis(axis)}")
             command = self._sine(course.amplitude_dps, course.to_hz)
         _, sent_s, answered_s = self._link.timed(command)
-        u_s = math.hypot(self._settings.time_u_s, (answered_s - sent_s) / math.sqrt(12))
+        u_s = math.hypot(self._settings.time_u_s, reply_time_u_s(answered_s - sent_s))
         return CourseRun(course, (sent_s + answered_s) / 2, u_s, is_whole=isinstance(course, Ramp))
 
     def go_on(self, run: CourseRun) -> CourseRun:
@@ -88,7 +88,9 @@ class CourseFollower:
             angle_deg += 360.0 * round((expected_deg - angle_deg) / 360.0)
         self._quickest_s = min(self._quickest_s, answered_s - sent_s)
         u_s = math.hypot(self._settings.time_u_s, (answered_s - sent_s - self._quickest_s) / math.sqrt(12))
-        self._last = AngleReading(t_s, angle_deg, self._settings.encoder_u_deg, u_s)
+        self._last = AngleReading(
+            t_s, angle_deg, self._settings.encoder_u_deg, u_s, reply_time_u_s(answered_s - sent_s)
+        )
         return self._last
 
     def _sine(self, size_dps: float, frequency_hz: float) -> str:

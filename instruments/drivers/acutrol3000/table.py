@@ -15,7 +15,7 @@ from instruments.drivers.acutrol3000.link import AcutrolLink
 from instruments.drivers.driver import TableDriver
 from instruments.errors import LimitError, NoReply, RequestRejected, WrongInstrument
 from instruments.interfaces.rate_course import RateCourse, course_complaint
-from instruments.interfaces.table import AngleReading, CourseRun, Spin, TableLimits
+from instruments.interfaces.table import AngleReading, CourseRun, Spin, TableLimits, reply_time_u_s
 from instruments.protocols.acutrol3000 import commands as acl
 from instruments.protocols.acutrol3000.settings import Acutrol3000Settings
 from instruments.transport.factory import Ports
@@ -195,7 +195,7 @@ class Acutrol3000:
             angle_deg += 360.0 * round((expected_deg - angle_deg) / 360.0)
         self._quickest_s = min(self._quickest_s, answered_s - sent_s)
         u_s = math.hypot(self.settings.time_u_s, (answered_s - sent_s - self._quickest_s) / math.sqrt(12))
-        self._last = AngleReading(t_s, angle_deg, self.settings.encoder_u_deg, u_s)
+        self._last = AngleReading(t_s, angle_deg, self.settings.encoder_u_deg, u_s, reply_time_u_s(answered_s - sent_s))
         return self._last
 
     def close(self) -> None:

@@ -12,7 +12,7 @@ from instruments.clock import Clock, sleep_until
 from instruments.drivers.driver import TableDriver, Trial
 from instruments.drivers.request_reply.dialogue import Dialogue
 from instruments.errors import InstrumentError, LimitError, NoReply, RequestRejected
-from instruments.interfaces.table import AngleReading, Spin, TableLimits
+from instruments.interfaces.table import AngleReading, Spin, TableLimits, reply_time_u_s
 from instruments.protocols.request_reply.settings import DescribedTableSettings, parameters_of
 from instruments.protocols.request_reply.table import SIGN
 from instruments.protocols.request_reply.templates import as_written
@@ -158,7 +158,7 @@ class DescribedTable:
             angle_deg += 360.0 * round((expected_deg - angle_deg) / 360.0)
         self._quickest_s = min(self._quickest_s, answered_s - sent_s)
         u_s = math.hypot(self._described.time_u_s, (answered_s - sent_s - self._quickest_s) / math.sqrt(12))
-        self._last = AngleReading(t_s, angle_deg, self._described.angle_u_deg, u_s)
+        self._last = AngleReading(t_s, angle_deg, self._described.angle_u_deg, u_s, reply_time_u_s(answered_s - sent_s))
         return self._last
 
     def close(self) -> None:

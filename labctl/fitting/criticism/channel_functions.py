@@ -10,7 +10,7 @@ from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.data.joined import trend_t_s
 from labctl.fitting.effects.acceleration import LEAST_CHANGE_G, change_g
 from labctl.fitting.numeric.arrays import Array
-from labctl.recording.columns import OWN_DATASET, READING_TIMES, RECORDING, WITHIN_S
+from labctl.recording.columns import OWN_DATASET, RATE_TIME_U, READING_TIMES, RECORDING, WITHIN_S
 
 #: Knots of a smooth function of a channel: a coarse and a fine one compete.
 KNOTS = (5, 9)
@@ -32,7 +32,7 @@ NO_CHANNELS = frozenset(
         "dataset", "run", "mounting", "n", "valid", "duration_s", "since_begin_s", "previous_rate_dps", "status",
         "table_angle_deg", "chamber_setpoint_c", "temperature_x_c", "temperature_y_c", "temperature_z_c",
         "turn_deg", "turn_u_deg", "computed_rate_dps", "encoder_rate_dps", "encoder_rate_u_dps",
-        RECORDING, WITHIN_S, OWN_DATASET, *READING_TIMES,
+        RECORDING, WITHIN_S, OWN_DATASET, *READING_TIMES, *RATE_TIME_U,
     }
 )  # fmt: skip
 FORCES = {"x": "accel_x_g", "y": "accel_y_g", "z": "accel_z_g"}

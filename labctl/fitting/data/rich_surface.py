@@ -19,7 +19,7 @@ from labctl.fitting.data.rate_profile import Response
 from labctl.fitting.data.shifts import shift_columns
 from labctl.fitting.data.temperature.levels import temperature_levels
 from labctl.fitting.numeric.arrays import Array
-from labctl.recording.columns import OWN_DATASET, READING_TIMES, RECORDING, WITHIN_S
+from labctl.recording.columns import OWN_DATASET, RATE_TIME_U, READING_TIMES, RECORDING, WITHIN_S
 
 #: Largest number of columns, as a share of the number of data sets (also with levels), and least degrees of freedom.
 MOST_SHARE, MOST_SHARE_WITH_LEVELS, LEAST_FREE = 0.5, 0.7, 8
@@ -43,7 +43,7 @@ NO_SURROUNDINGS = frozenset({
     "t_s", "table_rate_dps", "table_angle_deg", "dataset", "position", "mounting", "run", "n", "duration_s",
     "since_begin_s", "valid", "temperature_c", "temperature_x_c", "temperature_y_c", "temperature_z_c", "power_s",
     "turn_deg", "turn_u_deg",
-    RECORDING, WITHIN_S, OWN_DATASET, *READING_TIMES,
+    RECORDING, WITHIN_S, OWN_DATASET, *READING_TIMES, *RATE_TIME_U,
 })  # fmt: skip
 
 

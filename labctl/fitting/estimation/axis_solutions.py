@@ -17,6 +17,7 @@ from labctl.fitting.data.shifts import KINDS, shifts_of
 from labctl.fitting.estimation.axis_design import AxisDesign, axis_design
 from labctl.fitting.estimation.common_turn_error import with_common_error
 from labctl.fitting.estimation.held.propagation import considered, joint_covariance
+from labctl.fitting.estimation.reference_time import TimeErrors, time_errors
 from labctl.fitting.estimation.response import (
     first_response,
     next_response,
@@ -26,6 +27,7 @@ from labctl.fitting.estimation.response import (
     without_response,
 )
 from labctl.fitting.models.error_model import ErrorModel
+from labctl.fitting.models.error_part import ErrorPart
 from labctl.fitting.models.fitted_model import AxisFit, FittedModel
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.drift_noise import Scatter
@@ -97,9 +99,9 @@ def solve_axes(data: FitData, model: ErrorModel, fixed: Mapping[str, Solution] |
 def _solve_each(data: FitData, model: ErrorModel, fixed: Mapping[str, Solution] | None) -> AxisSolutions:
     fits, solutions, nuisance = {}, {}, {}
     for axis in data.outputs:
-        design, solution = _converged(data, model, axis, fixed[axis] if fixed else None)
+        design, solution, late = _converged(data, model, axis, fixed[axis] if fixed else None)
         solution = with_common_error(data, axis, design.columns, solution)
-        fits[axis] = _axis_fit(design, solution)
+        fits[axis] = _axis_fit(design, solution, late)
         solutions[axis], nuisance[axis] = replace(solution, white_dps=data.white_dps(axis)), _nuisance(design, solution)
     return AxisSolutions(fits, solutions, nuisance)
 
@@ -126,18 +128,19 @@ def leaning(data: FitData, nuisance: Mapping[str, Nuisance]) -> FitData:
     return replace(data, channels=data.channels.with_rates(rates), angles_known=True)
 
 
-def _converged(data: FitData, model: ErrorModel, axis: str, fixed: Solution | None) -> tuple[AxisDesign, Solution]:
-    """Return the design at the solution, and the solution: laws by Gauss-Newton steps at one drift, then once more.
+def _converged(
+    data: FitData, model: ErrorModel, axis: str, fixed: Solution | None
+) -> tuple[AxisDesign, Solution, TimeErrors | None]:
+    """Return the design at the solution, the solution, and the errors of the reference's time that are in it.
 
-    A delay and a bandwidth are laws of their own effect, and every other effect sees the rate that comes through both.
+    Laws are solved by Gauss-Newton steps at one drift, then once more. A delay and a bandwidth are laws of their own
+    effect, and every other effect sees the rate that comes through both.
     """
     response = first_response(data, model, axis)
     data = data.through(response)
     design = axis_design(data, model, axis)
     solution = _solve_axis(data, model, axis, design, fixed)
-    if not design.laws:
-        return design, solution
-    for _ in range(GAUSS_NEWTON_STEPS):
+    for _ in range(GAUSS_NEWTON_STEPS if design.laws else 0):
         before, at = solution.values, _law_coefficients(design, solution)
         if data.channels.profile is not None:
             u_s = _axis_fit(design, solution).u_of(TIME_CONSTANT)
@@ -147,7 +150,10 @@ def _converged(data: FitData, model: ErrorModel, axis: str, fixed: Solution | No
         solution = _solve_axis(data, model, axis, design, fixed or solution)
         if np.allclose(solution.values, before, rtol=1e-7, atol=1e-14):
             break
-    return design, _solve_axis(data, model, axis, design, fixed)
+    late = time_errors(data, axis)
+    if design.laws or late is not None:
+        solution = _solve_axis(data, model, axis, design, fixed, late)
+    return design, solution, late
 
 
 def _law_coefficients(design: AxisDesign, solution: Solution) -> dict[str, NDArray[np.float64]]:
@@ -156,7 +162,14 @@ def _law_coefficients(design: AxisDesign, solution: Solution) -> dict[str, NDArr
     return {name: row for (_, name, _), row in zip(design.names, table, strict=True) if name in design.laws}
 
 
-def _solve_axis(data: FitData, model: ErrorModel, axis: str, design: AxisDesign, fixed: Solution | None) -> Solution:
+def _solve_axis(
+    data: FitData,
+    model: ErrorModel,
+    axis: str,
+    design: AxisDesign,
+    fixed: Solution | None,
+    late: TimeErrors | None = None,
+) -> Solution:
     if design.columns.shape[1] == 0:
         raise NotEnoughData(
             f"{data.info.serial}, axis {axis}: the rates in this recording cause none of the effects of model "
@@ -175,6 +188,8 @@ def _solve_axis(data: FitData, model: ErrorModel, axis: str, design: AxisDesign,
         kinds = np.array([shift.kind for shift in design.shifts])
         random = RandomEffects(np.unique(kinds, return_inverse=True)[1], wide)
     columns, y, scatter, known_beside = considered(design.held, columns, y, scatter)
+    if late is not None:
+        known_beside = late.beside(known_beside, len(columns))
     try:
         return solve(columns, y, scatter, fixed.drift if fixed else None, random, known_beside)
     except NotEnoughData as error:
@@ -198,15 +213,20 @@ def _with_white_noise(design: AxisDesign, y: Array, scatter: Scatter) -> Scatter
     return replace(scatter, white_var=np.full(len(y), max(float(left @ left) / (len(y) - rank), 1e-20)))
 
 
-def _axis_fit(design: AxisDesign, solution: Solution) -> AxisFit:
+def _axis_fit(design: AxisDesign, solution: Solution, late: TimeErrors | None = None) -> AxisFit:
     names = design.names
     values, covariance = joint_covariance(solution, design.held, design.spread)
+    parts: tuple[ErrorPart, ...] = ()
+    if late is not None and solution.along_held is not None:
+        estimated, held = design.spread.shape[1], design.held.columns.shape[1]
+        parts = late.parts(np.asarray(design.spread @ solution.along_held[:estimated, held:]))
     return AxisFit(
         tuple(owner for owner, _, _ in names),
         tuple(name for _, name, _ in names),
         tuple(unit for _, _, unit in names),
         values.reshape(len(names), -1),
-        covariance,
+        sum((part.covariance for part in parts), covariance),
+        parts,
     )
 
 

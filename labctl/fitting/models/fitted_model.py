@@ -12,10 +12,11 @@ from labctl.fitting.data.channels import Channels
 from labctl.fitting.effects import Term, kind_of
 from labctl.fitting.effects.scale_factor import FREE_AMPLITUDE
 from labctl.fitting.models.error_model import ErrorModel, is_exported
+from labctl.fitting.models.error_part import ErrorPart
 from labctl.fitting.models.inversion import invert
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.json_numbers import none_for_nan
-from labctl.json_types.models import FittedModelJson, LeftOut
+from labctl.json_types.models import AxisFitJson, FittedModelJson, LeftOut
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,7 @@ class AxisFit:
     units: tuple[str, ...]
     values: NDArray[np.float64]  #: (k, m)
     covariance: NDArray[np.float64]  #: (k*m, k*m), the temperature functions running fastest
+    parts: tuple[ErrorPart, ...] = ()  #: of the covariance, by errors of the reference; they are in it
 
     @property
     def u(self) -> NDArray[np.float64]:
@@ -35,9 +37,18 @@ class AxisFit:
             return np.full(self.values.shape, np.nan)
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0)).reshape(self.values.shape)
 
+    @property
+    def own_covariance(self) -> NDArray[np.float64]:
+        """The covariance without its parts: by the scatter of the data, and by coefficients that were held."""
+        return np.asarray(self.covariance - sum(part.covariance for part in self.parts))
+
     def u_of(self, name: str) -> float:
         """Return the standard uncertainty of a coefficient, the first of a table; NaN where there is none."""
         return float(self.u[self.names.index(name), 0]) if name in self.names else float("nan")
+
+    def value_of(self, name: str) -> float:
+        """Return a coefficient, the first of a table."""
+        return float(self.values[self.names.index(name), 0])
 
 
 @dataclass(frozen=True)
@@ -103,16 +114,7 @@ class FittedModel:
         """Return everything needed to rebuild this model, as JSON."""
         return {
             **self.model.to_dict(),
-            "axes": {
-                axis: {
-                    "effects": list(fit.effects),
-                    "names": list(fit.names),
-                    "units": list(fit.units),
-                    "values": fit.values.tolist(),
-                    "covariance": none_for_nan(fit.covariance),
-                }
-                for axis, fit in self.axes.items()
-            },
+            "axes": {axis: _axis_json(fit) for axis, fit in self.axes.items()},
         }
 
     @staticmethod
@@ -128,10 +130,24 @@ class FittedModel:
                 tuple(fit["units"]),
                 np.asarray(fit["values"], dtype=np.float64),
                 np.asarray(fit["covariance"], dtype=np.float64),
+                tuple(map(ErrorPart.from_json, fit.get("parts", []))),
             )
             for axis, fit in record["axes"].items()
         }
         return FittedModel(model, axes)
+
+
+def _axis_json(fit: AxisFit) -> AxisFitJson:
+    found: AxisFitJson = {
+        "effects": list(fit.effects),
+        "names": list(fit.names),
+        "units": list(fit.units),
+        "values": fit.values.tolist(),
+        "covariance": none_for_nan(fit.covariance),
+    }
+    if fit.parts:
+        found["parts"] = [part.to_json() for part in fit.parts]
+    return found
 
 
 def _with_free_amplitude(term: Term) -> Term:
@@ -158,4 +174,5 @@ def _only(fit: AxisFit, effects: set[str]) -> AxisFit:
         tuple(fit.units[i] for i in kept),
         fit.values[kept],
         fit.covariance[np.ix_(flat, flat)],
+        tuple(part.take(flat) for part in fit.parts),
     )

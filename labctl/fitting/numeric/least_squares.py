@@ -42,7 +42,7 @@ class Solution:
     scale: float  #: factor on the covariance estimated from the residuals; 1 where the white noise is known;
     #: NaN, as the covariance then is, where neither the residuals nor the readings say anything about noise
     components: tuple[Component, ...] = ()  #: spread of each kind of random effect
-    along_held: NDArray[np.float64] | None = None  #: (k, h) derivative of the values along h held coefficients
+    along_held: NDArray[np.float64] | None = None  #: (k, h) derivative of the values along h considered columns
 
 
 @dataclass(frozen=True)

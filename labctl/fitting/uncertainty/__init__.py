@@ -1,7 +1,7 @@
 """Uncertainty of what a calibration gives, after the GUM (JCGM 100)."""
 
 from labctl.fitting.uncertainty.budget import Budget, BudgetLine
-from labctl.fitting.uncertainty.coefficient_budget import coefficient_budgets
+from labctl.fitting.uncertainty.coefficient_budget import coefficient_budgets, response_budgets
 from labctl.fitting.uncertainty.conditions import BenchConditions, conditions_of
 from labctl.fitting.uncertainty.rate import COVERAGE, RateUncertainty, of_budget, rate_uncertainty
 from labctl.fitting.uncertainty.rate_vector import RateVectorUncertainty, rate_vector_uncertainty
@@ -21,5 +21,6 @@ __all__ = [
     "of_budget",
     "rate_uncertainty",
     "rate_vector_uncertainty",
+    "response_budgets",
     "use_evidence",
 ]

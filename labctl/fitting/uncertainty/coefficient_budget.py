@@ -1,4 +1,4 @@
-"""Budgets of the coefficients: bias, scale factor and misalignments of each axis at one temperature."""
+"""Budgets of the coefficients: bias, scale factor and misalignments of each axis at one temperature; its response."""
 
 from __future__ import annotations
 
@@ -7,12 +7,14 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from labctl.fitting.effects import response
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.uncertainty.budget import Budget, BudgetLine, budget_of
 from labctl.fitting.uncertainty.conditions import BenchConditions
 from labctl.fitting.uncertainty.evaluated_lines import coefficient_line, model_line, repeatability_line, slope_line
 from labctl.fitting.uncertainty.rate_vector import require_law_of_rate_and_temperature
-from labctl.fitting.uncertainty.sensitivity import coefficients_of
+from labctl.fitting.uncertainty.reference_time import time_lines
+from labctl.fitting.uncertainty.sensitivity import OwnCoefficient, coefficients_of
 from labctl.fitting.uncertainty.standard_lines import Sensitivities, standard_lines
 from labctl.fitting.uncertainty.use import AxisEvidence
 
@@ -52,8 +54,29 @@ def _of_axis(
             across = None if name == "scale_factor" else name.removeprefix("misalignment_")
             lines.append(slope_line(fitted, evidence, temperature_c, across))
         sensitivities = _sensitivities(name, values, law.temperature_slope(fitted, temperature_c), bench)
-        lines += [source.lines[0] for source in standard_lines(bench, sensitivities)]
+        sources = [*time_lines(fitted, [law], temperature_c, bench), *standard_lines(bench, sensitivities)]
+        lines += [source.lines[0] for source in sources]
         found[name] = budget_of(name, unit, lines, values[name])
+    return found
+
+
+def response_budgets(
+    fitted: FittedModel, *, evidence: Mapping[str, AxisEvidence], bench: BenchConditions | None = None
+) -> dict[str, dict[str, Budget]]:
+    """Return axis -> name -> budget of the delay and the time constant of a model, s; nothing for one without them.
+
+    The time of the reference moves a delay in full. Empty where the coefficients have no uncertainty.
+    """
+    found: dict[str, dict[str, Budget]] = {}
+    for axis, fit in fitted.axes.items():
+        for name in (name for name, owner in zip(fit.names, fit.effects, strict=True) if owner in response.IDS):
+            own, known = OwnCoefficient(axis, name), evidence.get(axis)
+            if not np.isfinite(fit.u_of(name)):
+                continue
+            at_c = fitted.model.reference.temperature_c  # it is the same at all temperatures
+            lines = [coefficient_line(fitted, own, at_c, known, "s")]
+            lines += [source.lines[0] for source in time_lines(fitted, [own], at_c, bench)]
+            found.setdefault(axis, {})[name] = budget_of(name, "s", lines, fit.value_of(name))
     return found
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.models.presets import POSES
 from labctl.fitting.uncertainty.budget import BudgetLine
-from labctl.fitting.uncertainty.sensitivity import LawFunction
+from labctl.fitting.uncertainty.sensitivity import CoefficientFunction, u_of_fit
 from labctl.fitting.uncertainty.slope_error import slope_error, slope_unknown
 from labctl.fitting.uncertainty.use import AxisEvidence
 
@@ -28,10 +28,10 @@ SLOPE_HELD_OUT = (
 
 
 def coefficient_line(
-    fitted: FittedModel, law: LawFunction, temperature_c: float, evidence: AxisEvidence | None, unit: str
+    fitted: FittedModel, law: CoefficientFunction, temperature_c: float, evidence: AxisEvidence | None, unit: str
 ) -> BudgetLine:
     """Return the line of the fitted coefficients: their uncertainty in the result of the law, in `unit`."""
-    u = law.u(fitted, temperature_c)
+    u = u_of_fit(law, fitted, temperature_c)
     held = fitted.model.held
     why = PUBLISHED if u is None else BY_COVARIANCE
     if unstated := held.without_u(law.axis):

@@ -22,6 +22,7 @@ from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.uncertainty.budget import Budget, BudgetLine, budget_of
 from labctl.fitting.uncertainty.conditions import BenchConditions
 from labctl.fitting.uncertainty.evaluated_lines import coefficient_line, model_line, repeatability_line
+from labctl.fitting.uncertainty.reference_time import time_lines
 from labctl.fitting.uncertainty.sensitivity import correction_gain, error_at, response
 from labctl.fitting.uncertainty.standard_lines import Sensitivities, SourceLines, standard_lines
 from labctl.fitting.uncertainty.use import AxisEvidence
@@ -93,6 +94,7 @@ def rate_vector_uncertainty(
     require_law_of_rate_and_temperature(fitted, name)
     place = _Place(fitted, {axis: float(rates_dps.get(axis, 0.0)) for axis in BODY_AXES}, temperature_c)
     evaluated = place.evaluated(evidence)
+    evaluated += place.of_time(bench)
     sensitivities = place.sensitivities(bench)
     stated = standard_lines(bench, sensitivities)
     aligned = standard_lines(bench, replace(sensitivities, angles=place.mounting_angles(bench, aligned=True)))
@@ -166,6 +168,11 @@ class _Place:
         ]
         unread = [axis for axis in BODY_AXES if axis not in self.outputs and self.rates_dps[axis]]
         return [*found, self._cross_rates(unread)] if unread else found
+
+    def of_time(self, bench: BenchConditions | None) -> list[SourceLines]:
+        """Return the lines of the time of a reference rate that changed."""
+        laws = [error_at(axis, self.rates_dps) for axis in self.outputs]
+        return time_lines(self.fitted, laws, self.temperature_c, bench, self.gain)
 
     def _cross_rates(self, unread: Sequence[str]) -> SourceLines:
         read = {axis: rate for axis, rate in self.rates_dps.items() if axis not in unread}

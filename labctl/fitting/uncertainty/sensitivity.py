@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -17,6 +18,19 @@ from labctl.fitting.numeric.arrays import Array
 
 #: Steps of numerical derivatives: along the rate for an inversion and for a coefficient, deg/s; over temperature, K.
 STEP_DPS, COEFFICIENT_STEP_DPS, STEP_K = 0.01, 1.0, 0.05
+
+
+class CoefficientFunction(Protocol):
+    """What follows from the coefficients of one output axis."""
+
+    @property
+    def axis(self) -> str:
+        """The output axis."""
+        ...
+
+    def gradient(self, fitted: FittedModel, temperature_c: float) -> Array:
+        """Return its derivative along the coefficients of the axis, (k*m,), temperature functions running fastest."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -49,16 +63,34 @@ class LawFunction:
         ]
         return np.outer(slopes, basis).ravel() / self.divisor
 
-    def u(self, fitted: FittedModel, temperature_c: float) -> float | None:
-        """Return its standard uncertainty by the covariance of the coefficients (GUM eq. 13); None: not stated."""
-        covariance = fitted.axes[self.axis].covariance
-        if not np.any(covariance) or fitted.model.held.without_u(self.axis):
-            return None
-        gradient = self.gradient(fitted, temperature_c)
-        return math.sqrt(max(float(gradient @ covariance @ gradient), 0.0))
-
     def _channels(self, temperature_c: float) -> Channels:
         return channels_at(self.axis, self.rates, len(self.weights), temperature_c)
+
+
+@dataclass(frozen=True)
+class OwnCoefficient:
+    """A coefficient of one output axis itself, which is the same at all temperatures."""
+
+    axis: str
+    name: str
+
+    def gradient(self, fitted: FittedModel, temperature_c: float) -> Array:  # noqa: ARG002  it is the same at each
+        """Return its derivative along the coefficients of the axis, (k*m,)."""
+        found = np.zeros_like(fitted.axes[self.axis].values)
+        found[fitted.axes[self.axis].names.index(self.name), 0] = 1.0
+        return found.ravel()
+
+
+def u_of_fit(law: CoefficientFunction, fitted: FittedModel, temperature_c: float) -> float | None:
+    """Return the standard uncertainty of a function by the covariance of the coefficients (GUM eq. 13).
+
+    Without the parts of the covariance that have lines of their own. None: not stated.
+    """
+    fit = fitted.axes[law.axis]
+    if not np.any(fit.covariance) or fitted.model.held.without_u(law.axis):
+        return None
+    gradient = law.gradient(fitted, temperature_c)
+    return math.sqrt(max(float(gradient @ fit.own_covariance @ gradient), 0.0))
 
 
 def channels_at(axis: str, rates: dict[str, Array], n: int, temperature_c: float) -> Channels:

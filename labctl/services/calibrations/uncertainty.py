@@ -94,6 +94,7 @@ def uncertainty_answer(
         known.fitted, temperature_c, evidence=known.evidence, name=known.name, bench=known.bench
     )
     budgets = {axis: BudgetResponse.model_validate(one.budget.to_json()) for axis, one in found.items()}
+    response = calibration.document.get("response", {})
     return UncertaintyResponse(
         serial=calibration.serial,
         version=calibration.version,
@@ -105,7 +106,10 @@ def uncertainty_answer(
         axes={axis: _response(one) for axis, one in found.items()},
         budget=budgets,
         coefficients={
-            axis: {name: BudgetResponse.model_validate(one.to_json()) for name, one in named.items()}
+            axis: {
+                **{name: BudgetResponse.model_validate(one.to_json()) for name, one in named.items()},
+                **{name: BudgetResponse.model_validate(one) for name, one in response.get(axis, {}).items()},
+            }
             for axis, named in coefficients.items()
         },
         vector=None if vector is None else _vector_response(vector),

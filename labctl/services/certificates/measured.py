@@ -183,7 +183,18 @@ def coefficients(calibration: Calibration) -> tuple[CoefficientResult, ...]:
                         u=of_fit if whole is None else whole, has_standards=whole is not None,
                     )
                 )  # fmt: skip
-    return tuple(found)
+    return (*found, *_response(calibration))
+
+
+def _response(calibration: Calibration) -> Iterator[CoefficientResult]:
+    """Yield delay and time constant, by their budgets; a correction has none of them."""
+    for axis, named in calibration.document.get("response", {}).items():
+        for name, budget in named.items():
+            if budget["value"] is not None:
+                yield CoefficientResult(
+                    axis=axis, name=name, temperature_c=None, value=budget["value"], unit=budget["unit"],
+                    u=budget["combined"], has_standards=True,
+                )  # fmt: skip
 
 
 class _Budgets:

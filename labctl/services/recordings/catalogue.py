@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.recording import Recording, RecordingInfo
+from labctl.recording.columns import RATE_TIME_U
 from labctl.services.benches.bench_clock import has_simulated_time
 from labctl.services.schemas.recordings import (
     ChannelColumns,
@@ -84,7 +85,7 @@ def _of_rows(numbers: list[int], means: list[MeanRow]) -> dict[str, ChannelColum
 NO_CHANNEL = frozenset(
     {
         "dataset", "t_s", "position", "run", "mounting", "table_rate_dps", "computed_rate_dps", "encoder_rate_u_dps",
-        "n", "duration_s", "valid",
+        *RATE_TIME_U, "n", "duration_s", "valid",
     }
 )  # fmt: skip
 

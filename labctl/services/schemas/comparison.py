@@ -183,6 +183,12 @@ class AxisResponse(ResponseModel):
         default=None, description="Frequency at which the power is halved, 1/(2 pi time constant), Hz."
     )
     u_bandwidth_hz: float | None = None
+    expanded_delay_s: float | None = Field(
+        default=None, description="Expanded uncertainty of the delay by its budget, s; it covers with 95.45 %."
+    )
+    expanded_bandwidth_hz: float | None = Field(
+        default=None, description="Expanded uncertainty of the bandwidth by the budget of the time constant, Hz."
+    )
 
 
 class PoseColumns(ResponseModel):

@@ -16,7 +16,8 @@ class BudgetLineResponse(ResponseModel):
 
     source: str = Field(
         description="Source of the uncertainty: `coefficients` of the fit, `model` (its form), `repeatability`, or the "
-        "quantity that a reference standard realises, such as `clock`."
+        "quantity that a reference standard realises, such as `clock`; `table_time` and `table_time_common`: time of a "
+        "reference rate that changes."
     )
     name: str = Field(description="Name of the reference standard, with the number of its certificate.")
     type: Literal["A", "B"] = Field(description="Evaluated by statistics (A) or otherwise (B).")
@@ -40,7 +41,8 @@ class BudgetResponse(ResponseModel):
     """A result with its lines (GUM)."""
 
     result: str = Field(
-        description="Quantity of the budget: corrected_rate, bias, scale_factor, or misalignment with an axis."
+        description="Quantity of the budget: corrected_rate, bias, scale_factor, misalignment with an axis, delay or "
+        "time_constant."
     )
     unit: str = Field(description="Unit of the result and of every contribution; 1: a ratio to the rate.")
     value: float | None = Field(description="Of a coefficient.")

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from labctl.errors import LabctlError, NotFound
 from labctl.json_types import JsonObject
 from labctl.recording import Recording, RecordingInfo, refuse_too_many_data_sets
-from labctl.recording.columns import READING_TIMES, VERIFICATION
+from labctl.recording.columns import RATE_TIME_U, READING_TIMES, VERIFICATION
 from labctl.store.connection.database import Database
 from labctl.store.import_parts import WHOLE_TABLE, import_parts
 from labctl.store.records import DataSetRow, MeanRow, RecordingRow
@@ -158,7 +158,8 @@ class Recordings:
         info = RecordingInfo.model_validate(head.info)
         parts = [columns for _, columns in self.iter_datasets(recording, times=times)]
         names = dict.fromkeys(name for part in parts for name in part)
-        for name in READING_TIMES & names.keys():  # a campaign of before they were stored may end with them
+        # a campaign of before they were stored may end with them
+        for name in (READING_TIMES | RATE_TIME_U) & names.keys():
             if any(name not in part for part in parts):
                 del names[name]
         columns = {name: np.concatenate([part[name] for part in parts]) for name in names}
@@ -182,6 +183,7 @@ class Recordings:
             rows = [dict(head) for head in heads.mappings()]
             channels = channels_of(connection, recording)
         is_marked = any(head["verification"] for head in rows)
+        is_timed = any("time_u_s" in (head["encoder"] or {}) for head in rows)
         for together in _by_readings(rows):
             with self._database.reading() as connection:
                 blocks = blocks_of_sets(connection, recording, [int(head["number"]) for head in together])
@@ -190,6 +192,8 @@ class Recordings:
                 columns = in_units(blocks.pop(number, []), cast(DataSetHead, head), channels, times=times)
                 if is_marked and VERIFICATION not in columns:
                     columns[VERIFICATION] = np.zeros(len(columns["dataset"]), dtype=np.int64)
+                if is_timed and "course" not in (head["encoder"] or {}):  # of a constant rate no time matters
+                    columns |= {name: np.zeros(len(columns["dataset"])) for name in sorted(RATE_TIME_U)}
                 yield number, columns
 
     def data_sets(self, recording: int) -> list[DataSetRow]:

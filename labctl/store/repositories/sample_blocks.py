@@ -12,7 +12,7 @@ from typing_extensions import TypedDict
 
 from labctl.json_types import JsonObject
 from labctl.json_types.recordings import RawChannelJson
-from labctl.recording.columns import ARRIVAL_S, DEVICE_S, READING_TIMES, VERIFICATION
+from labctl.recording.columns import ARRIVAL_S, DEVICE_S, READING_TIMES, TIME_COMMON_U_S, TIME_U_S, VERIFICATION
 from labctl.store import sample_codec
 from labctl.store.import_parts import block_row
 from labctl.store.manifests.digests import block_digests
@@ -63,6 +63,8 @@ class EncoderAngles(TypedDict):
     computed_dps: float  #: the rate that the table was taken to run at
     course: NotRequired[JsonObject]  #: of a rate that changes, as MeasuredCourse says it; the rates are then means
     is_reference: NotRequired[bool]  #: with `course`: whether the measured rates are the reference, not the commanded
+    time_u_s: NotRequired[float]  #: with `course`: standard uncertainty of the time of the reference in this data set
+    time_common_u_s: NotRequired[float]  #: the same, of what all data sets have in common
 
 
 class DataSetHead(TypedDict):
@@ -202,13 +204,17 @@ def _of_course(
     course = MeasuredCourse.of_json(document)
     period_s = float(np.median(np.diff(t_s))) if len(t_s) > 1 else 1.0
     measured, commanded = course.rates_dps(t_s, period_s)
-    return {
+    found: dict[str, NDArray[np.generic]] = {
         "table_rate_dps": measured if encoder.get("is_reference", True) else commanded,
         "table_angle_deg": course.angle_deg(t_s - period_s / 2),  # at the middle of what a reading averages
         "computed_rate_dps": commanded,
         "encoder_rate_dps": measured,
         "encoder_rate_u_dps": np.full(len(t_s), encoder["rate_u_dps"]),
     }
+    if "time_u_s" in encoder and "time_common_u_s" in encoder:  # an older version did not record them
+        found[TIME_U_S] = np.full(len(t_s), encoder["time_u_s"])
+        found[TIME_COMMON_U_S] = np.full(len(t_s), encoder["time_common_u_s"])
+    return found
 
 
 def angle_values(angles: TableAngles) -> dict[str, object]:
@@ -219,6 +225,8 @@ def angle_values(angles: TableAngles) -> dict[str, object]:
     }  # fmt: skip
     if angles.course is not None:
         encoder["course"], encoder["is_reference"] = angles.course.to_json(), angles.is_reference
+    if angles.time is not None:
+        encoder["time_u_s"], encoder["time_common_u_s"] = angles.time.own_u_s, angles.time.common_u_s
     values: dict[str, object] = {"encoder": encoder, "table_angle_deg": angles.angle_from_deg}
     return values | ({"table_rate_dps": angles.rate_dps} if angles.is_reference else {})
 

@@ -2747,6 +2747,16 @@ export interface components {
             bandwidth_hz: number | null;
             /** U Bandwidth Hz */
             u_bandwidth_hz: number | null;
+            /**
+             * Expanded Delay S
+             * @description Expanded uncertainty of the delay by its budget, s; it covers with 95.45 %.
+             */
+            expanded_delay_s: number | null;
+            /**
+             * Expanded Bandwidth Hz
+             * @description Expanded uncertainty of the bandwidth by the budget of the time constant, Hz.
+             */
+            expanded_bandwidth_hz: number | null;
         };
         /**
          * AxisUncertainty
@@ -3154,7 +3164,7 @@ export interface components {
         BudgetLineResponse: {
             /**
              * Source
-             * @description Source of the uncertainty: `coefficients` of the fit, `model` (its form), `repeatability`, or the quantity that a reference standard realises, such as `clock`.
+             * @description Source of the uncertainty: `coefficients` of the fit, `model` (its form), `repeatability`, or the quantity that a reference standard realises, such as `clock`; `table_time` and `table_time_common`: time of a reference rate that changes.
              */
             source: string;
             /**
@@ -3227,7 +3237,7 @@ export interface components {
         BudgetResponse: {
             /**
              * Result
-             * @description Quantity of the budget: corrected_rate, bias, scale_factor, or misalignment with an axis.
+             * @description Quantity of the budget: corrected_rate, bias, scale_factor, misalignment with an axis, delay or time_constant.
              */
             result: string;
             /**

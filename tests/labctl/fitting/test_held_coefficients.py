@@ -22,7 +22,7 @@ from labctl.fitting.models.held import Held, HeldCoefficient
 from labctl.fitting.numeric.drift_noise import Drift
 from labctl.fitting.numeric.least_squares import Solution
 from labctl.fitting.uncertainty import evidence_of, rate_uncertainty
-from labctl.fitting.uncertainty.sensitivity import correction_gain, error_at, response
+from labctl.fitting.uncertainty.sensitivity import correction_gain, error_at, response, u_of_fit
 from labctl.recording import Recording, RecordingInfo
 from tests.helpers.joint_recordings import CENTRE_C, TRUTH, recordings
 from tests.helpers.recordings import STARTED, points
@@ -121,7 +121,7 @@ def test_fitted_coefficients_and_corrected_rates_are_within_u_as_often_as_they_s
         seen = true * (1 + truth["scale_factor"] + truth["asymmetry"]) + truth["bias"]
         channels = Channels({"temperature_c": np.array([25.0])}, {"z": np.array([seen])})
         left = fitted.compensate({"z": np.array([seen])}, channels)["z"][0] - true
-        of_error = error_at("z", {"z": true}).u(fitted, 25.0)
+        of_error = u_of_fit(error_at("z", {"z": true}), fitted, 25.0)
         assert of_error is not None
         of_rate = of_error * correction_gain(fitted, response(fitted, {"z": true}, 25.0))[0, 0]
         inside["rate"].append(abs(left) < 2 * of_rate)

@@ -42,7 +42,7 @@ def fitted(course: RateCourse, t_s: np.ndarray, angles: np.ndarray, *, noise_deg
     at = np.arange(0.01, course.duration_s, every_s)
     at = at + rng.uniform(0, 0.002, len(at))
     read = np.interp(at, t_s, angles) + noise_deg * rng.standard_normal(len(at)) + 77.0
-    log.readings = [AngleReading(100.0 + t, angle, noise_deg, 1e-5) for t, angle in zip(at, read, strict=True)]
+    log.readings = [AngleReading(100.0 + t, angle, noise_deg, 1e-5, 1e-4) for t, angle in zip(at, read, strict=True)]
     time = CampaignTime(VirtualClock(), 0.0)
     return log.result(run, time, is_reference=True), time.of(100.0)
 

@@ -113,9 +113,10 @@ def joint_covariance(
     c = spread.shape[1]
     values = spread @ solution.values[:c] + held.spread @ held.values
     covariance = spread @ solution.covariance[:c, :c] @ spread.T
-    if solution.along_held is None:
+    h = held.columns.shape[1]
+    if solution.along_held is None or h == 0:
         return values, covariance
-    root = (spread @ solution.along_held[:c] + held.spread) * np.nan_to_num(held.u)
+    root = (spread @ solution.along_held[:c, :h] + held.spread) * np.nan_to_num(held.u)
     covariance = covariance + root @ root.T
     unknown = np.any(held.spread[:, np.isnan(held.u)] != 0, axis=1)
     covariance[unknown, :] = covariance[:, unknown] = np.nan

@@ -13,6 +13,8 @@ from labctl.errors import BadInput
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.data.rate_profile import DELAY, TIME_CONSTANT, Response
 from labctl.fitting.poses.direction_errors import Correct, move_errors
+from labctl.fitting.uncertainty import COVERAGE
+from labctl.json_types.budget import BudgetJson
 from labctl.json_types.models import AxisCoefficients
 from labctl.services.cache import UNNAMED, compute
 from labctl.services.criticism.by_motion.columns import picked, profile_columns, rest_columns, turn_columns
@@ -64,7 +66,12 @@ def _compared(store: Store, row: RecordingRow, version: CalibrationRecord | None
         turns = int(np.count_nonzero(data.channels.table_rate_dps()))
         return answer.model_copy(update={"turns": turn_columns(data, errors), "rows": turns, "of": turns})
     coefficients: Mapping[str, AxisCoefficients] = {} if version is None else version.answer["axes"]
-    responses = {axis: found for axis in coefficients if (found := _response(coefficients[axis])) is not None}
+    budgets = {} if calibration is None else calibration.document.get("response", {})
+    responses = {
+        axis: found
+        for axis in coefficients
+        if (found := _response(coefficients[axis], budgets.get(axis, {}))) is not None
+    }
     return answer.model_copy(update={
         "profile": profile_columns(data, errors, {axis: response for axis, (response, _) in responses.items()}),
         "responses": {axis: figures for axis, (_, figures) in responses.items()},
@@ -79,8 +86,11 @@ def _source(row: RecordingRow, version: CalibrationRecord | None) -> str:
     return f"version {version.version} without refitting, on recording {row.id}, {own}"
 
 
-def _response(axis: AxisCoefficients) -> tuple[Response, AxisResponse] | None:
-    """Return delay and bandwidth of an axis as a response and as figures; None where a model has neither."""
+def _response(axis: AxisCoefficients, budgets: Mapping[str, BudgetJson]) -> tuple[Response, AxisResponse] | None:
+    """Return delay and bandwidth of an axis as a response and as figures; None where a model has neither.
+
+    Expanded uncertainties are those of the budgets; a version of an older labctl, which has none, has twice u.
+    """
     delay, constant = (_single(axis, name) for name in (DELAY, TIME_CONSTANT))
     if delay is None and constant is None:
         return None
@@ -88,8 +98,19 @@ def _response(axis: AxisCoefficients) -> tuple[Response, AxisResponse] | None:
     tau_s, u_tau_s = constant or (0.0, None)
     hz = 1 / (2 * math.pi * tau_s) if tau_s > 0 else None
     u_hz = None if hz is None or u_tau_s is None else hz * u_tau_s / tau_s
-    figures = AxisResponse(delay_s=delay_s, u_delay_s=u_delay_s, bandwidth_hz=hz, u_bandwidth_hz=u_hz)
+    expanded_tau_s = _expanded(budgets.get(TIME_CONSTANT), u_tau_s)
+    figures = AxisResponse(
+        delay_s=delay_s, u_delay_s=u_delay_s, bandwidth_hz=hz, u_bandwidth_hz=u_hz,
+        expanded_delay_s=_expanded(budgets.get(DELAY), u_delay_s),
+        expanded_bandwidth_hz=None if hz is None or expanded_tau_s is None else hz * expanded_tau_s / tau_s,
+    )  # fmt: skip
     return Response(delay_s or 0.0, tau_s), figures
+
+
+def _expanded(budget: BudgetJson | None, u: float | None) -> float | None:
+    if budget is not None:
+        return budget["expanded"]
+    return None if u is None else COVERAGE * u
 
 
 def _single(axis: AxisCoefficients, name: str) -> tuple[float, float | None] | None:

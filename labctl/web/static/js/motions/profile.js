@@ -9,8 +9,6 @@ import { ofAxis, shownOf } from "./rows.js";
 /** @import { Motion } from "../../../types/api.js" */
 /** @import { Picture, PlotTrace } from "../../../types/pages.js" */
 
-const K = 2;
-
 /**
  * @param {Motion} found
  * @param {string} axis
@@ -90,14 +88,16 @@ function responseFacts(found, axis) {
   if (!has) return null;
   /**
    * @param {number | null} value
-   * @param {number | null} u
+   * @param {number | null} expanded
    * @param {number} factor
    * @param {string} unit
    */
-  const text = (value, u, factor, unit) =>
-    value === null ? "not in the model" : withUncertainty(factor * value, u === null ? null : K * factor * u, unit);
+  const text = (value, expanded, factor, unit) =>
+    value === null
+      ? "not in the model"
+      : withUncertainty(factor * value, expanded === null ? null : factor * expanded, unit);
   return factList([
-    ["Delay, k = 2", text(has.delay_s, has.u_delay_s, 1e3, "ms")],
-    ["Bandwidth, k = 2", text(has.bandwidth_hz, has.u_bandwidth_hz, 1, "Hz"), null, "at half of the power"],
+    ["Delay, 95 %", text(has.delay_s, has.expanded_delay_s, 1e3, "ms")],
+    ["Bandwidth, 95 %", text(has.bandwidth_hz, has.expanded_bandwidth_hz, 1, "Hz"), null, "at half of the power"],
   ]);
 }
