@@ -82,6 +82,7 @@ def score(result: FitResult, truth: Truth, scores: Scores, *, latitude_known: bo
 def _score_alignment(result: FitResult, truth: Truth, scores: Scores, i: int) -> None:
     """The same for the rotation of the gyro triad about one axis."""
     assert result.poses is not None
+    assert "alignment" in result.poses
     entry = result.poses["alignment"]["axes"][AXES[i]]
     scores["alignment"].append(float((entry["value"] - turned_deg(truth.gyro, truth.accel)[i]) / entry["u"]))
 
