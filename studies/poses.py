@@ -14,7 +14,7 @@ import numpy as np
 
 from labctl.fitting import FitResult, fit
 from labctl.fitting.poses.readings import AXES
-from studies.poses_simulation import GRAVITY_48_G, Session, Truth, simulate_session
+from studies.poses_simulation import GRAVITY_48_G, Array, Session, Truth, simulate_session
 
 SESSIONS = 200
 #: What is hard about a session, beside a quiet one whose latitude is known.
@@ -75,7 +75,36 @@ def score(result: FitResult, truth: Truth, scores: Scores, *, latitude_known: bo
             if j != i:
                 add("misalignment", f"misalignment_{other}", truth.gyro[i, j])
                 add("g-sensitivity", f"g_{other}", truth.per_g[i, j])
+        _score_alignment(result, truth, scores, i)
         _score_accelerometer(result, truth, scores, i, 1.0 if latitude_known else GRAVITY_48_G)
+
+
+def _score_alignment(result: FitResult, truth: Truth, scores: Scores, i: int) -> None:
+    """The same for the rotation of the gyro triad about one axis."""
+    assert result.poses is not None
+    assert "alignment" in result.poses
+    entry = result.poses["alignment"]["axes"][AXES[i]]
+    scores["alignment"].append(float((entry["value"] - turned_deg(truth.gyro, truth.accel)[i]) / entry["u"]))
+
+
+def turned_deg(gyro: Array, accelerometer: Array) -> Array:
+    """Return the rotation vector (3,), deg, from the accelerometer's frame to the gyro's, of errors (3, 3).
+
+    By numpy alone, and by the square root of a product instead of singular values: the frame of axes S is
+    (S S')^(-1/2) S. The angle is the logarithm of the rotation as a series, for angles of some degrees.
+    """
+    turned = _nearest(accelerometer) @ _nearest(gyro).T - np.eye(3)
+    log = np.zeros((3, 3))
+    for k in range(1, 16):
+        log -= (-1.0) ** k * np.linalg.matrix_power(turned, k) / k
+    return np.asarray(np.degrees(np.array([log[2, 1], log[0, 2], log[1, 0]])))
+
+
+def _nearest(errors: Array) -> Array:
+    axes = np.eye(3) + errors
+    axes = axes / np.linalg.norm(axes, axis=1)[:, None]
+    values, vectors = np.linalg.eigh(axes @ axes.T)
+    return np.asarray(vectors @ np.diag(values**-0.5) @ vectors.T @ axes)
 
 
 def _score_accelerometer(result: FitResult, truth: Truth, scores: Scores, i: int, gravity_g: float) -> None:

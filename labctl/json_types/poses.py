@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NotRequired
+
 from typing_extensions import TypedDict
 
 
@@ -44,6 +46,14 @@ class AccelerometerJson(TypedDict):
     frame: str
 
 
+class AlignmentJson(TypedDict):
+    """Rotation of the gyro triad from the accelerometer triad, as a small angle about each axis, deg."""
+
+    axes: dict[str, AccelerometerCoefficient]
+    covariance_deg2: list[list[float]]
+    definition: str
+
+
 class MoveLeftOutJson(TypedDict):
     """A move that the fit did without, and why."""
 
@@ -83,6 +93,7 @@ class PosesJson(TypedDict):
 
     rests: RestsJson
     accelerometer: AccelerometerJson
+    alignment: NotRequired[AlignmentJson]  #: left out: fitted before it was stated
     moves: MovesJson
     held_out: HeldOutMovesJson
     not_determined: str

@@ -38,6 +38,7 @@ TROUBLE: Mapping[str, str] = {
     "step.ended": "campaign {campaign} on {bench}: step {step} of {steps} ({kind}) {outcome}: {reason}",
     "dataset.closed": "campaign {campaign} on {bench}: data set {dataset} {state}: {reason}",
     "unit.dropped": "campaign {campaign} on {bench}: unit {unit} is excluded from the rest of the campaign: {reason}",
+    "live.kept": "{text}",
     "request.ended": "{method} {path} failed with status {status}; X-Request-ID {request_id} names it in the log",
 }
 SERIOUS = frozenset({"warning", "error", "critical"})

@@ -39,7 +39,7 @@ def read_recording(folder: Path) -> Recording:
     """
     from labctl.recording.data_files import read_table  # noqa: PLC0415  0.2 s that only files need
 
-    info = _read_head(folder / HEAD)
+    info = read_head(folder / HEAD)
     path = _data_file(folder, info.kind)
     columns = checked(path, info, read_table(path))
     environment = None
@@ -51,7 +51,8 @@ def read_recording(folder: Path) -> Recording:
     return Recording(info, columns, environment)
 
 
-def _read_head(path: Path) -> RecordingInfo:
+def read_head(path: Path) -> RecordingInfo:
+    """Read the head of a recording, the file HEAD of its folder. Raises BadRecording."""
     if not path.is_file():
         raise BadRecording(f"{path}: not found; name a folder with {HEAD} and a data file")
     try:

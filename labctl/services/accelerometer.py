@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.errors import BadInput, BadRecording
+from labctl.errors import BadInput, BadRecording, NotEnoughData
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.poses.at_rest.accelerometer import Accelerometer, calibrate_accelerometer, different_poses
 from labctl.fitting.poses.at_rest.adequacy import Adequacy, adequacy_of
@@ -17,6 +17,8 @@ from labctl.fitting.poses.at_rest.fewer_poses import ByFewer, Known, by_fewer_po
 from labctl.fitting.poses.at_rest.gravity import STANDARD_GRAVITY
 from labctl.fitting.poses.at_rest.rests import Rests, find_rests
 from labctl.fitting.poses.at_rest.temperature import OverTemperature, calibrate_over_temperature
+from labctl.fitting.poses.description import alignment_json, alignment_text
+from labctl.fitting.poses.fit import solve
 from labctl.fitting.poses.readings import AXES, GAP, LEAST_READINGS, PoseReadings, readings_of
 from labctl.fitting.poses.triad import UPPER
 from labctl.recording import RecordingInfo
@@ -129,7 +131,7 @@ def accelerometer_of_files(
         return temperature_response(calibrate_over_temperature(readings, rests), rests)
     if earlier is None:
         found = calibrate_accelerometer(readings, rests)
-        return _response(found, rests, adequacy_of(found, rests))
+        return with_alignment(_response(found, rests, adequacy_of(found, rests)), readings)
     known = earlier.known()
     fewer = by_fewer_poses(readings, rests, known)
     worth = adequacy_of(fewer.found, rests, known.whitened)
@@ -195,6 +197,17 @@ def _joined(parts: Sequence[PoseReadings]) -> PoseReadings:
 
 def _both(first: Array | None, then: Array | None) -> Array | None:
     return None if first is None or then is None else np.concatenate([first, then])
+
+
+def with_alignment(answer: AccelerometerResponse, readings: PoseReadings) -> AccelerometerResponse:
+    """Return a calibration with the alignment of the gyro triad, where the readings have a gyro and enough turns."""
+    if not readings.gyro_dps.any():
+        return answer
+    try:
+        found = alignment_json(solve(readings).alignment)
+    except NotEnoughData as error:
+        return answer.model_copy(update={"text": [*answer.text, f"Alignment of the gyro triad: unknown: {error}"]})
+    return answer.model_copy(update={"alignment": found, "text": [*answer.text, alignment_text(found)]})
 
 
 def temperature_response(found: OverTemperature, rests: Rests) -> AccelerometerResponse:

@@ -56,6 +56,7 @@ def _accelerometer(answer: AccelerometerResponse) -> AccelerometerParameters:
         np.array([answer.bias_g[axis].value for axis in AXES]), errors, answer.gravity_g,
         np.array(answer.covariance), max(answer.noise_density_m_s2.values()),
         None if answer.temperature is None else _temperature(answer.temperature),
+        None if answer.alignment is None else np.radians([answer.alignment["axes"][axis]["value"] for axis in AXES]),
     )  # fmt: skip
 
 

@@ -81,7 +81,7 @@ def check(
     else:
         for finding in answer.findings:
             console.print(f"{finding.part}: {finding.text}", soft_wrap=True)
-        for text in (*answer.remarks, *_of_manifests(answer)):
+        for text in (*answer.remarks, *answer.kept_readings, *_of_manifests(answer)):
             console.print(text, soft_wrap=True)
         looked = f"{answer.blocks} blocks, {answer.calibrations} calibrations, {answer.audit_rows} audit rows"
         number = len(answer.findings)

@@ -115,10 +115,10 @@ def live(
     from labctl.fitting.live import Target
     from labctl.services.commands.open import DatabaseCommands
     from labctl.services.live.assessor import BackgroundAssessor, InlineAssessor
-    from labctl.services.live.calibrate import calibrate_live, usual_folder
+    from labctl.services.live.calibrate import calibrate_live
+    from labctl.services.recordings.live_folders import kept_beside, usual_folder
 
-    printer = LivePrinter()
-    with one_clear_line(), ExitStack() as opened:
+    with one_clear_line(), LivePrinter() as printer, ExitStack() as opened:
         target = Target(target_u, target_bias_dps, poses, rest_s)
         source = (
             opened.enter_context(_gyro_source(serial, bench, driver, port, option or [], latitude_deg, speed, wire_log))
@@ -127,7 +127,8 @@ def live(
         )
         assessor = InlineAssessor() if source.is_simulated else BackgroundAssessor()  # a real stream goes on meanwhile
         folder = out or usual_folder(database, source.serial, f"{source.clock.utc():%Y%m%dT%H%M%SZ}")
-        opened.callback(printer.close)
+        for kept in kept_beside(database):
+            printer.say(kept.text)
         answer = calibrate_live(
             DatabaseCommands(database), source, target, assessor, folder, keep_folder=out is not None,
             show=printer.show, say=printer.say, attended=ending_is_an_interrupt(),

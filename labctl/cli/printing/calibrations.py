@@ -66,6 +66,8 @@ def _print_held(held: HeldJson) -> None:
 
 def print_poses(poses: PosesJson) -> None:
     """Print what a calibration by hand says beside the gyro's coefficients: the accelerometer, rests and moves."""
+    from labctl.fitting.poses.description import alignment_text
+
     rests, moves, held_out = poses["rests"], poses["moves"], poses["held_out"]
     rows = table("accelerometer", "axis", "coefficient", "unit", "value", "u", numbers=2)
     for axis, coefficients in poses["accelerometer"]["axes"].items():
@@ -73,6 +75,8 @@ def print_poses(poses: PosesJson) -> None:
             shown = rounded_to_uncertainty(entry["value"], entry["u"])
             rows.add_row(axis, name, entry["unit"], shown.value + shown.power, (shown.u or "-") + shown.power)
     console.print(rows)
+    if (alignment := poses.get("alignment")) is not None:
+        console.print(alignment_text(alignment), soft_wrap=True)
     console.print(
         f"{rests['count']} rests in {rests['poses']} poses; {moves['used']} of {moves['count']} turns used; gravity "
         f"after a turn off by {moves['residual_deg']:.2g} deg, held out by {held_out['rms_deg']:.2g} deg, "

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 from rich.control import Control
 from rich.segment import ControlType
@@ -52,8 +52,10 @@ class LivePrinter:
         self._clear()
         stderr.print(f"labctl: {text}")
 
-    def close(self) -> None:
-        """Clear the line that is open."""
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
         self._clear()
 
     def _clear(self) -> None:

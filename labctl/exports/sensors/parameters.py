@@ -82,6 +82,7 @@ class AccelerometerParameters:
     covariance: NDArray[np.float64]  #: (9, 9) of the parameters in the order of `labels`
     noise_density_m_s2: float  #: the largest of the axes, m/s2/sqrt(Hz)
     temperature: TemperatureParameters | None = None  #: None: the parameters are constants
+    gyro_turned_rad: Array | None = None  #: (3,) rotation vector of the gyro triad; None: unknown
 
     sensor = "accelerometer"
     unit = "m/s2"

@@ -30,6 +30,8 @@ def kalibr(found: AccelerometerParameters, head: Sequence[str]) -> str:
         f"LOST bias: Kalibr estimates it over time; here x, y, z = {offset} m/s2.",
         "accelerometer_random_walk is not in this file: rests of seconds do not tell it.",
     ]
+    if found.gyro_turned_rad is not None:
+        notes.append("LOST gyroscopes: C_gyro_i is by lower triangular axes, and needs the M of the gyro beside it.")
     notes += _lost_temperature(found)
     body = ["model: scale-misalignment", "accelerometers:", "  M:"]
     body += ["  - [" + ", ".join(f"{value:.12g}" for value in row) + "]" for row in lower_triangle(found.errors)]
@@ -41,12 +43,26 @@ def ros(found: AccelerometerParameters, head: Sequence[str]) -> str:
     """Return the file that the node apply_calib of imu_calib reads: corrected = SM reading - bias, in m/s2."""
     matrix = found.matrix
     notes = ["For the node apply_calib of the ROS package imu_calib: corrected = SM reading - bias, m/s2."]
-    notes += _lost_temperature(found)
+    notes += _lost_temperature(found) + _transform(found)
     body = [
         "SM: [" + ", ".join(f"{value:.12g}" for value in matrix.ravel()) + "]",
         "bias: [" + ", ".join(f"{value:.12g}" for value in matrix @ found.offset) + "]",
     ]
     return commented([*map(plain, head), *notes]) + "\n".join(body) + "\n"
+
+
+def _transform(found: AccelerometerParameters) -> list[str]:
+    """Return the static transform from the accelerometer's frame to the gyro's, as a command of tf2_ros."""
+    if found.gyro_turned_rad is None:
+        return []
+    from scipy.spatial.transform import Rotation
+
+    named = zip("xyzw", Rotation.from_rotvec(found.gyro_turned_rad).as_quat(), strict=True)
+    turn = " ".join(f"--q{name} {value:.9f}" for name, value in named)
+    return [
+        "LOST gyro triad; for rates that labctl's matrix has not corrected, which has this turn in it:",
+        f"ros2 run tf2_ros static_transform_publisher {turn} --frame-id accelerometer --child-frame-id gyro",
+    ]
 
 
 def _lost_temperature(found: AccelerometerParameters) -> list[str]:

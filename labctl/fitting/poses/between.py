@@ -44,3 +44,9 @@ def gls(
     weighted = cho_solve(factor, jacobian)
     inverse = np.linalg.inv(jacobian.T @ weighted)
     return np.asarray(inverse @ (weighted.T @ residual)), np.asarray((inverse + inverse.T) / 2)
+
+
+def gls_weights(jacobian: NDArray[np.float64], covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the matrix (p, m) by which `gls` makes its solution of the residuals."""
+    weighted = cho_solve(cho_factor(covariance), jacobian)
+    return np.asarray(np.linalg.solve(jacobian.T @ weighted, weighted.T))

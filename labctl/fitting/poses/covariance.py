@@ -71,6 +71,11 @@ def _by_parameters(
     return np.asarray(found[0] + found[1]).reshape(-1, 9)
 
 
+def by_accelerometer(moves: Moves, accelerometer: Accelerometer, equations: Equations) -> NDArray[np.float64]:
+    """Return the derivative (2m, 9) of the equations of m moves by the accelerometer's bias and errors."""
+    return _by_parameters(moves, accelerometer, _by_reading(moves, accelerometer, equations))
+
+
 def _of_each_move(moves: Moves, equations: Equations, readings_u: Array) -> NDArray[np.float64]:
     """Return the covariance (m, 2, 2) of what no two moves share."""
     white = np.einsum("mab,mca,mdb->mcd", equations.rotations.white, equations.by_turn, equations.by_turn)

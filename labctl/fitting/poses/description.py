@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from labctl.fitting.poses.alignment import Alignment
 from labctl.fitting.poses.at_rest.accelerometer import Accelerometer, different_poses
 from labctl.fitting.poses.at_rest.bias import Bias
 from labctl.fitting.poses.at_rest.rests import FACTOR, WINDOW_S, Rests
@@ -15,6 +16,7 @@ from labctl.fitting.poses.triad import UPPER
 from labctl.json_types.poses import (
     AccelerometerCoefficient,
     AccelerometerJson,
+    AlignmentJson,
     HeldOutMovesJson,
     MoveLeftOutJson,
     MovesJson,
@@ -30,12 +32,16 @@ NOT_DETERMINED = (
     "the mounting of the body axes in the case; turns about the vertical, which leave gravity where it is; g-squared "
     "sensitivity and nonlinearity of the scale factors"
 )
+ALIGNMENT = (
+    "rotation vector from the accelerometer's frame to the gyro's, about the accelerometer's axes; the frame of a "
+    "triad is the nearest orthonormal one to the directions of its axes"
+)
 WRONG = "does not agree with the other moves"
 
 
 def describe(
     readings: PoseReadings, rests: Rests, accelerometer: Accelerometer, bias: Bias, every: Moves, moves: Moves,
-    gyro: Gyroscope, applied_rms_dps: float,
+    gyro: Gyroscope, alignment: Alignment, applied_rms_dps: float,
 ) -> PosesJson:  # fmt: skip
     """Return all that is said of a calibration; `moves` are those of `every` that can be used.
 
@@ -44,6 +50,7 @@ def describe(
     return {
         "rests": _rests(rests, accelerometer, bias),
         "accelerometer": accelerometer_json(accelerometer, known=readings.info.latitude_deg is not None),
+        "alignment": alignment_json(alignment),
         "moves": _moves(every, moves, gyro, applied_rms_dps),
         "held_out": _held_out(gyro),
         "not_determined": NOT_DETERMINED,
@@ -82,6 +89,24 @@ def accelerometer_json(accelerometer: Accelerometer, *, known: bool) -> Accelero
         "residual_g": accelerometer.residual_g,
         "frame": FRAME,
     }
+
+
+def alignment_json(alignment: Alignment) -> AlignmentJson:
+    """Return the alignment by axis, in deg."""
+    angles, u = np.degrees(alignment.angles_rad), np.degrees(alignment.u_rad)
+    return {
+        "axes": {
+            str(axis): {"value": float(angles[i]), "u": float(u[i]), "unit": "deg"} for i, axis in enumerate(AXES)
+        },
+        "covariance_deg2": (alignment.covariance * np.degrees(1.0) ** 2).tolist(),
+        "definition": ALIGNMENT,
+    }
+
+
+def alignment_text(found: AlignmentJson) -> str:
+    """Return an alignment in one sentence, with U = 2 u."""
+    angles = ", ".join(f"{each['value']:.3f} +- {2 * each['u']:.3f}" for each in found["axes"].values())
+    return f"Gyro triad turned from the accelerometer triad about x, y, z by {angles} deg (U, k = 2)."
 
 
 def _moves(every: Moves, moves: Moves, gyro: Gyroscope, applied_rms_dps: float) -> MovesJson:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
@@ -11,6 +13,7 @@ from labctl.fitting.effects import Reference, Term
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.fitted_model import AxisFit, FittedModel
 from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.poses.alignment import Alignment, alignment_of
 from labctl.fitting.poses.at_rest.accelerometer import Accelerometer, calibrate_accelerometer
 from labctl.fitting.poses.at_rest.bias import Bias, bias_of
 from labctl.fitting.poses.at_rest.rests import Rests, find_rests
@@ -37,12 +40,34 @@ UNITS = ("deg/s", "1", "1", "1", "deg/s/g", "deg/s/g", "deg/s/g")
 NO_THERMOMETER_C = 25.0
 
 
+@dataclass(frozen=True)
+class Solved:
+    """A calibration by hand, step by step."""
+
+    rests: Rests
+    accelerometer: Accelerometer
+    bias: Bias
+    every: Moves
+    moves: Moves  #: those that can be used
+    gyro: Gyroscope
+
+    @property
+    def alignment(self) -> Alignment:
+        """Of the gyro triad to the accelerometer triad."""
+        return alignment_of(self.moves, self.accelerometer, self.gyro)
+
+
 def fit_poses(recording: Recording) -> PosesFit:
     """Fit bias, scale factors, misalignments and g-sensitivities to a recording in poses.
 
     Raises BadInput for a recording of another motion, NotEnoughData where rests or turns do not determine them.
     """
     readings = readings_of(recording)
+    return _result(readings, solve(readings))
+
+
+def solve(readings: PoseReadings) -> Solved:
+    """Calibrate accelerometer and gyro by readings in poses. Raises NotEnoughData as `fit_poses`."""
     rests = find_rests(readings)
     accelerometer = calibrate_accelerometer(readings, rests)
     force_g = corrected(rests.accel_g, accelerometer.errors, accelerometer.bias_g)
@@ -56,7 +81,7 @@ def fit_poses(recording: Recording) -> PosesFit:
     require_determined(readings.info.serial, moves, start, noise)
     gyro = fit_gyroscope(moves, accelerometer, bias, readings_u)
     require_determined(readings.info.serial, moves.take(gyro.used), gyro.equations.take(gyro.used), gyro.total_of_used)
-    return _result(readings, rests, accelerometer, bias, every, moves, gyro)
+    return Solved(rests, accelerometer, bias, every, moves, gyro)
 
 
 def _moves(readings: PoseReadings, rests: Rests, accelerometer: Accelerometer, bias: Bias) -> Moves:
@@ -70,11 +95,9 @@ def _moves(readings: PoseReadings, rests: Rests, accelerometer: Accelerometer, b
     return moves_between(readings, rests, readings.gyro_dps - force_g @ bias.per_g.T)
 
 
-def _result(
-    readings: PoseReadings, rests: Rests, accelerometer: Accelerometer, bias: Bias, every: Moves, moves: Moves,
-    gyro: Gyroscope,
-) -> PosesFit:  # fmt: skip
-    used = gyro.used
+def _result(readings: PoseReadings, solved: Solved) -> PosesFit:
+    rests, accelerometer, bias, gyro = solved.rests, solved.accelerometer, solved.bias, solved.gyro
+    every, moves, used = solved.every, solved.moves, gyro.used
     seconds = moves.duration_s[used]
     raw = uncorrected_errors(moves_between(readings, rests).take(every.usable), accelerometer)
     exported = corrected(readings.gyro_dps, gyro.errors, bias.mean_dps)
@@ -92,7 +115,9 @@ def _result(
         span,
         _rates(moves.take(used), bias, gyro.errors),
         dict(zip(AXES, bias.solutions, strict=True)),
-        describe(readings, rests, accelerometer, bias, every, moves, gyro, rms_dps(applied[used], seconds)),
+        describe(
+            readings, rests, accelerometer, bias, every, moves, gyro, solved.alignment, rms_dps(applied[used], seconds)
+        ),
     )
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from labctl.config import default_database
 from labctl.errors import BadInput, LabctlError
+from labctl.services.recordings.live_folders import kept_beside
 from labctl.services.schemas.admin import (
     BackupNote,
     BackupResponse,
@@ -56,6 +57,7 @@ def check_database(
         keys=list(found.keys),
         anchor=None if found.head is None else str(found.head),
         remarks=list(found.remarks),
+        kept_readings=[each.text for each in kept_beside(location)],
         findings=[FindingResponse(part=each.part, text=each.text) for each in found.findings],
     )
 

@@ -20,6 +20,7 @@ from labctl.fitting.poses.at_rest.accelerometer import PARAMETERS as ACCELEROMET
 from labctl.fitting.poses.at_rest.gravity import STANDARD_GRAVITY
 from labctl.fitting.poses.triad import UPPER
 from labctl.fitting.uncertainty.budget import BudgetLine, budget_of
+from labctl.json_types.poses import AlignmentJson
 from labctl.services.schemas.documents.certificates import (
     CertificateOrder,
     OrderedAccelerometer,
@@ -34,6 +35,10 @@ from labctl.store import Store
 #: Parameters of an accelerometer that an earlier version has given, where it was used too.
 KNOWN_BEFORE = 6
 FORCE = "reading = bias + (1 + E) force; E: scale factors on the diagonal, misalignment ij of axis i by force along j"
+ALIGNED = (
+    "gyro triad about each axis: rotation vector from the frame of the accelerometer to that of the gyro, each frame "
+    "the nearest orthonormal one to the axes of its triad"
+)
 FIELD = "field = soft iron (reading - hard iron); soft iron symmetric, in the axes of the sensor"
 NOT_FORCE = (
     "Not measured, and not stated: other temperatures, larger forces, nonlinearity, vibration, and the change from one "
@@ -122,6 +127,7 @@ def accelerometer_result(
         value = ratio * (own + was.value) - own
         named = f"scale factor {AXES[i]}" if i == j else f"misalignment {name}"
         found.append(_coefficient(named, value, "1", (ratio * u[place], freedom), (own + value) * relative_u))
+    found += [] if result.alignment is None else _aligned(result.alignment, freedom)
     found += [] if result.temperature is None else _over_temperature(result.temperature, ratio, freedom)
     reference = SensorReference(
         quantity="local gravity", value=ordered.gravity_m_s2, u=ordered.gravity_u_m_s2, unit="m/s^2",
@@ -138,8 +144,17 @@ def accelerometer_result(
     converted = (
         f"The fit took the local gravity as {used:.7g} m/s²; the coefficients here are for that of the reference."
     )
-    notes = (FORCE, holds_for, NOT_FORCE if result.temperature is None else NOT_FORCE_WARM)
+    formula = FORCE if result.alignment is None else f"{FORCE}; {ALIGNED}"
+    notes = (formula, holds_for, NOT_FORCE if result.temperature is None else NOT_FORCE_WARM)
     return _result("accelerometer", version, ordered, included_by, reference, found, notes, [converted])
+
+
+def _aligned(found: AlignmentJson, freedom: float) -> list[SensorCoefficient]:
+    """Return the rotation of the gyro triad; gravity's size has no part in it."""
+    return [
+        _coefficient(f"gyro triad about {axis}", each["value"], each["unit"], (each["u"], freedom), 0.0)
+        for axis, each in found["axes"].items()
+    ]
 
 
 def _over_temperature(warm: AccelerometerTemperature, ratio: float, freedom: float) -> list[SensorCoefficient]:

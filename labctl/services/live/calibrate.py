@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import re
 import shutil
 from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path
 
-from labctl.config import default_database
 from labctl.errors import LabctlError
 from labctl.fitting.live import Target
 from labctl.fitting.models.presets import POSES
@@ -22,7 +20,6 @@ from labctl.services.live.source import LiveSource
 from labctl.services.live.spool import Spool
 from labctl.services.schemas.calibrations import FitRequest, FitResponse
 from labctl.services.schemas.live import LiveResponse
-from labctl.store import is_url
 
 #: Says one sentence to the person at the terminal.
 Say = Callable[[str], None]
@@ -40,19 +37,19 @@ def calibrate_live(
     version is also fitted where the target is not reached. Raises LabctlError, InstrumentError; where readings were
     taken, `say` has said where they are.
     """
-    spool = Spool(folder)
-    try:
-        with attended:
-            ending = run_live(source, target, spool, assessor, show, say)
-        imported = commands.execute(IMPORT_RECORDING, RecordingFolder(folder))
-    except BaseException:
-        if spool.readings:
-            say(f"the {spool.readings} readings so far are kept; import them with `labctl import {folder}`")
-        raise
-    finally:
-        assessor.close()
-    if not keep_folder:
-        shutil.rmtree(folder, ignore_errors=True)
+    with Spool(folder) as spool:  # in use until its readings are in the database, and it is removed
+        try:
+            with attended:
+                ending = run_live(source, target, spool, assessor, show, say)
+            imported = commands.execute(IMPORT_RECORDING, RecordingFolder(folder))
+        except BaseException:
+            if spool.readings:
+                say(f"the {spool.readings} readings so far are kept; import them with `labctl import {folder}`")
+            raise
+        finally:
+            assessor.close()
+        if not keep_folder:
+            shutil.rmtree(folder, ignore_errors=True)
     fitted: FitResponse | None = None
     refused = ""
     if ending.state.done or fits_anyway():
@@ -62,20 +59,6 @@ def calibrate_live(
         except LabctlError as error:
             refused = str(error)
     return _answer(imported.serial, ending, imported.recording, fitted, refused)
-
-
-def usual_folder(database: str | None, serial: str, stamp: str) -> Path:
-    """Return where the readings of a live calibration are until they are in the database: beside it.
-
-    What of a serial number cannot be in the name of a file is a line there.
-    """
-    serial = re.sub(r"[^\w.-]", "_", serial)
-    location = database or default_database()
-    if is_url(location):
-        from platformdirs import user_data_path  # noqa: PLC0415  the command line starts in a tenth of a second
-
-        return Path(user_data_path("labctl")) / f"live-{serial}-{stamp}"
-    return Path(location).absolute().parent / f"live-{serial}-{stamp}"
 
 
 def _answer(serial: str, ending: Ending, recording: int, fitted: FitResponse | None, refused: str) -> LiveResponse:

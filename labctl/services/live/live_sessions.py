@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import contextvars
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
-from pathlib import Path
 
 from instruments.clock import Clock, SystemClock
 from instruments.errors import InstrumentError
@@ -19,7 +18,6 @@ from labctl.acting_user import actor
 from labctl.errors import BadInput, Conflict, LabctlError
 from labctl.fitting.live import Target
 from labctl.log import get_logger
-from labctl.recording.files import HEAD
 from labctl.recording.line_stream import LineDecoder
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.listeners import ChangeListeners
@@ -27,7 +25,7 @@ from labctl.services.commands.command import LocalExecutor
 from labctl.services.commands.context import CommandContext
 from labctl.services.commands.service_control import NO_BENCH, ServiceControl
 from labctl.services.live.assessor import BackgroundAssessor, InlineAssessor
-from labctl.services.live.calibrate import calibrate_live, usual_folder
+from labctl.services.live.calibrate import calibrate_live
 from labctl.services.live.feeds import network_feed
 from labctl.services.live.gyro_source import GyroSource
 from labctl.services.live.line_source import LineSource, info_of
@@ -35,6 +33,7 @@ from labctl.services.live.session_record import SessionRecord
 from labctl.services.live.source import LiveSource
 from labctl.services.live.watched_source import EndingSource
 from labctl.services.planning.loading import with_drivers
+from labctl.services.recordings.live_folders import folders_of, kept_readings, usual_folder
 from labctl.services.schemas.live import (
     LiveEndRequest,
     LiveHistoryResponse,
@@ -66,7 +65,10 @@ class LiveSessions:
         self._ending: EndingSource | None = None
         self._thread: threading.Thread | None = None
         self._stops = False
-        self._kept = _kept_folders(store)
+        kept = kept_readings(store.location, store)
+        self._kept = folders_of(kept)
+        for each in kept:
+            log.warning("live.kept", text=each.text)
 
     def listen(self, listener: Callable[[], None]) -> Callable[[], None]:
         """Call `listener` at every change; returns the function that ends this. A listener may not block."""
@@ -146,7 +148,7 @@ class LiveSessions:
             )  # fmt: skip
         finally:
             _give_back(runner)
-            self._kept = _kept_folders(self._store)
+            self._kept = folders_of(kept_readings(self._store.location, self._store))
 
     def end(self, request: LiveEndRequest) -> LiveStateResponse:
         """End the one that runs, and wait until its recording is stored. Raises Conflict where none runs."""
@@ -201,9 +203,3 @@ class LiveSessions:
 def _give_back(runner: BenchRunner | None) -> None:
     if runner is not None:
         runner.live.take_back()
-
-
-def _kept_folders(store: Store) -> Sequence[str]:
-    """Return folders beside the database that hold readings which are in no database."""
-    place: Path = usual_folder(store.location, "", "").parent
-    return sorted(str(head.parent) for head in place.glob(f"live-*/{HEAD}"))

@@ -1,14 +1,14 @@
 """The recording of a live calibration on disk, from its first reading on.
 
 It is a recording in the interchange format at every moment: what a process that was killed leaves is read by
-`labctl import FOLDER`.
+`labctl import FOLDER`. Its folder is locked while it is in use.
 """
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, Self
 
 import numpy as np
 
@@ -16,12 +16,14 @@ from labctl.errors import BadInput
 from labctl.recording import RecordingInfo
 from labctl.recording.files import HEAD, head_of
 from labctl.services.live.source import Block
-
-SAMPLES = "samples.csv"
+from labctl.services.recordings.live_folders import SAMPLES, lock, unlock
 
 
 class Spool:
-    """A folder that is made with the first block; raises BadInput where it exists already and is not empty."""
+    """A folder that is made with the first block, and is in use from then until the end of the context.
+
+    Raises BadInput where it exists already and is not empty.
+    """
 
     def __init__(self, folder: Path) -> None:
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
@@ -32,6 +34,16 @@ class Spool:
         self._info: RecordingInfo | None = None
         self._names: tuple[str, ...] = ()
         self._file: BinaryIO | None = None
+        self._handle: int | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+        if self._handle is not None:
+            unlock(self._handle)
+            self._handle = None
 
     def add(self, info: RecordingInfo, block: Block) -> None:
         """Write a block down; it is on the disk when this returns. Raises OSError."""
@@ -66,6 +78,7 @@ class Spool:
 
     def _open(self, info: RecordingInfo, block: Block) -> None:
         self.folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        self._handle = lock(self.folder)
         self._info, self._names = info, tuple(block.columns)
         (self.folder / HEAD).write_bytes(head_of(info))
         self._file = (self.folder / SAMPLES).open("wb")

@@ -112,6 +112,11 @@ class CheckResponse(ResponseModel):
     keys: list[str] = Field(default=[], description="Fingerprints (SHA-256) of the keys that signatures name.")
     anchor: str | None = Field(default=None, description="End of the chain, LENGTH:HASH; keep it in another place.")
     remarks: list[str] = Field(default=[], description="What was not checked, and why.")
+    kept_readings: list[str] = Field(
+        default=[],
+        description="Readings that live calibrations left beside the database and that are in no recording, each with "
+        "the command that imports it; no damage.",
+    )
     findings: list[FindingResponse]
 
 

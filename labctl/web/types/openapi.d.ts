@@ -2095,6 +2095,8 @@ export interface components {
             earlier?: components["schemas"]["EarlierVersion"] | null;
             /** @description Over temperature; null: it was not asked for, and the parameters are constants. */
             temperature?: components["schemas"]["AccelerometerTemperature"] | null;
+            /** @description Rotation of the gyro triad from the accelerometer triad, deg; null: no gyro, turns that do not determine it, or a fit over temperature or with an earlier version. */
+            alignment?: components["schemas"]["AlignmentJson"] | null;
             /** Text */
             text: string[];
         };
@@ -2180,6 +2182,8 @@ export interface components {
             earlier: components["schemas"]["EarlierVersion"] | null;
             /** @description Over temperature; null: it was not asked for, and the parameters are constants. */
             temperature: components["schemas"]["AccelerometerTemperature"] | null;
+            /** @description Rotation of the gyro triad from the accelerometer triad, deg; null: no gyro, turns that do not determine it, or a fit over temperature or with an earlier version. */
+            alignment: components["schemas"]["AlignmentJson"] | null;
             /** Text */
             text: string[];
         };
@@ -2377,6 +2381,20 @@ export interface components {
             calibrations: components["schemas"]["AffectedCalibration"][];
             /** Text */
             text: string[];
+        };
+        /**
+         * AlignmentJson
+         * @description Rotation of the gyro triad from the accelerometer triad, as a small angle about each axis, deg.
+         */
+        AlignmentJson: {
+            /** Axes */
+            axes: {
+                [key: string]: components["schemas"]["AccelerometerCoefficient"];
+            };
+            /** Covariance Deg2 */
+            covariance_deg2: number[][];
+            /** Definition */
+            definition: string;
         };
         /**
          * AllanJson
@@ -8254,6 +8272,7 @@ export interface components {
         PosesJson: {
             rests: components["schemas"]["RestsJson"];
             accelerometer: components["schemas"]["AccelerometerJson"];
+            alignment?: components["schemas"]["AlignmentJson"];
             moves: components["schemas"]["MovesJson"];
             held_out: components["schemas"]["HeldOutMovesJson"];
             /** Not Determined */

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -88,3 +89,15 @@ def test_what_a_format_has_not_is_refused() -> None:
         written(MAGNETOMETER, [], "json", 1, None)
     with pytest.raises(BadInput, match="--export ros takes no --device-id"):
         written(ACCELEROMETER, [], "ros", None, 7)
+
+
+def test_ros_gets_the_turn_of_the_gyro_triad_and_kalibr_is_told_that_it_is_lost() -> None:
+    turned = replace(ACCELEROMETER, gyro_turned_rad=np.array([0.0, 0.0, 0.02]))
+    ros = written(turned, ["head"], "ros", None, None)
+    assert (
+        "# ros2 run tf2_ros static_transform_publisher --qx 0.000000000 --qy 0.000000000 --qz 0.009999833 "
+        "--qw 0.999950000 --frame-id accelerometer --child-frame-id gyro" in ros.splitlines()
+    )
+    assert yaml.safe_load(ros) == yaml.safe_load(written(ACCELEROMETER, ["head"], "ros", None, None))
+    assert "LOST gyroscopes" in written(turned, ["head"], "kalibr", None, None)
+    assert "LOST gyro" not in written(ACCELEROMETER, ["head"], "kalibr", None, None)

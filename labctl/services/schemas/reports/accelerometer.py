@@ -6,6 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from labctl.json_types.poses import AlignmentJson
 from labctl.services.schemas.base import ResponseModel
 from labctl.services.schemas.reports.magnetometer import Estimate
 
@@ -60,5 +61,10 @@ class AccelerometerResponse(ResponseModel):
     )
     temperature: AccelerometerTemperature | None = Field(
         default=None, description="Over temperature; null: it was not asked for, and the parameters are constants."
+    )
+    alignment: AlignmentJson | None = Field(
+        default=None,
+        description="Rotation of the gyro triad from the accelerometer triad, deg; null: no gyro, turns that do not "
+        "determine it, or a fit over temperature or with an earlier version.",
     )
     text: list[str]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,16 +15,21 @@ from dcclib.validation import SchematronValidator
 from labctl.certificates.document import Certificate, SensorResult
 from labctl.certificates.readable import readable_certificate
 from labctl.errors import BadInput, NotFound
+from labctl.recording.files import write_recording
 from labctl.services.accelerometer import Source as ForceSource
 from labctl.services.accelerometer import accelerometer_of_files
 from labctl.services.certificates.issue import issue
 from labctl.services.certificates.missing import MissingFacts
+from labctl.services.certificates.sensors import accelerometer_result
 from labctl.services.magnetometer import Source as FieldSource
 from labctl.services.magnetometer import magnetometer_of_file
+from labctl.services.schemas.documents.certificates import OrderedAccelerometer
 from labctl.services.schemas.sensors import AccelerometerRequest, MagnetometerRequest
-from labctl.services.sensor_versions import keep_accelerometer, keep_magnetometer, measured_data
+from labctl.services.sensor_versions import keep_accelerometer, keep_magnetometer, measured_data, one_accelerometer
 from labctl.store import Store, open_store
 from studies.accelerometer_simulation import TrueUnit, poses_at_temperatures
+from studies.poses import turned_deg
+from studies.poses_simulation import Session, simulate_session
 from tests.helpers.certificates import AT, SERIAL, add_version, request
 from tests.helpers.magnetic_turns import FIELD_UT, HARD_IRON_UT, SOFT_IRON, fields, readings_of
 from tests.helpers.poses_at_rest import BIAS_G, ERRORS, poses, readings_in, write_readings
@@ -168,3 +174,33 @@ def test_a_field_that_was_not_constant_is_no_calibration(store: Store, tmp_path:
     newest = store.sensor_versions.get(SERIAL, "magnetometer").version
     with pytest.raises(BadInput, match="was not constant"):
         issue(store, SERIAL, add_version(store), request(magnetometer=MAGNETOMETER | {"version": newest}), AT)
+
+
+def test_the_alignment_of_the_gyro_triad_is_stated_with_its_uncertainty(tmp_path: Path) -> None:
+    folder = tmp_path / "turned"
+    recording, truth = simulate_session(3, Session(rests=22, latitude_deg=48.0))
+    write_recording(replace(recording, info=recording.info.model_copy(update={"serial": SERIAL})), folder)
+    found = accelerometer_of_files([folder], ForceSource())
+    assert found.alignment is not None
+    assert "Gyro triad turned from the accelerometer triad about x, y, z by" in found.text[-1]
+    with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
+        add_version(store)
+        data = measured_data([folder], ForceSource().text)
+        keep_accelerometer(store, SERIAL, AccelerometerRequest(data=data, result=found, by="Ada"), AT)
+        stored = one_accelerometer(store, SERIAL, 1)
+        assert stored.result.alignment == found.alignment
+    ordered = OrderedAccelerometer.model_validate(ACCELEROMETER)
+    stated = {each.name: each for each in accelerometer_result(stored, ordered, "Ada").coefficients}
+    for axis, true in zip("xyz", turned_deg(truth.gyro, truth.accel), strict=True):
+        each = stated[f"gyro triad about {axis}"]
+        assert (each.value, each.unit) == (found.alignment["axes"][axis]["value"], "deg")
+        assert abs(each.value - true) < 2 * each.expanded
+        assert 0 < each.expanded < 0.03
+
+
+def test_a_recording_whose_turns_do_not_tell_the_alignment_says_so(tmp_path: Path) -> None:
+    recording, _ = simulate_session(3, Session(rests=22, latitude_deg=48.0, full_scale_dps=40.0))
+    write_recording(recording, tmp_path / "turned")
+    found = accelerometer_of_files([tmp_path / "turned"], ForceSource())
+    assert found.alignment is None
+    assert found.text[-1].startswith("Alignment of the gyro triad: unknown: HAND-1: ")

@@ -15,10 +15,11 @@ from labctl.errors import BadInput, BenchBusy, Conflict, StoreError
 from labctl.fitting.live import PoseRequest
 from labctl.fitting.live.directions import DIRECTIONS, Direction
 from labctl.services.campaigns.bench_runner import BenchRunner
-from labctl.services.live import calibrate, live_sessions
+from labctl.services.live import live_sessions
 from labctl.services.live.assessor import InlineAssessor
 from labctl.services.live.live_sessions import UNWATCHED_S, LiveSessions
 from labctl.services.planning.loading import load_bench
+from labctl.services.recordings.live_folders import usual_folder
 from labctl.services.schemas.campaigns import CampaignRequest
 from labctl.services.schemas.live import LiveEndRequest, LiveRequest, LiveStateResponse
 from labctl.stop.latch import StopRequest
@@ -275,4 +276,4 @@ def test_nothing_to_end(service: Service) -> None:
 
 
 def test_the_folder_of_any_serial_number_is_beside_the_database() -> None:
-    assert calibrate.usual_folder("/data/lab.sqlite", "IMU #1/..", "1") == Path("/data/live-IMU__1_..-1")
+    assert usual_folder("/data/lab.sqlite", "IMU #1/..", "1") == Path("/data/live-IMU__1_..-1")

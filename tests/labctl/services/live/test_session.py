@@ -20,9 +20,10 @@ from labctl.recording.line_stream import LineDecoder
 from labctl.services.commands import open as opening
 from labctl.services.commands.open import DatabaseCommands
 from labctl.services.live.assessor import BackgroundAssessor, InlineAssessor
-from labctl.services.live.calibrate import calibrate_live, usual_folder
+from labctl.services.live.calibrate import calibrate_live
 from labctl.services.live.line_source import LineSource
 from labctl.services.live.source import Block, StreamEnded
+from labctl.services.recordings.live_folders import usual_folder
 from labctl.services.schemas.live import LiveResponse
 from labctl.store import open_store
 from tests.helpers.turned_unit import TurnedUnit
