@@ -89,7 +89,7 @@ def _source(row: RecordingRow, version: CalibrationRecord | None) -> str:
 def _response(axis: AxisCoefficients, budgets: Mapping[str, BudgetJson]) -> tuple[Response, AxisResponse] | None:
     """Return delay and bandwidth of an axis as a response and as figures; None where a model has neither.
 
-    Expanded uncertainties are those of the budgets; a version of an older labctl, which has none, has twice u.
+    Expanded uncertainties are those of the budgets; a version that has none, by an older version of labctl, has 2 u.
     """
     delay, constant = (_single(axis, name) for name in (DELAY, TIME_CONSTANT))
     if delay is None and constant is None:
