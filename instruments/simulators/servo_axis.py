@@ -1,4 +1,4 @@
-"""The axis of a simulated servo table, as its controller moves and measures it, and its replies one after the other."""
+"""The axis of a simulated servo table, as its controller moves and measures it."""
 
 from __future__ import annotations
 
@@ -48,29 +48,3 @@ class ServoAxis:
     def rate_dps(self, t_s: float) -> float:
         """Return the rate by the encoder."""
         return self.sign * self.motion.rate_dps(t_s) + RATE_NOISE_DPS * float(self._rng.standard_normal())
-
-
-class QueuedReplies:
-    """Replies that are due at a time, in order: a command that takes long holds up those after it."""
-
-    def __init__(self) -> None:
-        self._replies: list[tuple[float, bytes]] = []
-
-    def reply(self, data: bytes, due_s: float) -> None:
-        """Send a reply at a time, and after all before it."""
-        last_s = self._replies[-1][0] if self._replies else due_s
-        self._replies.append((max(due_s, last_s), data))
-
-    def transmit(self, t_s: float) -> bytes:
-        """Return the replies that are due."""
-        due = b"".join(data for due_s, data in self._replies if due_s <= t_s)
-        self._replies = [reply for reply in self._replies if reply[0] > t_s]
-        return due
-
-    def skip(self, t_s: float) -> None:
-        """Lose the replies that are due."""
-        self.transmit(t_s)
-
-    def next_byte_s(self, t_s: float) -> float | None:  # noqa: ARG002  the times of all replies are known
-        """Return when the next reply is due."""
-        return min((due_s for due_s, _ in self._replies), default=None)

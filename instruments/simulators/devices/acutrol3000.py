@@ -15,6 +15,7 @@ from instruments.bench_config import part_of
 from instruments.protocols.acutrol3000 import commands as acl
 from instruments.protocols.acutrol3000.messages import Command, ParseError, commands_of
 from instruments.protocols.acutrol3000.settings import Acutrol3000Settings
+from instruments.simulators.links.replies import TimedReplies
 from instruments.simulators.physics.oscillator import Sine
 from instruments.simulators.physics.servo_motion import ServoMotion
 from instruments.simulators.physics.world import number
@@ -51,10 +52,11 @@ class _Axis:
     software: int = 0
 
 
-class SimulatedAcutrol3000:
+class SimulatedAcutrol3000(TimedReplies):
     """One controller; `[simulation] table` sets its rate error, its encoder's noise, latency and way of replying."""
 
     def __init__(self, setup: InstrumentSetup) -> None:
+        super().__init__()
         table = part_of(setup.instrument("table"), Acutrol3000Settings)
         self._world, self._faults = setup.world, setup.faults
         said = setup.world.settings.table
@@ -69,7 +71,6 @@ class SimulatedAcutrol3000:
         self._rng = np.random.default_rng([setup.world.settings.seed, setup.world.settings.noise_seed, 3000])
         self.axis = _Axis()
         self._line = bytearray()
-        self._replies: list[tuple[float, bytes]] = []
         self._errors: list[str] = []
         self._handlers: dict[str, Callable[[Command, float], str]] = {
             "*idn?": lambda _command, _t_s: IDENTITY,
@@ -98,20 +99,6 @@ class SimulatedAcutrol3000:
                 message, self._line = self._line.decode("latin-1"), bytearray()
                 self._reply(*self._execute(message, t_s), t_s)
 
-    def transmit(self, t_s: float) -> bytes:
-        """Return the replies that are due."""
-        due = b"".join(data for due_s, data in self._replies if due_s <= t_s)
-        self._replies = [reply for reply in self._replies if reply[0] > t_s]
-        return due
-
-    def skip(self, t_s: float) -> None:
-        """Lose the replies that are due."""
-        self.transmit(t_s)
-
-    def next_byte_s(self, t_s: float) -> float | None:  # noqa: ARG002  the times of all replies are known
-        """Return when the next reply is due."""
-        return min((due_s for due_s, _ in self._replies), default=None)
-
     def trip(self, t_s: float, *, hardware: int = 0, software: int = 0) -> None:
         """Break the interlock: the axis is shut down, and the status is frozen."""
         self.axis.interlock, self.axis.mode = acl.FAULT, acl.OFF
@@ -122,7 +109,7 @@ class SimulatedAcutrol3000:
         if self._faults.trigger(["lost_reply"], t_s) is not None:
             return
         due_s = t_s + self._reply_s + self._jitter_s * float(self._rng.exponential())
-        self._replies.append((due_s, text.encode() + acl.LINE_END if self._lines else acl.packed(error, text)))
+        self.send_at(due_s, text.encode() + acl.LINE_END if self._lines else acl.packed(error, text))
 
     def _execute(self, message: str, t_s: float) -> tuple[int, str]:
         """Execute a message; returns the error of the first command that was refused, or the replies to its queries."""

@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
-from instruments.simulators.servo_axis import QueuedReplies, ServoAxis
+from instruments.simulators.links.replies import TimedReplies
+from instruments.simulators.servo_axis import ServoAxis
 from instruments.simulators.setup import InstrumentSetup
 
 DONE, INVALID, FAULT = "%", "!", "#"
@@ -18,7 +19,7 @@ LONGEST = 1024
 Act = Callable[[re.Match[str], float], tuple[str, float]]
 
 
-class SimulatedEnsemble(QueuedReplies):
+class SimulatedEnsemble(TimedReplies):
     """One controller, its axis by number or name; a line feed ends a command."""
 
     def __init__(self, setup: InstrumentSetup) -> None:
@@ -50,7 +51,7 @@ class SimulatedEnsemble(QueuedReplies):
         else:
             said, done_s = self._execute(text, t_s)
         if not lost:
-            self.reply(f"{said}\n".encode(), done_s + self.axis.reply_s)
+            self.send_in_order(done_s + self.axis.reply_s, f"{said}\n".encode())
 
     def _execute(self, text: str, t_s: float) -> tuple[str, float]:
         """Return the reply and when the command is done."""

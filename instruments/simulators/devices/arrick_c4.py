@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from instruments.bench_config import part_of
 from instruments.protocols import arrick_c4_lines as lines
 from instruments.protocols.arrick_c4_settings import ArrickC4Settings
+from instruments.simulators.links.replies import TimedReplies
 from instruments.simulators.physics.world import number
 from instruments.simulators.setup import InstrumentSetup
 
@@ -23,16 +23,11 @@ LINE_ENDS = b"\r\n"
 ACKNOWLEDGED = "a\r\n"
 
 
-@dataclass
-class _Reply:
-    due_s: float
-    data: bytes
-
-
-class SimulatedC4:
+class SimulatedC4(TimedReplies):
     """A C4 controller with one motor, on the world's table."""
 
     def __init__(self, setup: InstrumentSetup) -> None:
+        super().__init__()
         table = part_of(setup.instrument("table"), ArrickC4Settings)
         self._world, self._faults = setup.world, setup.faults
         self._byte_s = BITS_PER_BYTE / table.baudrate
@@ -49,7 +44,6 @@ class SimulatedC4:
         self.passed_on_s: Callable[[float], float] = self._at_tick_s  #: when bytes that were sent reach the computer
         self.missed_steps = 0  #: the next move is so much shorter than what was asked for
         self._line = bytearray()
-        self._replies: list[_Reply] = []
 
     def receive(self, data: bytes, t_s: float) -> None:
         """Take bytes; a command is executed when its CR or LF arrives."""
@@ -60,24 +54,10 @@ class SimulatedC4:
             elif len(self._line) < MAX_COMMAND_BYTES:
                 self._line.append(byte)
 
-    def transmit(self, t_s: float) -> bytes:
-        """Return the replies that are due."""
-        due = [reply for reply in self._replies if reply.due_s <= t_s]
-        self._replies = [reply for reply in self._replies if reply.due_s > t_s]
-        return b"".join(reply.data for reply in due)
-
-    def skip(self, t_s: float) -> None:
-        """Lose the replies that are due."""
-        self.transmit(t_s)
-
-    def next_byte_s(self, t_s: float) -> float | None:  # noqa: ARG002  the times of all replies are known
-        """Return when the next reply is due."""
-        return min((reply.due_s for reply in self._replies), default=None)
-
     def _reply(self, text: str, t_s: float) -> float:
         """Queue a reply; returns when its last byte is sent."""
         due_s = t_s + len(text) * self._byte_s
-        self._replies.append(_Reply(self.passed_on_s(due_s), text.encode("ascii")))
+        self.send_at(self.passed_on_s(due_s), text.encode("ascii"))
         return due_s
 
     def _at_tick_s(self, due_s: float) -> float:
@@ -94,7 +74,7 @@ class SimulatedC4:
         elif body == lines.STATE:
             self._reply(BUSY if self._world.table.moving(t_s) else lines.IDLE, t_s)
         elif body == lines.ABORT:
-            self._replies.clear()
+            self.forget_replies()
             self._world.table.abort(t_s)
             self._reply(lines.ACCEPTED, t_s)
         elif body in {lines.HOME, lines.HOME_BOTH}:
@@ -132,4 +112,4 @@ class SimulatedC4:
 
     def _finish(self, end_s: float, t_s: float) -> None:
         if self._faults.trigger(["lost_reply"], t_s) is None:
-            self._replies.append(_Reply(self.passed_on_s(end_s + self._byte_s), lines.FINISHED.encode("ascii")))
+            self.send_at(self.passed_on_s(end_s + self._byte_s), lines.FINISHED.encode("ascii"))

@@ -6,21 +6,17 @@ The layout of signals is that of the DBC file format: a start bit is the least s
 
 from __future__ import annotations
 
-import math
 import re
 import struct
-import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-
-import numpy as np
-from numpy.typing import NDArray
 
 from instruments.bench_config import part_of
 from instruments.protocols.can.frames import BUS_OFF, ERROR, FRAME_BYTES, CanFrame, packed
 from instruments.protocols.can.settings import CanSettings
 from instruments.protocols.can.units import unit_of_text
 from instruments.protocols.stream_formats.units import UNITS
+from instruments.simulators.sampled_unit import SampledUnit
 from instruments.simulators.setup import InstrumentSetup
 
 _MESSAGE = re.compile(r"^BO_ (\d+) (\w+) *: *(\d+)")
@@ -115,14 +111,13 @@ def read_messages(dbc: str) -> dict[str, PackedMessage]:
     return found
 
 
-class SimulatedCanUnit:
+class SimulatedCanUnit(SampledUnit):
     """Sends the messages of a cycle per sampling interval of the world's unit, the first one first."""
 
     def __init__(self, setup: InstrumentSetup) -> None:
         settings = part_of(setup.gyro, CanSettings)
-        self._settings, self._unit, self._faults, self._world = settings, setup.unit, setup.faults, setup.world
+        self._settings = settings
         self._messages = read_messages(settings.dbc)
-        self._axes, self._rate_hz = tuple(settings.axes), self._unit.sample_rate_hz
         counters = () if settings.counter is None else settings.counter.signals
         status = {path: _good_value(self._signal(path), given[0]) for path, given in settings.status.items()}
         self._status, self._counters = status, counters
@@ -134,23 +129,14 @@ class SimulatedCanUnit:
             names & (cyclic | {path.partition(".")[0] for path in counters}), key=lambda each: each != first
         )
         self._rare = sorted((held | names) - set(self._cyclic))
-        self._most = setup.port_buffer_bytes // (FRAME_BYTES * (len(self._cyclic) + 1))
-        simulation = self._world.settings  # of the unit's own noise no number is taken
-        self._rng = np.random.default_rng(
-            [simulation.seed, simulation.noise_seed, zlib.crc32(setup.gyro.serial.encode())]
-        )
-        self._sent = 0  #: index of the newest cycle sent
-
-    def receive(self, data: bytes, t_s: float) -> None:
-        """Take frames without a reply."""
+        most = setup.port_buffer_bytes // (FRAME_BYTES * (len(self._cyclic) + 1))
+        super().__init__(setup, tuple(settings.axes), most)
 
     def transmit(self, t_s: float) -> bytes:
         """Return the frames of the cycles up to `t_s`."""
-        newest = self._newest(t_s)
-        if newest <= self._sent:
+        index = self._due(t_s)
+        if not len(index):
             return b""
-        index = np.arange(max(self._sent + 1, newest - self._most + 1), newest + 1)
-        self._sent = newest
         if (gap := self._faults.trigger(["counter_gap"], t_s)) is not None:
             index = index[gap.value :]
         values = self._values(index)
@@ -166,42 +152,9 @@ class SimulatedCanUnit:
             out = [[packed(CanFrame(ERROR | BUS_OFF, bytes(8)))]]
         return b"".join(frame for cycle in out for frame in cycle)
 
-    @property
-    def newest_s(self) -> float:
-        """When the newest cycle was complete, s."""
-        return self._sent / self._rate_hz
-
-    def skip(self, t_s: float) -> None:
-        """Lose the cycles up to `t_s`."""
-        self._sent = max(self._sent, self._newest(t_s))
-
-    def next_byte_s(self, t_s: float) -> float | None:  # noqa: ARG002  the unit never waits
-        """Return when the next cycle is complete."""
-        return (self._sent + 1) / self._rate_hz
-
-    def _newest(self, t_s: float) -> int:
-        return math.floor(t_s * self._rate_hz + 1e-9)
-
     def _signal(self, path: str) -> PackedSignal:
         message, _, name = path.partition(".")
         return self._messages[message].signals[name]
-
-    def _values(self, index: NDArray[np.int64]) -> dict[str, NDArray[np.float64]]:
-        """Return channel -> its values, (n,) in the unit of a recording."""
-        sample = self._unit.sample(index / self._rate_hz)
-        force = self._world.gravity(index / self._rate_hz)
-        if self._unit.truth.accel_noise_g > 0:
-            force = force + self._unit.truth.accel_noise_g * self._rng.standard_normal(force.shape)
-        found: dict[str, NDArray[np.float64]] = {
-            "temperature_c": sample.temperature_c[:, 0],
-            "supply_v": sample.supply_v,
-        }
-        for column, axis in enumerate(self._axes):
-            found[f"gyro_{axis}"] = sample.rate_dps[:, column]
-            found[f"temperature_{axis}_c"] = sample.temperature_c[:, column]
-        for column, body_axis in enumerate("xyz"):
-            found[f"accel_{body_axis}_g"] = force[:, column]
-        return found
 
     def _cycle(self, index: int, values: dict[str, float]) -> list[bytes]:
         """Return the frames of one cycle; those behind the first come in any order."""

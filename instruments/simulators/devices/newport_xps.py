@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
-from instruments.simulators.servo_axis import QueuedReplies, ServoAxis
+from instruments.simulators.links.replies import TimedReplies
+from instruments.simulators.servo_axis import ServoAxis
 from instruments.simulators.setup import InstrumentSetup
 
 #: A function and its arguments: nothing else ends a request.
@@ -16,7 +17,7 @@ MAX_DPS, MAX_DPS2, INITIALISATION_S = 720.0, 4000.0, 1.5
 LONGEST = 4096
 
 
-class SimulatedXps(QueuedReplies):
+class SimulatedXps(TimedReplies):
     """One controller; each link to it runs one function after the other."""
 
     def __init__(self, setup: InstrumentSetup) -> None:
@@ -49,7 +50,8 @@ class SimulatedXps(QueuedReplies):
 
     def _run(self, name: str, arguments: list[str], t_s: float) -> None:
         if name == "GroupKill":  # it ends what another link waits for, which was closed
-            self._busy_until_s, self._replies = t_s, []
+            self._busy_until_s = t_s
+            self.forget_replies()
         begin_s = max(t_s, self._busy_until_s)
         stalls = self.faults.trigger(["stall"], t_s) is not None
         if stalls and self.status == JOGGING:
@@ -60,7 +62,7 @@ class SimulatedXps(QueuedReplies):
         code, value, done_s = (RANGE, "", begin_s) if refused else self._result(name, arguments, begin_s)
         self._busy_until_s = done_s
         if not lost:
-            self.reply(f"{code},{value},EndOfAPI".encode(), done_s + self.axis.reply_s)
+            self.send_in_order(done_s + self.axis.reply_s, f"{code},{value},EndOfAPI".encode())
 
     def _result(self, name: str, arguments: list[str], t_s: float) -> tuple[int, str, float]:
         """Return the error code, what is returned, and when the function is done."""
