@@ -13,9 +13,9 @@ from labctl.fitting.uncertainty.budget import Budget, BudgetLine, budget_of
 from labctl.fitting.uncertainty.conditions import BenchConditions
 from labctl.fitting.uncertainty.evaluated_lines import coefficient_line, model_line, repeatability_line, slope_line
 from labctl.fitting.uncertainty.rate_vector import require_law_of_rate_and_temperature
-from labctl.fitting.uncertainty.reference_time import time_lines
 from labctl.fitting.uncertainty.sensitivity import OwnCoefficient, coefficients_of
 from labctl.fitting.uncertainty.standard_lines import Sensitivities, standard_lines
+from labctl.fitting.uncertainty.time_lines import time_lines
 from labctl.fitting.uncertainty.use import AxisEvidence
 
 

@@ -22,9 +22,9 @@ from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.uncertainty.budget import Budget, BudgetLine, budget_of
 from labctl.fitting.uncertainty.conditions import BenchConditions
 from labctl.fitting.uncertainty.evaluated_lines import coefficient_line, model_line, repeatability_line
-from labctl.fitting.uncertainty.reference_time import time_lines
 from labctl.fitting.uncertainty.sensitivity import correction_gain, error_at, response
 from labctl.fitting.uncertainty.standard_lines import Sensitivities, SourceLines, standard_lines
+from labctl.fitting.uncertainty.time_lines import time_lines
 from labctl.fitting.uncertainty.use import AxisEvidence
 
 #: Largest rate, deg/s, and temperature, deg C, that are taken for a gyro's.

@@ -160,16 +160,15 @@ def _aligned(found: AlignmentJson, freedom: float) -> list[SensorCoefficient]:
 def _over_temperature(warm: AccelerometerTemperature, ratio: float, freedom: float) -> list[SensorCoefficient]:
     """Return the coefficients of temperature; the uncertainty of gravity is too small a share of them to count."""
     found = []
+    u = iter(np.sqrt(np.diag(np.array(warm.covariance)))[ACCELEROMETER_PARAMETERS:].tolist())
     for name, unit, terms, factor in (
         ("bias", "m/s^2", warm.bias_g, STANDARD_GRAVITY), ("scale factor", "1", warm.scale_factor, ratio)
     ):  # fmt: skip
-        for axis in AXES:
-            for power, each in enumerate(terms[axis], start=1):
-                per = f"{unit}/K" + (f"^{power}" if power > 1 else "")
-                fit = (factor * (each.u or 0.0), freedom)
-                found.append(
-                    _coefficient(f"{name} {axis}, power {power} of temperature", factor * each.value, per, fit, 0.0)
-                )
+        for power in range(1, len(terms[AXES[0]]) + 1):
+            per = f"{unit}/K" + (f"^{power}" if power > 1 else "")
+            for axis in AXES:
+                value, fit = factor * terms[axis][power - 1].value, (factor * next(u), freedom)
+                found.append(_coefficient(f"{name} {axis}, power {power} of temperature", value, per, fit, 0.0))
     return found
 
 
