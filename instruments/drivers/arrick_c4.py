@@ -197,7 +197,25 @@ class ArrickC4:
         return self._learn_homing(took_s, wait)
 
     def _learn_homing(self, took_s: float, wait: Wait) -> HomeCheck | None:
-        """Learn the homing from home and from places away from it; returns the check of a homing that took `took_s`."""
+        """Learn the homing, again where it scatters so much that the check would see nothing; keeps the most certain.
+
+        Returns the check of a homing that took `took_s`, or that of the turns that it was learned from.
+        """
+        for _ in range(checks.LEARNING_ATTEMPTS):
+            found = self._learned(wait)
+            if found is None or isinstance(found, HomeCheck):
+                return found
+            if self._homing is None or found.u_steps < self._homing.u_steps:
+                self._homing = found
+            if self._homing.u_steps <= self.settings.home_limit_steps:
+                break
+        return None if self._homing is None else self._homing.check(took_s, self.settings)
+
+    def _learned(self, wait: Wait) -> checks.Homing | HomeCheck | None:
+        """Return the homing from home and from places away from it, or the check of the turns where steps were missed.
+
+        None where the homing does not begin where the table is.
+        """
         at_home_s = [self._timed_home(), self._timed_home()]
         part = self.settings.steps_per_turn // checks.LEARNING_PARTS
         away, away_s = [part * n for n in checks.LEARNING_TURNS], []
@@ -205,13 +223,10 @@ class ArrickC4:
             self._turn_by(steps, wait)
             away_s.append(self._timed_home())
         homing = checks.learned_homing(at_home_s, away, away_s, checks.reply_u_s(self.settings))
-        if homing.step_s <= 0:  # the homing does not begin where the table is
+        if homing.step_s <= 0:
             return None
         learning = homing.check_learning(away_s, self.settings)
-        if learning.is_missing:
-            return learning
-        self._homing = homing
-        return homing.check(took_s, self.settings)
+        return learning if learning.is_missing else homing
 
     def is_moving(self) -> bool:
         """Get whether the table moves (`!1rs`, `0` when idle); raises NoReply, LinkError."""

@@ -24,6 +24,8 @@ LARGEST_DEVIATION = 0.2
 #: Turns, in parts of a whole one, from which the homing is learned, and the rate, deg/s.
 LEARNING_PARTS, LEARNING_TURNS = 16, (1, 2, 3)
 SLOW_DPS = 22.5
+#: A homing that scatters by more than the limit of the check is learned so often: one may have been late, or short.
+LEARNING_ATTEMPTS = 3
 POLL_S = 0.5
 NO_SPEED = (
     "no constant rate: the C4's speed command is not public; set speed_template of the table in the bench file from "

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from instruments.interfaces.table import HomeCheck, OpenLoopTable
+from instruments.interfaces.table import COVERAGE, HomeCheck, OpenLoopTable
 from procedures.contracts.errors import StepFailed, TableStopped
 from procedures.contracts.journal import ClockRun, DataSetState, Event
 from procedures.contracts.steps import CheckHome, MeasureClock
@@ -164,6 +164,12 @@ def check_home(context: ExecutionContext, step: CheckHome) -> dict[str, float]:
         for number in since:
             context.recorder.journal.dataset_closed(number, DataSetState.PARTIAL, reason)
         raise TableStopped(reason, {"missed_steps": found.missed_steps, "u_steps": found.u_steps})
+    if found.u_steps > found.limit_steps:
+        text = (
+            f"{table.name}: the check for missed steps is blind below {COVERAGE * found.u_steps:.0f} steps, limit "
+            f"{found.limit_steps:g} steps, because homings from one place scatter (u = {found.u_steps:.1f} steps)"
+        )
+        context.recorder.event(warning("home_uncertain", f"{text}; {QUIETEN}", table.name))
     if found.is_doubtful or found.is_missing:
         text = (
             f"{table.name}: home seems {found.missed_steps:g} steps from where it was left, limit "

@@ -220,6 +220,46 @@ def test_steps_that_are_missed_while_the_homing_is_learned_are_found(stand: Make
     assert (again.learning, again.missed_steps) == (False, 0)
 
 
+def with_long_homings(stand: Any, *which: int) -> list[float]:
+    """Let these homings take 0.24 s longer, as where pulses are lost; returns the list of all, which grows."""
+    table, homings = stand.world.table, []
+    home = table.home
+
+    def long(t_s: float) -> float:
+        homings.append(t_s)
+        return float(home(t_s)) + 0.24 * (len(homings) in which)
+
+    table.home = long
+    return homings
+
+
+@pytest.mark.parametrize("which", [2, 3])
+def test_a_homing_at_home_that_takes_long_once_does_not_blind_the_check(stand: Make, which: int) -> None:
+    """The homing of the check is the first; it is learned from the next two at home, and three away from it."""
+    s = stand(table=CHECKED)
+    table = s.bench.table
+    table.home()
+    homings = with_long_homings(s, which)
+    found = table.check_home(waiting(s))
+    assert found.u_steps < found.limit_steps
+    assert len(homings) == 11  # learned twice
+    simulated(s).missed_steps = 40
+    turned(table, 50.0)
+    again = table.check_home(waiting(s))
+    assert (again.is_missing, again.missed_steps) == (True, 40)
+
+
+def test_homings_that_scatter_each_time_end_with_an_uncertainty_that_says_so(stand: Make) -> None:
+    s = stand(table=CHECKED)
+    table = s.bench.table
+    table.home()
+    homings = with_long_homings(s, 2, 7, 12)
+    found = table.check_home(waiting(s))
+    assert found.u_steps > 10 * found.limit_steps
+    assert not found.is_missing
+    assert len(homings) == 16
+
+
 def test_after_an_abort_the_place_is_not_known(stand: Make) -> None:
     s = stand(table=CHECKED)
     table = s.bench.table

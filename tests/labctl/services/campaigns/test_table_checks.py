@@ -12,6 +12,7 @@ import pytest
 
 from instruments.bench_config import BenchFile, read_bench
 from instruments.clock import VirtualClock
+from instruments.drivers.arrick_c4 import ArrickC4
 from instruments.drivers.resolution import resolve
 from instruments.standards import MEASURED_STEP_CLOCK
 from labctl.fitting import fit
@@ -194,6 +195,29 @@ def test_missed_steps_end_the_campaign_and_the_data_sets_since_the_last_check(tm
     assert states == ["complete"] * 5 + ["partial"] * 5
     (reasons,) = rows(location, "select distinct reason from data_sets where state = 'partial'")
     assert "steps were missed" in reasons[0]
+
+
+def test_a_check_for_missed_steps_that_sees_little_says_how_much(tmp_path: Path) -> None:
+    """Homings from one place scatter by more than the limit, however often the homing is learned."""
+    location = str(tmp_path / "lab.sqlite")
+    with open_store(location, write=True) as store:
+        prepared = prepare(
+            store, RECIPE.replace("[24, 26]", "[25]"), checked_bench(), VirtualClock(), clip=False
+        )  # fmt: skip
+        table = prepared.bench.table
+        assert isinstance(table, ArrickC4)
+        timed, calls = table._timed_home, []
+
+        def scattered() -> float:
+            calls.append(0.1 * (len(calls) % 5 == 1))
+            return timed() + calls[-1]
+
+        table._timed_home = scattered  # type: ignore[method-assign]
+        assert run(store, prepared).state == "done"
+    (said,) = {text for (text,) in rows(location, "select message from events where kind = 'home_uncertain'")}
+    assert "the check for missed steps is blind below" in said
+    assert "limit 2 steps, because homings from one place scatter (u = " in said
+    assert "end other work on this computer" in said
 
 
 def test_a_unit_that_sends_angles_instead_of_rates_is_found_by_turning_the_table(tmp_path: Path) -> None:
