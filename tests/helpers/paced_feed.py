@@ -14,6 +14,8 @@ Columns = Mapping[str, Any]
 class PacedFeed:
     """Blocks of `block_s` as CSV lines: as many as were allowed, then all that are asked for once it runs free."""
 
+    may_lose = False
+
     name = "paced feed"
 
     def __init__(self, seed: int = 1, block_s: float = 0.5, change: Callable[[Columns], Columns] = lambda c: c) -> None:

@@ -20,6 +20,7 @@ class LineFeed(Protocol):
     """Bytes that arrive without being asked for."""
 
     name: str
+    may_lose: bool  #: whether a line that was sent may not arrive, and the next one does
 
     def open(self) -> None:
         """Open it; raises BadInput."""
@@ -36,6 +37,8 @@ class LineFeed(Protocol):
 
 class DescriptorFeed:
     """An open file descriptor, such as standard input."""
+
+    may_lose = False
 
     def __init__(self, descriptor: int, name: str) -> None:
         self._descriptor, self.name = descriptor, name
@@ -63,6 +66,8 @@ class DescriptorFeed:
 
 class TcpFeed:
     """A server that sends lines to every client."""
+
+    may_lose = False
 
     def __init__(self, address: str) -> None:
         """Take tcp://HOST:PORT; raises BadInput for another form."""

@@ -72,7 +72,7 @@ class LineSource:
 
     def _lost(self, columns: Mapping[str, NDArray[np.generic]]) -> int:
         """Return how many readings of a feed that may lose some are missing, by the times that the lines carry."""
-        if not getattr(self._feed, "may_lose", False) or "t_s" not in columns:
+        if not self._feed.may_lose or "t_s" not in columns:
             return 0
         t_s = np.concatenate([self._newest_s, np.asarray(columns["t_s"], dtype=np.float64)])
         self._newest_s, steps = t_s[-1:], np.diff(t_s)

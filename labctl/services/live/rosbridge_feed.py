@@ -25,6 +25,8 @@ QUOTED = 200
 class RosbridgeFeed:
     """A subscription to one topic of a rosbridge server."""
 
+    may_lose = False
+
     def __init__(self, address: str, topic: str) -> None:
         """Take ws://HOST:PORT or wss://HOST:PORT, and the name of a topic of type sensor_msgs/Imu."""
         self._address, self._topic = address, topic

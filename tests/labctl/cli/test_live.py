@@ -23,6 +23,8 @@ NAMES = ("t_s", *(f"gyro_{a}" for a in "xyz"), *(f"accel_{a}_g" for a in "xyz"))
 class TurnedFeed:
     """Lines of a unit that is turned from face to edge to face, whatever is asked for."""
 
+    may_lose = False
+
     name = "standard input"
 
     def __init__(self, blocks: int) -> None:

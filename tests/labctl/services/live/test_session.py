@@ -167,6 +167,8 @@ def test_a_folder_that_exists_is_refused_before_the_stream_begins(bench: Bench) 
 class Feed:
     """Lines that arrive in parts; None ends the stream, b"" is silence."""
 
+    may_lose = False
+
     name = "feed"
 
     def __init__(self, parts: Iterator[bytes | None]) -> None:
