@@ -41,8 +41,6 @@ def jump_of(values: Array, noise: float, code_step: float) -> int | None:
 def _apart(values: Array) -> Array:
     """Return lines through the readings from a row on less those before it, midway, (n - 2 READINGS + 1,)."""
     x = np.arange(READINGS) - (READINGS - 1) / 2
-    after = 1.0 / READINGS - x * (READINGS / 2) / float(
-        x @ x
-    )  # the value of a fitted line half a step before the first
+    after = 1.0 / READINGS - x * (READINGS / 2) / float(x @ x)  # of a line, its value half a step before the first
     weights = np.concatenate([-after[::-1], after])
     return np.asarray(np.correlate(values - float(np.median(values)), weights, mode="valid"))
