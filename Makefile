@@ -69,10 +69,10 @@ $(VENV)/.documented: requirements/docs.txt $(VENV)/.installed
 
 # Versions move only here. The lock files carry hashes and no registry address.
 lock:
-	uv pip compile pyproject.toml --extra build --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --quiet -o requirements/run.txt
-	uv pip compile pyproject.toml --extra build --extra dev --extra docs --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --quiet -c requirements/run.txt -o requirements/dev.txt
-	uv pip compile pyproject.toml --extra build --extra study --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --quiet -c requirements/run.txt -o requirements/study.txt
-	uv pip compile pyproject.toml --extra build --extra docs --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --quiet -c requirements/run.txt -o requirements/docs.txt
+	uv pip compile pyproject.toml --extra lab --extra build --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --quiet -o requirements/run.txt
+	uv pip compile pyproject.toml --extra lab --extra build --extra dev --extra docs --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --quiet -c requirements/run.txt -o requirements/dev.txt
+	uv pip compile pyproject.toml --extra lab --extra build --extra study --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --quiet -c requirements/run.txt -o requirements/study.txt
+	uv pip compile pyproject.toml --extra lab --extra build --extra docs --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --quiet -c requirements/run.txt -o requirements/docs.txt
 
 clean:
 	rm -rf docs/_build $(VENV) node_modules .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

@@ -21,7 +21,7 @@ from httpx_sse import ServerSentEvent, connect_sse
 
 from instruments.clock import Clock, SystemClock
 from labctl.calibration import Calibration, read_calibration
-from labctl.certification import warn
+from labctl.calibration.certification import warn
 from labctl.errors import CalibrationWithdrawn
 from labctl.recording.files import recording_parts
 from labctl.service_connection import TIMEOUT_S, ServiceConnection, ServiceRefused, json_of, refusal

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from instruments.clock import Clock, SystemClock
 from labctl.calibration import Calibration, read_calibration
-from labctl.certification import LeftOutWarning, warn
+from labctl.calibration.certification import LeftOutWarning, warn
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import BODY_AXES
 from labctl.fitting.data.temperature.channel import STAND_IN_C

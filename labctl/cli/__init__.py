@@ -3,6 +3,8 @@
 import os
 import sys
 
+from labctl.lazy_imports import install
+
 # Fits are many small solves, for which threads only get in each other's way; to be set before numpy is loaded.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
@@ -23,6 +25,10 @@ def main() -> None:
 
         first_of_all()
         keep_memory()
-    from labctl.cli.app import main as run
-
+    try:
+        from labctl.cli.app import main as run
+    except ModuleNotFoundError as error:  # labctl was installed as a library for robots
+        if str(error.name).startswith("labctl"):
+            raise
+        sys.exit(f"labctl: the command line needs {error.name}, which is not installed; run {install('lab')}")
     run()

@@ -6,13 +6,15 @@ A key that is `NotRequired` is left out, not null, where it says nothing. All nu
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING, TypeAlias
 
-from pydantic import JsonValue
+if TYPE_CHECKING:  # these types are read where no document is validated
+    from pydantic import JsonValue
 
 #: A document whose form is known to those who wrote it; who reads it checks it against a model.
 JsonObject = Mapping[str, object]
 
 #: The same, whose values were read from JSON.
-JsonDocument = Mapping[str, JsonValue]
+JsonDocument: TypeAlias = "Mapping[str, JsonValue]"
 
 __all__ = ["JsonDocument", "JsonObject"]

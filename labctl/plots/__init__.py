@@ -3,8 +3,6 @@
 Everything here takes the answers as JSON, so the command line, a page and a saved file show the same plots.
 """
 
-from labctl.plots.papers import paper_figure, paper_html
-from labctl.plots.registry import Picture, pictures_of
-from labctl.plots.report import report_html
+from labctl.lazy_imports import lazy_names
 
-__all__ = ["Picture", "paper_figure", "paper_html", "pictures_of", "report_html"]
+__getattr__, __dir__, __all__ = lazy_names(__name__, __file__)

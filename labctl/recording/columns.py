@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from labctl.recording.info import Motion, RecordingInfo
+if TYPE_CHECKING:
+    from labctl.recording.info import Motion, RecordingInfo
 
 Kind = Literal["integer", "number", "text"]
 

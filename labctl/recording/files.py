@@ -10,11 +10,11 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import BinaryIO, Literal
 
-import tomli_w
 from pydantic import ValidationError
 
 from instruments.toml_documents import read_toml, shown
 from labctl.errors import BadRecording
+from labctl.extras import needs_extra
 from labctl.recording.checks import checked, checked_environment
 from labctl.recording.info import RecordingInfo
 from labctl.recording.recording import Recording
@@ -37,9 +37,9 @@ def read_recording(folder: Path) -> Recording:
     Raises BadRecording, which names the file, the column, the row (1 is the first row below the header) and what was
     expected.
     """
-    from labctl.recording.data_files import read_table  # noqa: PLC0415  0.2 s that only files need
-
     info = read_head(folder / HEAD)
+    with needs_extra("lab", f"{folder}: reading a recording"):
+        from labctl.recording.data_files import read_table  # noqa: PLC0415  0.2 s that only files need
     path = _data_file(folder, info.kind)
     columns = checked(path, info, read_table(path))
     environment = None
@@ -83,7 +83,8 @@ def write_recording(recording: Recording, folder: Path, file_format: FileFormat 
 
     The folder appears whole or not at all. Raises BadRecording when it exists already.
     """
-    from labctl.recording.data_files import write_table  # noqa: PLC0415  as above
+    with needs_extra("lab", f"{folder}: writing a recording"):
+        from labctl.recording.data_files import write_table  # noqa: PLC0415  as above
 
     if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
         raise BadRecording(f"{folder}: exists already and is not empty; name a new folder")
@@ -107,6 +108,9 @@ def write_recording(recording: Recording, folder: Path, file_format: FileFormat 
 
 def head_of(info: RecordingInfo) -> bytes:
     """Return the content of recording.toml; what is not known is left out."""
+    with needs_extra("lab", "writing a recording"):
+        import tomli_w  # noqa: PLC0415  as above
+
     unstated = {name for name in ("standards", "thermometer", "unread", "left_out") if not getattr(info, name)}
     if info.date_known:
         unstated.add("date_known")

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.recording.info import Motion
 from labctl.recording.motions.turn_means import turned_points
 from labctl.recording.motions.windows import kept_windows, usual_step_s, white_std_of_profile, window_labels
 from labctl.recording.quantisation import steps_columns
 from labctl.recording.recording import Columns, Recording
 from labctl.recording.spread import LEAST_FOR_SPECTRUM, white_std
+
+if TYPE_CHECKING:
+    from labctl.recording.info import Motion
 
 #: Columns that one data set has one value of: its first reading's.
 FIRST = (

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.recording.info import RecordingInfo
+if TYPE_CHECKING:
+    from labctl.recording.info import RecordingInfo
 
 #: One column: numbers, whole numbers or texts, (n,).
 Column = NDArray[np.generic]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from labctl.calibration import Calibration, read_calibration
-from labctl.certification import LeftOutWarning
+from labctl.calibration.certification import LeftOutWarning
 from labctl.compensator import Compensator
 from labctl.errors import BadCalibrationFile, BadInput
 from labctl.recording.data_files import read_table

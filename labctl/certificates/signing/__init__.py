@@ -12,9 +12,9 @@ from pathlib import Path
 
 from labctl.config import SIGN_CERTIFICATE_VARIABLE, SIGN_KEY_VARIABLE, SIGN_PASSWORD_VARIABLE, variable
 from labctl.errors import BadInput
+from labctl.extras import needs_extra
 from labctl.private_keys import SCHEME, KeyUse, refuse_open_key
 
-NEEDS = "pip install 'labctl[sign]'"
 SIGNING_KEY = KeyUse("signing key", SIGN_KEY_VARIABLE)
 PASSWORD_FILE = KeyUse("password file", SIGN_PASSWORD_VARIABLE)
 
@@ -45,7 +45,5 @@ def signing_settings() -> SigningSettings:
 @contextmanager
 def libraries(purpose: str) -> Iterator[None]:
     """Import modules of this package inside; raises BadInput where a library of the extra is missing."""
-    try:
+    with needs_extra("sign", purpose):
         yield
-    except ModuleNotFoundError as error:
-        raise BadInput(f"{purpose} needs {error.name}, which is not installed; run {NEEDS}") from error

@@ -1,7 +1,5 @@
 """Calibration while a person turns the unit: what the readings so far determine, and which pose is missing."""
 
-from labctl.fitting.live.calibration import LiveCalibration
-from labctl.fitting.live.state import LiveCoefficient, LiveState, PoseRequest
-from labctl.fitting.live.target import MOST_POSES, Target
+from labctl.lazy_imports import lazy_names
 
-__all__ = ["MOST_POSES", "LiveCalibration", "LiveCoefficient", "LiveState", "PoseRequest", "Target"]
+__getattr__, __dir__, __all__ = lazy_names(__name__, __file__)

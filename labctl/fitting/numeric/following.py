@@ -10,10 +10,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import repeat
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dtbtrs
 
 from labctl.fitting.numeric.arrays import Array
 
@@ -230,14 +230,7 @@ def _lane(keep: float) -> tuple[Array, float]:
 
 
 def _one_by_one(keep: Array | float, pull: Array, start: float) -> Array:
-    """Return x with x_k = keep_k x_(k-1) + pull_k, (n,), from `start`; writes over `pull`."""
-    band = np.empty((2, len(pull)), order="F")
-    band[0] = 1.0
-    if isinstance(keep, np.ndarray):
-        band[1, :-1] = -keep[1:]
-        pull[0] += keep[0] * start
-    else:
-        band[1] = -keep
-        pull[0] += keep * start
-    found, _ = dtbtrs(band, pull[:, None], uplo="L", diag="U", overwrite_b=True)
-    return np.asarray(found[:, 0])
+    """Return x with x_k = keep_k x_(k-1) + pull_k, (n,), from `start`."""
+    keeps = keep.tolist() if isinstance(keep, np.ndarray) else repeat(keep)
+    steps = zip(keeps, pull.tolist(), strict=False)
+    return np.fromiter((start := kept * start + pulled for kept, pulled in steps), dtype=np.float64, count=len(pull))

@@ -1,6 +1,5 @@
 """Readings as lines of text that arrive one by one: JSON objects, or CSV with or without a header."""
 
-from labctl.recording.line_stream.decoder import DecodedLines, LineDecoder
-from labctl.recording.line_stream.layout import LineLayout, layout_of
+from labctl.lazy_imports import lazy_names
 
-__all__ = ["DecodedLines", "LineDecoder", "LineLayout", "layout_of"]
+__getattr__, __dir__, __all__ = lazy_names(__name__, __file__)

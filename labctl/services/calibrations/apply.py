@@ -11,7 +11,7 @@ import pyarrow as pa
 import pyarrow.csv as pacsv
 import pyarrow.parquet as pq
 
-from labctl.certification import CalibrationWarning
+from labctl.calibration.certification import CalibrationWarning
 from labctl.compensator import Compensator
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import BODY_AXES

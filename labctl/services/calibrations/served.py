@@ -9,7 +9,7 @@ from functools import lru_cache
 from typing import Final
 
 from labctl.calibration import with_certification
-from labctl.certification import Certification, State
+from labctl.calibration.certification import Certification, State
 from labctl.errors import NotFound
 from labctl.exports import Loss
 from labctl.services.calibrations.certification import version_in_force

@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import roots_genlaguerre
 
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.following import Steps, lag_shares
@@ -126,8 +125,10 @@ def rounded_plays(width_k: float) -> list[tuple[float, float]]:
     hysteresis); four plays are its Gauss quadrature. Unlike a state that moves with every step of the temperature, a
     play stands still in the noise of a thermometer.
     """
-    nodes, weights = roots_genlaguerre(ROUNDED_PLAYS, 1.0)
-    return [(float(width_k * node), float(weight)) for node, weight in zip(nodes, weights, strict=True)]
+    k = np.arange(ROUNDED_PLAYS)  # Golub and Welsch 1969: the nodes are eigenvalues of the polynomials' recurrence
+    beside = np.sqrt(k[1:] * (k[1:] + 1.0))
+    nodes, vectors = np.linalg.eigh(np.diag(2.0 * k + 2.0) + np.diag(beside, 1) + np.diag(beside, -1))
+    return [(float(width_k * node), float(first**2)) for node, first in zip(nodes, vectors[0], strict=True)]
 
 
 def _slope(temperature_c: Array, over_s: float) -> Array:

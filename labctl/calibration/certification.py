@@ -6,12 +6,15 @@ It is part of the file's hash. The calibration itself is the same whether it is 
 
 from __future__ import annotations
 
+import json
 import sys
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Literal, cast, get_args
+
+from labctl.canonical_json import with_own_hash
 
 State = Literal["in-force", "superseded", "revoked"]
 
@@ -94,3 +97,9 @@ def _instant(text: object) -> datetime:
 
 def _said(at: datetime) -> str:
     return f"{at.astimezone(UTC):%Y-%m-%d %H:%M} UTC"
+
+
+def with_certification(content: bytes, known: Certification) -> tuple[bytes, str]:
+    """Return the bytes of a calibration file with its certification, and their hash, which covers it."""
+    whole, found = with_own_hash({**json.loads(content), "certification": known.to_json()})
+    return whole + b"\n", found

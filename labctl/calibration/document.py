@@ -7,45 +7,25 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from datetime import date, datetime
+from datetime import datetime
 from functools import cached_property
-from importlib.metadata import version as package_version
 from pathlib import Path
-from typing import cast, get_args
+from typing import TYPE_CHECKING, cast
 
 from instruments.configuration import changed
-from labctl.canonical_json import canonical, canonical_and_hash, hash_of, with_own_hash
-from labctl.certification import CalibrationWarning, Certification, read_certification
+from labctl.calibration.certification import Certification, read_certification
+from labctl.canonical_json import canonical, canonical_and_hash
 from labctl.errors import BadCalibrationFile, OtherConfiguration
-from labctl.fitting import FitResult, FittedModel, coefficients_json
-from labctl.fitting.models.force_sensitivity import ForceSensitivity, specific_force_json
-from labctl.fitting.models.memory import state_json
-from labctl.fitting.models.paper_units import in_paper_units
-from labctl.fitting.uncertainty import AxisEvidence, BenchConditions, conditions_of, response_budgets
-from labctl.fitting.uncertainty.document import Covered, uncertainty_json
-from labctl.json_types import JsonObject
-from labctl.json_types.budget import BudgetJson, UncertaintyJson
-from labctl.json_types.calibrations import AxisEvidenceJson, CalibrationJson, OutputUnitJson
-from labctl.recording import OutputUnit, RecordingInfo
-from labctl.recording.info import Axis
+from labctl.fitting.data.channels import BODY_AXES
+from labctl.fitting.models.fitted_model import FittedModel
+from labctl.fitting.models.force_sensitivity import ForceSensitivity
+from labctl.json_types.calibrations import CalibrationJson
 
-__all__ = [
-    "SCHEMA",
-    "Calibration",
-    "CalibrationWarning",
-    "Certification",
-    "build_calibration",
-    "canonical",
-    "hash_of",
-    "read_calibration",
-    "with_certification",
-]
+if TYPE_CHECKING:  # need pydantic, which costs as much to load as the rest of a robot's program
+    from labctl.fitting.uncertainty.conditions import BenchConditions
+    from labctl.recording.info import OutputUnit
 
 SCHEMA = "labctl-calibration/1"
-HOW_TO_USE = (
-    "rate = (output - offset) / scale per axis; then the model's error is taken off: argument 'output' "
-    "subtracts it as a function of that rate, 'rate' solves rate = true + error(true) for the true rate"
-)
 #: The largest calibration file that is read; one of 6 axes' temperature tables has a fiftieth of it.
 MOST_BYTES = 64 << 20
 
@@ -86,7 +66,7 @@ class Calibration:
         """The axes that are corrected, in order."""
         with _reading("axes"):
             axes = self.document["axes"]
-            if not (isinstance(axes, list) and axes and set(axes) <= set(get_args(Axis))):
+            if not (isinstance(axes, list) and axes and set(axes) <= set(BODY_AXES)):
                 raise ValueError(f"{str(axes)[:80]} is not a list of axes; give one or more of x, y and z")
             return tuple(axes)
 
@@ -110,6 +90,8 @@ class Calibration:
     @cached_property
     def bench(self) -> BenchConditions | None:
         """What is known of the bench: standards, and angles of mountings. None: an older version of labctl made it."""
+        from labctl.fitting.uncertainty.conditions import BenchConditions  # noqa: PLC0415  needs pydantic
+
         with _reading("standards"):
             given = self.document.get("standards")
             return None if given is None else BenchConditions.from_json(given)
@@ -117,6 +99,8 @@ class Calibration:
     @property
     def output(self) -> dict[str, OutputUnit]:
         """How each axis's output becomes a rate before it is corrected."""
+        from labctl.recording.info import OutputUnit  # noqa: PLC0415  needs pydantic
+
         with _reading("output"):
             units = {axis: OutputUnit.model_validate(unit) for axis, unit in self.document["output"].items()}
             return units | {axis: units[axis] for axis in self.axes}  # each axis has one
@@ -125,13 +109,13 @@ class Calibration:
     def temperature_c(self) -> tuple[float, float]:
         """The calibrated temperatures; infinite where the document has null: no thermometer was there."""
         with _reading("validity"):
-            return _limits(self.document["validity"]["temperature_c"])
+            return limits(self.document["validity"]["temperature_c"])
 
     @property
     def rate_dps(self) -> tuple[float, float]:
         """The calibrated rates; infinite where the document has null: nothing of the model depends on the rate."""
         with _reading("validity"):
-            return _limits(self.document["validity"]["rate_dps"])
+            return limits(self.document["validity"]["rate_dps"])
 
     @property
     def configuration(self) -> dict[str, str]:
@@ -168,102 +152,10 @@ class Calibration:
         return canonical(self.document) + b"\n"
 
 
-def build_calibration(
-    info: RecordingInfo,
-    result: FitResult,
-    *,
-    version: int,
-    parent: int | None,
-    issued_at: datetime,
-    provenance: JsonObject,
-    evidence: Mapping[str, AxisEvidence] | None = None,
-    used_on: Sequence[date] = (),
-) -> Calibration:
-    """Make the document of a fit. What belongs to bench, fixture or environment is left out, and named.
-
-    `evidence`, by axis, is what the uncertainty in use is computed from; without it that is unknown. `used_on` are the
-    days of several recordings, on which the standards of the bench were used; default: the day of `info`.
-    """
-    exported, left_out = result.exported()
-    bench = conditions_of(info, result.environment, used_on, result.mountings, result.angles_rad)
-    use = {axis: one.to_json() for axis, one in (evidence or {}).items()}
-    document: CalibrationJson = {
-        "schema": SCHEMA,
-        "serial": info.serial,
-        "version": version,
-        "parent": parent,
-        "issued_at": issued_at.isoformat(),
-        "unit": {"model": info.model, "technology": info.technology},
-        "software": {"name": "labctl", "version": package_version("labctl")},
-        "axes": list(exported.axes),
-        "output": {axis: _unit_json(info.output.get(axis, OutputUnit())) for axis in info.axes},
-        "model": exported.to_dict(),
-        "coefficients": {axis: coefficients_json(exported.model, fit) for axis, fit in exported.axes.items()},
-        "papers": in_paper_units(exported),
-        "left_out": left_out,
-        "error": result.error.to_dict(),
-        "noise": dict(result.noise),
-        "environment": result.environment,
-        "validity": {"temperature_c": list(result.temperature_c), "rate_dps": list(result.rate_dps)},
-        "use": use,
-        "standards": bench.to_json(),
-        "uncertainty": _uncertainty(exported, result, use, bench),
-        "provenance": dict(provenance),
-        "how_to_use": HOW_TO_USE,
-        "hash": "",
-    }
-    if response := _response(result, use, bench):
-        document["response"] = response
-    _add_where_known(document, info, result, exported)
-    document["hash"] = hash_of(document)
-    return Calibration(document)
-
-
-def _add_where_known(document: CalibrationJson, info: RecordingInfo, result: FitResult, exported: FittedModel) -> None:
-    """Add what only some calibrations have."""
-    if info.configuration:
-        document["configuration"] = dict(info.configuration)
-    if (force := specific_force_json(result.fitted)) is not None:
-        document["specific_force"] = force
-    if (state := state_json(exported)) is not None:
-        document["state"] = state
-    if result.poses is not None:
-        document["poses"] = result.poses
-
-
-def _uncertainty(
-    exported: FittedModel, result: FitResult, use: Mapping[str, AxisEvidenceJson], bench: BenchConditions
-) -> UncertaintyJson | None:
-    """Return the bound of a document, computed from the model as it is exported."""
-    covered = Covered(_limits(result.rate_dps), _limits(result.temperature_c))
-    return uncertainty_json(exported, covered, _evidence(use), bench)
-
-
-def _response(
-    result: FitResult, use: Mapping[str, AxisEvidenceJson], bench: BenchConditions
-) -> dict[str, dict[str, BudgetJson]]:
-    """Return axis -> budgets of delay and time constant, which a document leaves out of its model."""
-    found = response_budgets(result.fitted, evidence=_evidence(use), bench=bench)
-    return {axis: {name: budget.to_json() for name, budget in named.items()} for axis, named in found.items()}
-
-
-def _evidence(use: Mapping[str, AxisEvidenceJson]) -> dict[str, AxisEvidence]:
-    return {axis: AxisEvidence.from_json(one) for axis, one in use.items()}
-
-
-def with_certification(content: bytes, known: Certification) -> tuple[bytes, str]:
-    """Return the bytes of a calibration file with its certification, and their hash, which covers it."""
-    whole, found = with_own_hash({**json.loads(content), "certification": known.to_json()})
-    return whole + b"\n", found
-
-
-def _limits(pair: Sequence[float | None]) -> tuple[float, float]:
+def limits(pair: Sequence[float | None]) -> tuple[float, float]:
+    """Return a range as numbers: null, where there is no limit, is infinite."""
     low, high = pair
     return -math.inf if low is None else float(low), math.inf if high is None else float(high)
-
-
-def _unit_json(unit: OutputUnit) -> OutputUnitJson:
-    return {"unit": unit.unit, "scale": unit.scale, "offset": unit.offset}
 
 
 def read_calibration(source: Path | bytes) -> Calibration:

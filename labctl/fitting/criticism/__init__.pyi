@@ -1,0 +1,37 @@
+from labctl.fitting.criticism.criticism import (
+    Criticism as Criticism,
+    FittedMeans as FittedMeans,
+    best_shapes as best_shapes,
+    criticise as criticise,
+    fit_means as fit_means,
+)
+from labctl.fitting.criticism.diagnostics import residual_maps as residual_maps
+from labctl.fitting.criticism.effect_size import (
+    SizeReference as SizeReference,
+    size_for_z as size_for_z,
+    size_in_noise_units as size_in_noise_units,
+    size_reference as size_reference,
+)
+from labctl.fitting.criticism.reduction import ReducedRecording as ReducedRecording
+from labctl.fitting.criticism.residuals import (
+    Residuals as Residuals,
+    has_one_rising_leg as has_one_rising_leg,
+    where_it_fails as where_it_fails,
+    worst_data_sets as worst_data_sets,
+)
+from labctl.fitting.criticism.separation import (
+    LeadingSignal as LeadingSignal,
+    SEPARATED_CHI2 as SEPARATED_CHI2,
+    leading_signal as leading_signal,
+    separation_chi2 as separation_chi2,
+    separation_power as separation_power,
+)
+from labctl.fitting.criticism.suspects import Suspect as Suspect
+from labctl.fitting.criticism.thermal_family import ThermalFamily as ThermalFamily, hint_of_added as hint_of_added
+from labctl.fitting.criticism.verdict import Verdict as Verdict
+from labctl.fitting.criticism.visibility import (
+    EffectVisibility as EffectVisibility,
+    Schedule as Schedule,
+    effect_visibilities as effect_visibilities,
+    schedule_of as schedule_of,
+)

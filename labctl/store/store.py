@@ -1,0 +1,143 @@
+"""The open database: one repository for each kind of record."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from labctl.config import seal_key
+from labctl.store.connection.database import Database, Writer
+from labctl.store.connection.location import is_url
+from labctl.store.connection.transactions import run_transaction
+from labctl.store.connection.writer_lock import NO_SERVICE, ServiceAddress, holder_of
+from labctl.store.repositories.audit import Audit
+from labctl.store.repositories.benches import Benches
+from labctl.store.repositories.calibrations import Calibrations
+from labctl.store.repositories.campaigns import Campaigns
+from labctl.store.repositories.certified_versions import CertifiedVersions
+from labctl.store.repositories.check_gyros import CheckGyros
+from labctl.store.repositories.documents.certificates import Certificates
+from labctl.store.repositories.drafts.repository import Drafts
+from labctl.store.repositories.fetches import Fetches
+from labctl.store.repositories.keys import Keys
+from labctl.store.repositories.leases import Leases
+from labctl.store.repositories.manifests import Manifests
+from labctl.store.repositories.recording_writer import Imports
+from labctl.store.repositories.recordings import Recordings
+from labctl.store.repositories.releases import ReleaseRequests
+from labctl.store.repositories.resume_points import ResumePoints
+from labctl.store.repositories.room_environment import RoomEnvironment
+from labctl.store.repositories.scheduled_starts import Starts
+from labctl.store.repositories.sensors import SensorVersions
+from labctl.store.repositories.standards import Standards
+from labctl.store.repositories.units import Certifications, Units
+from labctl.store.sealing.signing import begin_signing
+
+
+class Store:
+    """An open database with its repositories."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+        self.units = Units(database)
+        self.recordings = Recordings(database)
+        self.imports = Imports(database)
+        self.campaigns = Campaigns(database)
+        self.resume_points = ResumePoints(database)
+        self.benches = Benches(database)
+        self.calibrations = Calibrations(database)
+        self.certifications = Certifications(database)
+        self.certified_versions = CertifiedVersions(database)
+        self.certificates = Certificates(database)
+        self.release_requests = ReleaseRequests(database)
+        self.fetches = Fetches(database)
+        self.drafts = Drafts(database)
+        self.standards = Standards(database)
+        self.check_gyros = CheckGyros(database)
+        self.sensor_versions = SensorVersions(database)
+        self.room_environment = RoomEnvironment(database)
+        self.audit = Audit(database)
+        self.keys = Keys(database)
+        self.starts = Starts(database)
+        self.leases = Leases(database)
+        self.manifests = Manifests(database)
+        self._signing = begin_signing(database, seal_key()) if database.writes else None
+
+    @property
+    def location(self) -> str:
+        """Where the database is."""
+        return self._database.location
+
+    @property
+    def is_held(self) -> bool:
+        """Whether a process, perhaps this one, holds the database for writing."""
+        return self._database.writes or is_url(self.location) or holder_of(self.location) is not None
+
+    @property
+    def is_sole_writer(self) -> bool:
+        """Whether no other process can write to the database as long as this one holds it."""
+        return self._database.writes and not is_url(self.location)
+
+    @property
+    def address(self) -> StoreAddress:
+        """The address by which another process opens the same database."""
+        return StoreAddress(self.location, self._database.writer)
+
+    def note_address(self, address: ServiceAddress) -> None:
+        """Write down at which address the service that holds this database is reached now."""
+        self._database.note_address(address)
+
+    def run(self, name: str, args: tuple[object, ...], kwargs: Mapping[str, object]) -> object:
+        """Run a transaction that another process sent; raises what it raises, and KeyError for an unknown name."""
+        return run_transaction(
+            {type(each).__name__: each for each in vars(self).values() if hasattr(each, "_database")},
+            name,
+            args,
+            kwargs,
+        )
+
+    def close(self) -> None:
+        """Close the database."""
+        if self._signing is not None:
+            self._signing.close()
+        self._database.close()
+
+
+@contextmanager
+def open_store(
+    location: str, *, write: bool, address: ServiceAddress = NO_SERVICE, writer: Writer | None = None
+) -> Iterator[Store]:
+    """Open a database by path or URL, made on first use; `write` holds it for this process.
+
+    Without, transactions run by `writer`, the process that holds it.
+
+    Raises Conflict when another process holds it, StoreError when it is newer than the code or damaged, OldSchema
+    when it has to be migrated first.
+    """
+    store = Store(Database(location, write=write, address=address, writer=writer))
+    try:
+        if write:
+            store.imports.discard_unfinished()
+        yield store
+    finally:
+        store.close()
+
+
+@dataclass(frozen=True)
+class StoreAddress:
+    """The address by which a process opens a store that another one has; like its writer it can be pickled."""
+
+    location: str  #: path or URL
+    writer: Writer | None = None  #: the process that writes for others
+
+    @property
+    def can_write(self) -> bool:
+        """Whether a store opened by this address can be written to while another process has the database."""
+        return self.writer is not None or is_url(self.location)
+
+    @contextmanager
+    def open(self) -> Iterator[Store]:
+        """Open the store; without a writer for reading. Raises StoreError."""
+        with open_store(self.location, write=False, writer=self.writer) as store:
+            yield store
