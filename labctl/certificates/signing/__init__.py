@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from labctl.config import SIGN_CERTIFICATE_VARIABLE, SIGN_KEY_VARIABLE, SIGN_PASSWORD_VARIABLE, variable
-from labctl.errors import BadInput
 from labctl.extras import needs_extra
 from labctl.private_keys import SCHEME, KeyUse, refuse_open_key
 
