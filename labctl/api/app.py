@@ -14,6 +14,7 @@ from labctl import web
 from labctl.api import problems
 from labctl.api.access_policy import DECLARES_KEY, AccessPolicy
 from labctl.api.dependencies import ControlPool
+from labctl.api.descriptions import DescribedAPI
 from labctl.api.middleware import AccessMiddleware
 from labctl.api.request_log import RequestFigures, RequestLogMiddleware
 from labctl.api.routers import (
@@ -94,7 +95,7 @@ def create_app(service: LabService, access: AccessPolicy | None = None, keys: Ke
             service.close()
             app.state.control_pool.close()
 
-    app = FastAPI(
+    app = DescribedAPI(
         title="labctl",
         version=version("labctl"),
         description=DESCRIPTION,

@@ -12,14 +12,20 @@ from labctl.json_types.noise import StaticRecordJson
 
 
 class CriticisedErrors(TypedDict):
-    """RMS errors of the model refitted, deg/s; `explained`: share of the raw excess chi2 that the model explains."""
+    """Errors of the model as it was refitted for the criticism, and how much of what is there it explains."""
 
     rms_dps: float | None
+    """RMS residual of the data set means, deg/s; null: unknown."""
     heldout_rms_dps: float | None
+    """RMS error on data sets that the model was not fitted to, deg/s; null: there are too few to leave any out."""
     noise_floor_dps: float | None
+    """RMS residual that noise alone leaves, deg/s; null: unknown."""
     noise_floor_source: str
+    """What the noise floor was computed from."""
     explained: float | None
+    """Share of the chi2 of the raw error in excess of noise that the model explains, 0 to 1; null: there is no excess."""
     direct_form_rms_dps: float | None
+    """RMS residual of the same model as a function of the output, deg/s; null: it is that form, or has none."""
 
 
 class CriticisedNoise(TypedDict):
