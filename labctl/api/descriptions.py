@@ -1,7 +1,7 @@
 """Descriptions of the fields of typed dictionaries in the API's description, from the docstrings below the fields.
 
 Models carry theirs as `Field(description=...)`. Typed dictionaries are read by programs that never load pydantic, so
-each field has a docstring below it (PEP 257, attribute docstrings), which is looked up when the description is asked for.
+each field has a docstring below it (PEP 257, attribute docstrings), which is looked up when the description is made.
 """
 
 from __future__ import annotations
