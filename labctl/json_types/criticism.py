@@ -23,7 +23,7 @@ class CriticisedErrors(TypedDict):
     noise_floor_source: str
     """What the noise floor was computed from."""
     explained: float | None
-    """Share of the chi2 of the raw error in excess of noise that the model explains, 0 to 1; null: there is no excess."""
+    """Share of the chi2 of the raw error in excess of noise that the model explains, 0 to 1; null: there is none."""
     direct_form_rms_dps: float | None
     """RMS residual of the same model as a function of the output, deg/s; null: it is that form, or has none."""
 

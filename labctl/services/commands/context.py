@@ -5,16 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable
 from datetime import datetime
 from functools import cached_property
-from typing import Protocol
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from instruments.bench_config import BenchFile
 from instruments.clock import Clock
-from labctl.services.commands.requests import CampaignResume, CampaignStart, ToBench, ToCampaign
-from labctl.services.schemas.benches import BenchCheckResponse, CheckRequest
-from labctl.services.schemas.campaigns import CampaignResponse, ConfirmRequest, ReasonRequest
+from labctl.services.commands.requests import CampaignStart
+from labctl.services.schemas.base import ResponseModel
 from labctl.services.schemas.live import LiveEndRequest, LiveRequest, LiveStateResponse
-from labctl.services.schemas.schedule import ScheduledResponse
 from labctl.store import Store
+
+if TYPE_CHECKING:
+    from labctl.services.commands.acts.bench_act import BenchAct
+
+RequestT = TypeVar("RequestT")
+ResponseT = TypeVar("ResponseT", bound=ResponseModel)
 
 
 class CommandContext:
@@ -36,46 +40,14 @@ class CommandContext:
 
 
 class CampaignControl(Protocol):
-    """Control over campaigns, by the process that executes the command."""
+    """Control over benches and their campaigns, by the process that executes the command."""
 
     def bench_of(self, asked: CampaignStart, /) -> BenchFile:
         """Return the bench that a start is for. Raises Conflict where the service has none."""
         ...
 
-    def start(self, context: CommandContext, asked: CampaignStart, /) -> CampaignResponse:
-        """Start a campaign now."""
-        ...
-
-    def schedule(self, context: CommandContext, asked: CampaignStart, /) -> ScheduledResponse:
-        """Enter a campaign into the schedule."""
-        ...
-
-    def resume(self, context: CommandContext, asked: CampaignResume, /) -> CampaignResponse:
-        """Continue a paused campaign, or resume an interrupted one."""
-        ...
-
-    def pause(self, context: CommandContext, asked: ToCampaign[ReasonRequest], /) -> CampaignResponse:
-        """Ask a running campaign to hold after the present data set."""
-        ...
-
-    def abort(self, context: CommandContext, asked: ToCampaign[ReasonRequest], /) -> CampaignResponse:
-        """End a campaign now, in the safe state."""
-        ...
-
-    def confirm(self, context: CommandContext, asked: ToCampaign[ConfirmRequest], /) -> CampaignResponse:
-        """Answer the question that a campaign waits for. Raises StalePrompt for another one."""
-        ...
-
-    def check(self, context: CommandContext, asked: ToBench[CheckRequest], /) -> BenchCheckResponse:
-        """Ask every instrument of a bench what it is and how it does; nothing moves."""
-        ...
-
-    def start_live(self, context: CommandContext, asked: LiveRequest, /) -> LiveStateResponse:
-        """Begin a live calibration."""
-        ...
-
-    def end_live(self, context: CommandContext, asked: LiveEndRequest, /) -> LiveStateResponse:
-        """End the live calibration that runs."""
+    def perform(self, act: BenchAct[RequestT, ResponseT], context: CommandContext, asked: RequestT, /) -> ResponseT:
+        """Have an act carried out by the process that has the bench. Raises LabctlError."""
         ...
 
 
