@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator
 from typing import Annotated
 
 from fastapi import APIRouter, Header, Response
 from fastapi.concurrency import run_in_threadpool
 
+from labctl.api.act_routes import add_act_route
 from labctl.api.computation import execute
-from labctl.api.dependencies import ControlPoolDep, ServiceDep, command_route
+from labctl.api.dependencies import ServiceDep, command_route
 from labctl.api.event_stream import EventStream
 from labctl.services.campaigns.plan_view import campaign_plan
-from labctl.services.commands.acts.bench_act import BodyT, CampaignAct
 from labctl.services.commands.acts.catalogue import CAMPAIGN_ACTS
 from labctl.services.commands.acts.resume import RESUME_CAMPAIGN
 from labctl.services.commands.acts.start import START_CAMPAIGN
 from labctl.services.commands.registry import MAKE_DRAFTS
 from labctl.services.commands.requests import CampaignResume, CampaignStart, ToCampaign
-from labctl.services.lab_service import LabService
 from labctl.services.schemas.campaigns import (
     CampaignRequest,
     CampaignResponse,
@@ -61,34 +60,8 @@ def plan(campaign: int, service: ServiceDep) -> CampaignPlanResponse:
     return campaign_plan(service.store, campaign)
 
 
-def _route_act(act: CampaignAct[BodyT]) -> None:
-    """Route an act on a campaign by what it says of itself."""
-
-    def perform(campaign: int, request: BodyT, service: LabService) -> CampaignResponse:
-        return service.execute(act.command, ToCampaign(campaign, request))
-
-    if act.is_urgent:
-
-        async def urgent(
-            campaign: int, request: BodyT, service: ServiceDep, control: ControlPoolDep
-        ) -> CampaignResponse:
-            return await control.run(lambda: perform(campaign, request, service))
-
-        endpoint: Callable[..., object] = urgent
-    else:
-
-        def usual(campaign: int, request: BodyT, service: ServiceDep) -> CampaignResponse:
-            return perform(campaign, request, service)
-
-        endpoint = usual
-    endpoint.__name__ = act.name
-    endpoint.__doc__ = act.description
-    endpoint.__annotations__["request"] = act.body
-    command_route(router, act.command, act.summary)(endpoint)
-
-
 for _act in CAMPAIGN_ACTS:
-    _route_act(_act)
+    add_act_route(router, _act)
 
 
 @command_route(router, RESUME_CAMPAIGN, "Resume a campaign")
