@@ -16,6 +16,7 @@ from instruments.protocols.stim300.datagrams import (
     ASK_BIAS_TRIM,
     ASK_CONFIGURATION,
     ASK_SERIAL_NUMBER,
+    SAMPLE_RATES_HZ,
     Configuration,
     parse_bias_trim,
     parse_configuration,
@@ -33,6 +34,7 @@ from instruments.protocols.stim300.frames import (
     layout_of,
     scan,
 )
+from instruments.protocols.stim300.layouts import SPECIALS
 from instruments.protocols.stim300.settings import Stim300Settings
 from instruments.transport.adapters import require_adapter
 from instruments.transport.device_time import DeviceTime
@@ -198,6 +200,12 @@ class Stim300:
         )
 
     @property
+    def _possible_rates_hz(self) -> tuple[int, ...]:
+        """What the unit can be set to; none where something else triggers it."""
+        triggered = self._set is not None and self._set.sample_rate_hz is None
+        return () if triggered or self.sample_rate_hz not in SAMPLE_RATES_HZ else SAMPLE_RATES_HZ
+
+    @property
     def _is_unknown(self) -> bool:
         """Whether the unit has yet to report its configuration, serial number and, if it knows it, bias trim offset."""
         trim = self._trim_dps is None and self._questions < TRIM_QUESTIONS
@@ -255,6 +263,7 @@ class Stim300:
         found = scan(self._unfinished + data, self.layout)
         self._unfinished = found.rest
         for special in found.specials:
+            self._stream.answered(SPECIALS[special[0]].stride)
             self._hear(special)
         frames, layout, behind = found.frames, self.layout, found.behind
         damaged = found.damaged
@@ -291,7 +300,7 @@ class Stim300:
         times, uncounted = self._time.times(
             advance, came.now_s, self._counter.readings_per_turn, width_s=came.width_s, arrival_s=arrival_s
         )
-        refuse_other_rate(self.name, self.settings.port, self._time.line)
+        refuse_other_rate(self.name, self.settings.port, self._time.line, self._possible_rates_hz)
         return times, int(advance.sum() - len(advance)) + uncounted
 
 

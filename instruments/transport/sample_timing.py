@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -240,11 +241,27 @@ class StreamTime:
         return np.asarray(times, dtype=np.float64)
 
 
-def refuse_other_rate(device: str, port: str | None, line: PeriodLine) -> None:
-    """Raise WrongInstrument for a stream that is faster or slower than its bench file says, beyond the tolerance."""
-    if line.is_outside_tolerance and (period_s := line.measured_s):
-        raise WrongInstrument(
-            device,
-            f"sends {1 / period_s:.4g} readings/s on {port}, but the bench file says {1 / line.nominal_s:.4g}, limit "
-            f"+-{100 * line.tolerance:g} %; set sample_rate_hz = {1 / period_s:.4g} or configure the unit",
-        )
+def refuse_other_rate(device: str, port: str | None, line: PeriodLine, rates_hz: Sequence[float] = ()) -> None:
+    """Raise WrongInstrument for a stream that is faster or slower than its bench file says, beyond the tolerance.
+
+    `rates_hz` are those that the device can be set to, where these are few: what is advised is possible.
+    """
+    if not line.is_outside_tolerance or not (period_s := line.measured_s):
+        return
+    rate_hz = 1 / period_s
+    advice = f"set sample_rate_hz = {rate_hz:.4g} or configure the unit"
+    if rates_hz:
+        nearest_hz = min(rates_hz, key=lambda each: abs(each - rate_hz))
+        if abs(rate_hz / nearest_hz - 1.0) <= line.tolerance:
+            advice = f"set sample_rate_hz = {nearest_hz:g} or configure the unit"
+        else:
+            able = ", ".join(f"{each:g}" for each in rates_hz)
+            advice = (
+                f"by its own crystal the unit sends {able} readings/s and no other; check whether something triggers "
+                "it, and the clock of this computer; if both are in order, have the unit repaired"
+            )
+    raise WrongInstrument(
+        device,
+        f"sends {rate_hz:.4g} readings/s on {port}, but the bench file says {1 / line.nominal_s:.4g}, limit "
+        f"+-{100 * line.tolerance:g} %; {advice}",
+    )
