@@ -21,7 +21,7 @@ from instruments.errors import LinkError
 from instruments.protocols.nidaqmx.service import INSTALL_GRPC
 from instruments.protocols.simulator_control import BUSY, IS_TURNING, MOUNT, OK, POWER, TURN, turn_of
 from instruments.shared_clock import SharedClock
-from instruments.simulators.links.device import SimulatedDevice
+from instruments.simulators.links.device import SimulatedDevice, connected
 from instruments.simulators.links.real_ports import LOCALHOST, RealPorts
 from instruments.simulators.links.rpc_server import RpcServer
 from instruments.simulators.simulated_bench import SimulatedBench
@@ -74,11 +74,10 @@ class SimulationServer:
 
     def _listen(self, name: str, device: SimulatedDevice) -> int:
         """Open a TCP port that carries bytes, or calls of gRPC, to a device; returns its number."""
-        exchange = partial(self._exchange, name, device)
         if not getattr(device, "is_rpc", False):
-            return self._ports.open_byte_server(exchange)
+            return self._ports.open_byte_server(lambda: partial(self._exchange, name, connected(device)))
         try:
-            self._rpc_servers.append(RpcServer(exchange))
+            self._rpc_servers.append(RpcServer(partial(self._exchange, name, device)))
         except ImportError as error:
             raise LinkError(name, f"the package grpcio is not installed; run `{INSTALL_GRPC}`") from error
         return self._rpc_servers[-1].tcp_port

@@ -99,7 +99,9 @@ class LineLink:
             self.awaits_slow = False
             port = self._opened()
             for request in requests:
-                port.write(self._encoded(request) * (2 if self._syntax.end else 1))
+                data = self._encoded(request) * (2 if self._syntax.end else 1)
+                self._line.send(data)
+                port.write(data)
         except BROKEN as error:
             raise self._broken(what, error) from error
         finally:

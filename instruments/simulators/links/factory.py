@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from instruments.clock import Clock
-from instruments.simulators.links.device import SimulatedDevice
+from instruments.simulators.links.device import SimulatedDevice, connected
 from instruments.simulators.links.modbus_clients import SimulatedRtuClient, SimulatedTcpClient
 from instruments.simulators.links.rpc_channel import SimulatedChannel
 from instruments.simulators.links.serial_port import SimulatedSerialPort
@@ -20,7 +20,7 @@ class SimulatedLinks:
     def serial_port(self, url: str, *, baudrate: int, timeout_s: float, line: object = None) -> SimulatedSerialPort:
         """Return an open port, whatever its line settings; raises LinkError for an unknown address."""
         del line
-        return SimulatedSerialPort(self._device(url), self._clock, baudrate=baudrate, timeout=timeout_s)
+        return SimulatedSerialPort(connected(self._device(url)), self._clock, baudrate=baudrate, timeout=timeout_s)
 
     def port_timeout_s(self, timeout_s: float) -> float:
         """Return the time-out as it is: a simulated port waits on the bench clock."""

@@ -40,11 +40,14 @@ class RealPorts:
         self._run(self._carry_terminal, ours, exchange)
         return os.ttyname(theirs)
 
-    def open_byte_server(self, exchange: Exchange) -> int:
-        """Listen for connections that carry the instrument's bytes; returns the TCP port. Raises OSError."""
+    def open_byte_server(self, exchange_of_link: Callable[[], Exchange]) -> int:
+        """Listen for connections that carry the instrument's bytes; returns the TCP port. Raises OSError.
+
+        `exchange_of_link` is called once for each connection.
+        """
 
         def carry(connection: socket.socket) -> None:
-            self._carry_connection(connection, exchange)
+            self._carry_connection(connection, exchange_of_link())
 
         return self._listen(carry)
 

@@ -13,7 +13,7 @@ from datetime import datetime
 import numpy as np
 from numpy.typing import NDArray
 
-from instruments.bench_config import BenchFile, GyroSettings, SimulationSettings
+from instruments.bench_config import USUAL_AIR_TAU_S, BenchFile, GyroSettings, SimulationSettings
 from instruments.clock import VIRTUAL_START
 from instruments.positions import Position
 from instruments.simulators.hidden import HiddenEffect, State, hidden_effects
@@ -89,7 +89,7 @@ class World:
         self.heat = Heat(
             start_c,
             USUAL_RAMP_C_PER_MIN if bench.chamber is None else bench.chamber.ramp_c_per_min,
-            number(settings.chamber, "air_tau_s", 180.0),
+            number(settings.chamber, "air_tau_s", USUAL_AIR_TAU_S),
             bodies,
             number(settings.chamber, "noise_c", 0.02),
             settings.seed + 1000 * settings.noise_seed,

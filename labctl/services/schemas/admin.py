@@ -196,6 +196,9 @@ class DescriptionTestResponse(ResponseModel):
     address: str | None = Field(default=None, description="Null: nothing was sent.")
     ok: bool
     checks: list[DescribedCheckResponse]
+    wire_log: str | None = Field(
+        default=None, description="File with every byte between labctl and the instrument; null: none was kept."
+    )
 
 
 class DriverTestResponse(ResponseModel):

@@ -115,6 +115,9 @@ class PlanResponse(ResponseModel):
     steps: int
     datasets: int
     expected_s: float
+    guessed: list[str] = Field(
+        default_factory=list, description="Figures of the expected time that the bench file does not state."
+    )
     verification_datasets: int = Field(description="Number of the data sets that verify and are never fitted.")
     verification_s: float = Field(description="Expected time of these, with their mountings and soaks, s.")
     clipped: list[str] = Field(description="Points left out because the bench or the unit cannot do them.")

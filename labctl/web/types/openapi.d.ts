@@ -8213,6 +8213,11 @@ export interface components {
             /** Expected S */
             expected_s: number;
             /**
+             * Guessed
+             * @description Figures of the expected time that the bench file does not state.
+             */
+            guessed: string[];
+            /**
              * Verification Datasets
              * @description Number of the data sets that verify and are never fitted.
              */
