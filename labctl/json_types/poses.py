@@ -54,6 +54,18 @@ class AlignmentJson(TypedDict):
     definition: str
 
 
+class FieldAlignmentJson(TypedDict):
+    """Rotation of the magnetometer's axes from the accelerometer's, about each axis, and the dip of the field, deg."""
+
+    axes: dict[str, AccelerometerCoefficient]
+    dip: AccelerometerCoefficient
+    covariance_deg2: list[list[float]]
+    place_deg: float
+    rests: int
+    moves: int
+    definition: str
+
+
 class MoveLeftOutJson(TypedDict):
     """A move that the fit did without, and why."""
 

@@ -5715,6 +5715,27 @@ export interface components {
             last_at: string;
         };
         /**
+         * FieldAlignmentJson
+         * @description Rotation of the magnetometer's axes from the accelerometer's, about each axis, and the dip of the field, deg.
+         */
+        FieldAlignmentJson: {
+            /** Axes */
+            axes: {
+                [key: string]: components["schemas"]["AccelerometerCoefficient"];
+            };
+            dip: components["schemas"]["AccelerometerCoefficient"];
+            /** Covariance Deg2 */
+            covariance_deg2: number[][];
+            /** Place Deg */
+            place_deg: number;
+            /** Rests */
+            rests: number;
+            /** Moves */
+            moves: number;
+            /** Definition */
+            definition: string;
+        };
+        /**
          * FindingResponse
          * @description One thing that was found out about an instrument.
          */
@@ -7370,7 +7391,7 @@ export interface components {
         MagnetometerRequest: {
             data: components["schemas"]["MeasuredData"];
             /** @description As `labctl magnetometer FILE --json` prints it. */
-            result: components["schemas"]["MagnetometerResponse"];
+            result: components["schemas"]["MagnetometerResponse-Input"];
             /**
              * By
              * @description Who.
@@ -7381,7 +7402,7 @@ export interface components {
          * MagnetometerResponse
          * @description Hard and soft iron of a magnetometer: field = soft iron (reading - hard iron), in the axes of the sensor.
          */
-        MagnetometerResponse: {
+        "MagnetometerResponse-Input": {
             /**
              * Verdict
              * @description adequate: the readings are those of a constant field up to their noise; unexplained: they are not.
@@ -7447,6 +7468,83 @@ export interface components {
              * @description From any direction to the nearest that was measured, at most, deg.
              */
             largest_gap_deg: number;
+            /** @description Rotation of the axes of the corrected field from those of the corrected force and rate, deg, and the dip of the field; null: no recording in poses, or rests and turns that do not determine it. */
+            alignment?: components["schemas"]["FieldAlignmentJson"] | null;
+            /** Text */
+            text: string[];
+        };
+        /**
+         * MagnetometerResponse
+         * @description Hard and soft iron of a magnetometer: field = soft iron (reading - hard iron), in the axes of the sensor.
+         */
+        "MagnetometerResponse-Output": {
+            /**
+             * Verdict
+             * @description adequate: the readings are those of a constant field up to their noise; unexplained: they are not.
+             * @enum {string}
+             */
+            verdict: "adequate" | "unexplained";
+            /** Hard Iron Ut */
+            hard_iron_ut: {
+                [key: string]: components["schemas"]["Estimate"];
+            };
+            /**
+             * Soft Iron
+             * @description Symmetric matrix: xx, yy, zz, xy, xz, yz.
+             */
+            soft_iron: {
+                [key: string]: components["schemas"]["Estimate"];
+            };
+            field_ut: components["schemas"]["Estimate"];
+            /**
+             * Covariance
+             * @description Of hard iron x, y, z, soft iron xx, yy, zz, xy, xz, yz, and field.
+             */
+            covariance: number[][];
+            /** Readings */
+            readings: number;
+            /**
+             * Left Out
+             * @description Readings further from the ellipsoid than five robust standard deviations.
+             */
+            left_out: number;
+            /**
+             * Before Ut
+             * @description Standard deviation of the size of the raw readings, uT.
+             */
+            before_ut: number;
+            /**
+             * Residual Ut
+             * @description Root mean square of the distances from the ellipsoid, uT.
+             */
+            residual_ut: number;
+            /**
+             * Heldout Ut
+             * @description The same of readings predicted from those of other times, uT.
+             */
+            heldout_ut: number;
+            /**
+             * Noise Ut
+             * @description Noise of the distances from one reading to the next, uT.
+             */
+            noise_ut: number;
+            /**
+             * Repetition
+             * @description Readings that tell as much as one independent reading, by the autocorrelation of the distances; the covariance includes it.
+             */
+            repetition: number;
+            /**
+             * Heading Error Deg
+             * @description Angle to which the held-out error turns a field square to it, deg.
+             */
+            heading_error_deg: number;
+            /**
+             * Largest Gap Deg
+             * @description From any direction to the nearest that was measured, at most, deg.
+             */
+            largest_gap_deg: number;
+            /** @description Rotation of the axes of the corrected field from those of the corrected force and rate, deg, and the dip of the field; null: no recording in poses, or rests and turns that do not determine it. */
+            alignment: components["schemas"]["FieldAlignmentJson"] | null;
             /** Text */
             text: string[];
         };
@@ -7501,7 +7599,7 @@ export interface components {
              * @description Formats in which it is available; none for a magnetometer whose field was not constant.
              */
             formats: components["schemas"]["SensorFormatResponse"][];
-            result: components["schemas"]["MagnetometerResponse"];
+            result: components["schemas"]["MagnetometerResponse-Output"];
         };
         /**
          * MarkJson

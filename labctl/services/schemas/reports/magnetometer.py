@@ -6,6 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from labctl.json_types.poses import FieldAlignmentJson
 from labctl.services.schemas.base import ResponseModel
 
 
@@ -40,4 +41,9 @@ class MagnetometerResponse(ResponseModel):
     )
     heading_error_deg: float = Field(description="Angle to which the held-out error turns a field square to it, deg.")
     largest_gap_deg: float = Field(description="From any direction to the nearest that was measured, at most, deg.")
+    alignment: FieldAlignmentJson | None = Field(
+        default=None,
+        description="Rotation of the axes of the corrected field from those of the corrected force and rate, deg, and "
+        "the dip of the field; null: no recording in poses, or rests and turns that do not determine it.",
+    )
     text: list[str]
