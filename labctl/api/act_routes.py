@@ -7,7 +7,7 @@ from collections.abc import Callable
 from fastapi import APIRouter
 
 from labctl.api.dependencies import ControlPoolDep, ServiceDep, command_route
-from labctl.services.commands.acts.bench_act import BodyT, CampaignAct
+from labctl.services.commands.acts.campaign_act import BodyT, CampaignAct
 from labctl.services.commands.requests import ToCampaign
 from labctl.services.lab_service import LabService
 from labctl.services.schemas.campaigns import CampaignResponse

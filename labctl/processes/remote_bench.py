@@ -21,8 +21,7 @@ from labctl.services.benches.bench_left import BenchLeft
 from labctl.services.benches.stops import describe_stop, late_stop
 from labctl.services.campaigns.listeners import ChangeListeners
 from labctl.services.commands.acts.abort import ABORT
-from labctl.services.commands.acts.bench_act import WRITES_S, BenchAct, RequestT, ResponseT
-from labctl.services.commands.context import CommandContext
+from labctl.services.commands.context import WRITES_S, BenchAct, CommandContext, RequestT, ResponseT
 from labctl.services.commands.requests import CampaignStart, ToCampaign
 from labctl.services.commands.service_control import NO_BENCH
 from labctl.services.schemas.benches import BenchDescription, StopResponse

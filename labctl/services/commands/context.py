@@ -3,19 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from datetime import datetime
 from functools import cached_property
-from typing import TYPE_CHECKING, Protocol, TypeVar
+from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
 from instruments.bench_config import BenchFile
 from instruments.clock import Clock
-from labctl.services.commands.requests import CampaignStart
+from labctl.services.commands.requests import CampaignResume, CampaignStart
 from labctl.services.schemas.base import ResponseModel
+from labctl.services.schemas.benches import BenchCheckResponse
+from labctl.services.schemas.campaigns import CampaignResponse
 from labctl.services.schemas.live import LiveEndRequest, LiveRequest, LiveStateResponse
+from labctl.services.schemas.schedule import ScheduledResponse
 from labctl.store import Store
 
 if TYPE_CHECKING:
-    from labctl.services.commands.acts.bench_act import BenchAct
+    from labctl.services.campaigns.bench_runner import BenchRunner
+
+#: How long a web process waits for an act that only writes, s: the engine may have the writing connection for a moment.
+WRITES_S = 30.0
+#: The same for one that opens a bench: every instrument is asked.
+OPENS_BENCH_S = 180.0
 
 RequestT = TypeVar("RequestT")
 ResponseT = TypeVar("ResponseT", bound=ResponseModel)
@@ -61,3 +70,58 @@ class LiveControl(Protocol):
     def end(self, request: LiveEndRequest) -> LiveStateResponse:
         """End the one that runs."""
         ...
+
+
+class ServiceBench(Protocol):
+    """What an act may use in a service: the runner of its bench, where it has one, and its live calibrations."""
+
+    @property
+    def runner(self) -> BenchRunner | None:
+        """The runner; None: this service has no bench."""
+        ...
+
+    def bench_runner(self) -> BenchRunner:
+        """Return the runner. Raises Conflict without one."""
+        ...
+
+    def live_control(self) -> LiveControl:
+        """Return the control over live calibrations. Raises Conflict in a process that does not drive the bench."""
+        ...
+
+    def record(self, context: CommandContext, action: str, campaign: int, reason: str) -> None:
+        """Write an act on a campaign into the log and the audit trail."""
+        ...
+
+
+class Foreground(Protocol):
+    """What an act may use in a process without a service: a campaign runs here and now, until it is over."""
+
+    def run(self, asked: CampaignStart) -> CampaignResponse:
+        """Run a campaign."""
+        ...
+
+    def run_on(self, asked: CampaignResume) -> CampaignResponse:
+        """Resume a campaign and run it."""
+        ...
+
+    def schedule(self, context: CommandContext, asked: CampaignStart) -> ScheduledResponse:
+        """Enter a campaign into the schedule of a bench."""
+        ...
+
+    def check(self, bench: str) -> BenchCheckResponse:
+        """Check a bench by its file or its shipped name."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class BenchAct(Generic[RequestT, ResponseT]):
+    """Something that a person has a bench do."""
+
+    name: str  #: in calls between processes and in the audit trail
+    in_service: Callable[[ServiceBench, CommandContext, RequestT], ResponseT]  #: in the process that has the bench
+    in_foreground: Callable[[Foreground, CommandContext, RequestT], ResponseT]  #: where no service runs
+    wait_s: float = WRITES_S  #: how long another process of the service waits for it
+
+    def execute(self, context: CommandContext, asked: RequestT) -> ResponseT:
+        """Have it carried out by whoever controls the bench. Raises LabctlError."""
+        return context.control.perform(self, context, asked)

@@ -12,8 +12,7 @@ from labctl.errors import BadInput
 from labctl.services.benches.check import check_bench
 from labctl.services.campaigns.execution import AskClear, Attend, Observe, run_here
 from labctl.services.campaigns.resume import resume_here
-from labctl.services.commands.acts.bench_act import BenchAct, RequestT, ResponseT
-from labctl.services.commands.context import CommandContext
+from labctl.services.commands.context import BenchAct, CommandContext, RequestT, ResponseT
 from labctl.services.commands.requests import CampaignResume, CampaignStart
 from labctl.services.drafts.answers import with_drafts
 from labctl.services.planning.loading import bench_for, load_bench, load_recipe

@@ -8,8 +8,7 @@ from labctl.errors import Conflict
 from labctl.log import get_logger
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.unattended import record_action
-from labctl.services.commands.acts.bench_act import BenchAct, RequestT, ResponseT
-from labctl.services.commands.context import CommandContext, LiveControl
+from labctl.services.commands.context import BenchAct, CommandContext, LiveControl, RequestT, ResponseT
 from labctl.services.commands.requests import CampaignStart
 
 log = get_logger()

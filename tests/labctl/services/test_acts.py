@@ -16,12 +16,10 @@ from labctl.processes.bench_calls import BENCH_ACTS
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.status import campaign_status
 from labctl.services.campaigns.unattended import not_running
-from labctl.services.commands.acts.bench_act import CampaignAct
+from labctl.services.commands.acts.campaign_act import CampaignAct
 from labctl.services.commands.acts.catalogue import CAMPAIGN_ACTS
-from labctl.services.commands.context import CommandContext
-from labctl.services.commands.foreground_control import ForegroundControl
+from labctl.services.commands.context import CommandContext, Foreground, ServiceBench
 from labctl.services.commands.requests import ToCampaign
-from labctl.services.commands.service_control import ServiceControl
 from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
 from labctl.services.schemas.campaigns import CampaignRequest, CampaignResponse, ReasonRequest
@@ -30,13 +28,13 @@ from labctl.store import Store, open_store
 Asked = ToCampaign[ReasonRequest]
 
 
-def _hold_in_service(control: ServiceControl, context: CommandContext, asked: Asked) -> CampaignResponse:
+def _hold_in_service(control: ServiceBench, context: CommandContext, asked: Asked) -> CampaignResponse:
     control.bench_runner()
     control.record(context, HOLD.name, asked.campaign, asked.body.text)
     return campaign_status(context.store, asked.campaign)
 
 
-def _hold_in_foreground(_: ForegroundControl, context: CommandContext, asked: Asked) -> CampaignResponse:
+def _hold_in_foreground(_: Foreground, context: CommandContext, asked: Asked) -> CampaignResponse:
     raise not_running(context.store, asked.campaign, "hold it")
 
 

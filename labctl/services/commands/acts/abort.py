@@ -9,21 +9,19 @@ from typing import TYPE_CHECKING
 from labctl.acting_user import actor
 from labctl.errors import StoreError
 from labctl.services.campaigns.unattended import abort_abandoned
-from labctl.services.commands.acts.bench_act import CampaignAct
-from labctl.services.commands.context import CommandContext
+from labctl.services.commands.acts.campaign_act import CampaignAct
+from labctl.services.commands.context import CommandContext, Foreground, ServiceBench
 from labctl.services.commands.requests import ToCampaign
 from labctl.services.schemas.campaigns import CampaignResponse, ReasonRequest
 from labctl.stop.latch import StopRequest
 
 if TYPE_CHECKING:
     from labctl.services.campaigns.bench_runner import BenchRunner
-    from labctl.services.commands.foreground_control import ForegroundControl
-    from labctl.services.commands.service_control import ServiceControl
 
 Asked = ToCampaign[ReasonRequest]
 
 
-def _in_service(control: ServiceControl, context: CommandContext, asked: Asked) -> CampaignResponse:
+def _in_service(control: ServiceBench, context: CommandContext, asked: Asked) -> CampaignResponse:
     """End a campaign; one that does not run here is only closed.
 
     It is written down after it is done: neither a full disk nor a slow writer is a reason to go on.
@@ -58,7 +56,7 @@ def _recorded(context: CommandContext, runner: BenchRunner, stop: StopRequest) -
     return " yet: the database is busy" if thread.is_alive() else "".join(failed)
 
 
-def _in_foreground(_: ForegroundControl, context: CommandContext, asked: Asked) -> CampaignResponse:
+def _in_foreground(_: Foreground, context: CommandContext, asked: Asked) -> CampaignResponse:
     """Close a campaign that no process runs any more; one that runs would hold the database."""
     return abort_abandoned(context.store, asked.campaign, asked.body.text, context.now())
 

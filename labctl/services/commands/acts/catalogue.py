@@ -5,13 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 from labctl.services.commands.acts.abort import ABORT
-from labctl.services.commands.acts.bench_act import BenchAct, CampaignAct
+from labctl.services.commands.acts.campaign_act import CampaignAct
 from labctl.services.commands.acts.check import CHECK
 from labctl.services.commands.acts.confirm import CONFIRM
 from labctl.services.commands.acts.live import END_LIVE_ACT, START_LIVE_ACT
 from labctl.services.commands.acts.pause import PAUSE
 from labctl.services.commands.acts.resume import RESUME
 from labctl.services.commands.acts.start import SCHEDULE, START
+from labctl.services.commands.context import BenchAct
 
 #: Acts on one campaign, in the order of the API's description.
 CAMPAIGN_ACTS: tuple[CampaignAct[Any], ...] = (ABORT, PAUSE, CONFIRM)

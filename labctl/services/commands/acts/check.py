@@ -2,23 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from labctl.errors import NotFound
-from labctl.services.commands.acts.bench_act import OPENS_BENCH_S, BenchAct
 from labctl.services.commands.command import Command
-from labctl.services.commands.context import CommandContext
+from labctl.services.commands.context import OPENS_BENCH_S, BenchAct, CommandContext, Foreground, ServiceBench
 from labctl.services.commands.requests import ToBench
 from labctl.services.schemas.benches import BenchCheckResponse, CheckRequest
-
-if TYPE_CHECKING:
-    from labctl.services.commands.foreground_control import ForegroundControl
-    from labctl.services.commands.service_control import ServiceControl
 
 Asked = ToBench[CheckRequest]
 
 
-def _in_service(control: ServiceControl, context: CommandContext, asked: Asked) -> BenchCheckResponse:
+def _in_service(control: ServiceBench, context: CommandContext, asked: Asked) -> BenchCheckResponse:
     """Check this service's bench. Raises NotFound for another one, BenchBusy while a campaign runs."""
     runner = control.bench_runner()
     if asked.bench != runner.bench.name:
@@ -31,7 +24,7 @@ def _in_service(control: ServiceControl, context: CommandContext, asked: Asked) 
     return found
 
 
-def _in_foreground(control: ForegroundControl, _: CommandContext, asked: Asked) -> BenchCheckResponse:
+def _in_foreground(control: Foreground, _: CommandContext, asked: Asked) -> BenchCheckResponse:
     """Check a bench by its file or its shipped name, in this process."""
     return control.check(asked.bench)
 

@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from labctl.services.campaigns.unattended import not_running
-from labctl.services.commands.acts.bench_act import CampaignAct
-from labctl.services.commands.context import CommandContext
+from labctl.services.commands.acts.campaign_act import CampaignAct
+from labctl.services.commands.context import CommandContext, Foreground, ServiceBench
 from labctl.services.commands.requests import ToCampaign
 from labctl.services.schemas.campaigns import CampaignResponse, ConfirmRequest
-
-if TYPE_CHECKING:
-    from labctl.services.commands.foreground_control import ForegroundControl
-    from labctl.services.commands.service_control import ServiceControl
 
 Asked = ToCampaign[ConfirmRequest]
 
 
-def _in_service(control: ServiceControl, context: CommandContext, asked: Asked) -> CampaignResponse:
+def _in_service(control: ServiceBench, context: CommandContext, asked: Asked) -> CampaignResponse:
     body = asked.body
     if control.runner is None:
         raise not_running(context.store, asked.campaign, f"answer question {body.prompt}")
@@ -27,7 +21,7 @@ def _in_service(control: ServiceControl, context: CommandContext, asked: Asked) 
     return answer
 
 
-def _in_foreground(_: ForegroundControl, context: CommandContext, asked: Asked) -> CampaignResponse:
+def _in_foreground(_: Foreground, context: CommandContext, asked: Asked) -> CampaignResponse:
     """Raise Conflict: no campaign asks anything here."""
     raise not_running(context.store, asked.campaign, f"answer question {asked.body.prompt}")
 

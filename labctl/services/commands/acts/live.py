@@ -2,33 +2,26 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from labctl.errors import Conflict
-from labctl.services.commands.acts.bench_act import OPENS_BENCH_S, BenchAct
 from labctl.services.commands.command import Command
-from labctl.services.commands.context import CommandContext
+from labctl.services.commands.context import OPENS_BENCH_S, BenchAct, CommandContext, Foreground, ServiceBench
 from labctl.services.schemas.live import LiveEndRequest, LiveRequest, LiveStateResponse
 
-if TYPE_CHECKING:
-    from labctl.services.commands.foreground_control import ForegroundControl
-    from labctl.services.commands.service_control import ServiceControl
 
-
-def _start_in_service(control: ServiceControl, _: CommandContext, asked: LiveRequest) -> LiveStateResponse:
+def _start_in_service(control: ServiceBench, _: CommandContext, asked: LiveRequest) -> LiveStateResponse:
     return control.live_control().start(asked)
 
 
-def _start_in_foreground(_: ForegroundControl, __: CommandContext, asked: LiveRequest) -> LiveStateResponse:
+def _start_in_foreground(_: Foreground, __: CommandContext, asked: LiveRequest) -> LiveStateResponse:
     """Raise Conflict: `labctl live` calibrates in its own process."""
     raise Conflict(f"no service runs on this database; calibrate {asked.serial or 'the unit'} with `labctl live`")
 
 
-def _end_in_service(control: ServiceControl, _: CommandContext, asked: LiveEndRequest) -> LiveStateResponse:
+def _end_in_service(control: ServiceBench, _: CommandContext, asked: LiveEndRequest) -> LiveStateResponse:
     return control.live_control().end(asked)
 
 
-def _end_in_foreground(_: ForegroundControl, __: CommandContext, ___: LiveEndRequest) -> LiveStateResponse:
+def _end_in_foreground(_: Foreground, __: CommandContext, ___: LiveEndRequest) -> LiveStateResponse:
     """Raise Conflict: one that runs in a terminal is ended there."""
     raise Conflict("no service runs on this database; end `labctl live` with Ctrl-C in its terminal")
 

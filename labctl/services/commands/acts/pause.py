@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from labctl.services.campaigns.unattended import not_running
-from labctl.services.commands.acts.bench_act import CampaignAct
-from labctl.services.commands.context import CommandContext
+from labctl.services.commands.acts.campaign_act import CampaignAct
+from labctl.services.commands.context import CommandContext, Foreground, ServiceBench
 from labctl.services.commands.requests import ToCampaign
 from labctl.services.schemas.campaigns import CampaignResponse, ReasonRequest
-
-if TYPE_CHECKING:
-    from labctl.services.commands.foreground_control import ForegroundControl
-    from labctl.services.commands.service_control import ServiceControl
 
 Asked = ToCampaign[ReasonRequest]
 
 
-def _in_service(control: ServiceControl, context: CommandContext, asked: Asked) -> CampaignResponse:
+def _in_service(control: ServiceBench, context: CommandContext, asked: Asked) -> CampaignResponse:
     if control.runner is None:
         raise not_running(context.store, asked.campaign, f"pause it ({asked.body.reason})")
     answer = control.runner.pause(asked.campaign, asked.body)
@@ -25,7 +19,7 @@ def _in_service(control: ServiceControl, context: CommandContext, asked: Asked) 
     return answer
 
 
-def _in_foreground(_: ForegroundControl, context: CommandContext, asked: Asked) -> CampaignResponse:
+def _in_foreground(_: Foreground, context: CommandContext, asked: Asked) -> CampaignResponse:
     """Raise Conflict: a campaign that this process could pause would hold the database."""
     raise not_running(context.store, asked.campaign, f"pause it ({asked.body.reason})")
 

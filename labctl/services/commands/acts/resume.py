@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from labctl.errors import Conflict
-from labctl.services.commands.acts.bench_act import OPENS_BENCH_S, BenchAct
 from labctl.services.commands.command import Command
-from labctl.services.commands.context import CommandContext
+from labctl.services.commands.context import OPENS_BENCH_S, BenchAct, CommandContext, Foreground, ServiceBench
 from labctl.services.commands.requests import CampaignResume
 from labctl.services.schemas.campaigns import CampaignResponse
 
-if TYPE_CHECKING:
-    from labctl.services.commands.foreground_control import ForegroundControl
-    from labctl.services.commands.service_control import ServiceControl
 
-
-def _in_service(control: ServiceControl, context: CommandContext, asked: CampaignResume) -> CampaignResponse:
+def _in_service(control: ServiceBench, context: CommandContext, asked: CampaignResume) -> CampaignResponse:
     runner, body = control.bench_runner(), asked.body
     if asked.campaign is None:
         raise Conflict("state the number of the campaign to resume; `labctl campaign list` shows the numbers")
@@ -27,7 +20,7 @@ def _in_service(control: ServiceControl, context: CommandContext, asked: Campaig
     return answer
 
 
-def _in_foreground(control: ForegroundControl, _: CommandContext, asked: CampaignResume) -> CampaignResponse:
+def _in_foreground(control: Foreground, _: CommandContext, asked: CampaignResume) -> CampaignResponse:
     return control.run_on(asked)
 
 

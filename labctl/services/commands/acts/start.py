@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
-from labctl.services.commands.acts.bench_act import OPENS_BENCH_S, BenchAct
 from labctl.services.commands.command import Command
-from labctl.services.commands.context import CommandContext
+from labctl.services.commands.context import OPENS_BENCH_S, BenchAct, CommandContext, Foreground, ServiceBench
 from labctl.services.commands.requests import CampaignStart
 from labctl.services.planning.fit_rules import check_fit
 from labctl.services.planning.loading import load_recipe
@@ -16,26 +14,20 @@ from labctl.services.schemas.campaigns import CampaignResponse
 from labctl.services.schemas.schedule import ScheduledResponse
 from labctl.services.simulation.effect_sizes import with_sizes
 
-if TYPE_CHECKING:
-    from labctl.services.commands.foreground_control import ForegroundControl
-    from labctl.services.commands.service_control import ServiceControl
 
-
-def _start_in_service(control: ServiceControl, _: CommandContext, asked: CampaignStart) -> CampaignResponse:
+def _start_in_service(control: ServiceBench, _: CommandContext, asked: CampaignStart) -> CampaignResponse:
     return control.bench_runner().start(asked.body)
 
 
-def _start_in_foreground(control: ForegroundControl, _: CommandContext, asked: CampaignStart) -> CampaignResponse:
+def _start_in_foreground(control: Foreground, _: CommandContext, asked: CampaignStart) -> CampaignResponse:
     return control.run(asked)
 
 
-def _schedule_in_service(control: ServiceControl, context: CommandContext, asked: CampaignStart) -> ScheduledResponse:
+def _schedule_in_service(control: ServiceBench, context: CommandContext, asked: CampaignStart) -> ScheduledResponse:
     return queue.add_start(context.store, asked.body, control.bench_runner().bench, context.now())
 
 
-def _schedule_in_foreground(
-    control: ForegroundControl, context: CommandContext, asked: CampaignStart
-) -> ScheduledResponse:
+def _schedule_in_foreground(control: Foreground, context: CommandContext, asked: CampaignStart) -> ScheduledResponse:
     return control.schedule(context, asked)
 
 
