@@ -14,7 +14,7 @@ from instruments.clock import Clock
 from instruments.errors import InstrumentError, LinkError, MalformedReply, NoReply, RequestRejected
 from instruments.protocols.text_lines.line_syntax import LineSyntax
 from instruments.transport.factory import Ports
-from instruments.transport.rtu.line import RtuLine
+from instruments.transport.rtu import RtuLine
 from instruments.transport.serial import BROKEN, EIGHT_N_1, Line, SerialPort
 
 log = logging.getLogger(__name__)

@@ -19,7 +19,7 @@ from pymodbus.pdu import ModbusPDU
 from instruments.clock import Clock, sleep_until
 from instruments.errors import InstrumentError, LinkError, MalformedReply, NoReply, RequestRejected, one_line
 from instruments.protocols.modbus_codes import ACKNOWLEDGED, BUSY, EXCEPTIONS, TCP_PREFIX_BYTES, ends_at_a_frame_end
-from instruments.transport.rtu.line import NeverSilent, RtuLine
+from instruments.transport.rtu import NeverSilent, RtuLine
 from instruments.transport.serial import BROKEN, SerialPort
 
 SHORTEST_RTU_BYTES = 5

@@ -44,7 +44,7 @@ from labctl.store.repositories.certified_versions import (
     CertifiedVersions as CertifiedVersions,
 )
 from labctl.store.repositories.check_gyros import CheckGyroRow as CheckGyroRow, CheckGyros as CheckGyros
-from labctl.store.repositories.documents.certificates import (
+from labctl.store.repositories.certificates import (
     CertificateForms as CertificateForms,
     CertificateRow as CertificateRow,
     Certificates as Certificates,

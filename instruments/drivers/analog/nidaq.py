@@ -24,7 +24,7 @@ from instruments.protocols.analog_settings import NidaqSettings
 from instruments.protocols.nidaqmx.rpc_status import RpcStatus
 from instruments.protocols.nidaqmx.service import INSTALL, INSTALL_GRPC
 from instruments.transport.factory import Ports
-from instruments.transport.rpc.channel import RpcChannel
+from instruments.transport.rpc import RpcChannel
 
 PACKAGE = "nidaqmx"
 #: What nidaqmx itself imports with its first task, without a server and with one.

@@ -16,7 +16,7 @@ from labctl.fitting.data.mounting_angles import leaning_rates
 from labctl.fitting.data.rate_profile import DELAY, TIME_CONSTANT
 from labctl.fitting.data.shifts import KINDS, shifts_of
 from labctl.fitting.estimation.axis_design import AxisDesign, axis_design
-from labctl.fitting.estimation.held.propagation import considered, joint_covariance
+from labctl.fitting.estimation.held import considered, joint_covariance
 from labctl.fitting.estimation.response import (
     first_response,
     next_response,

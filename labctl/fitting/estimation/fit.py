@@ -22,8 +22,8 @@ from labctl.fitting.effects import Term, kind_of
 from labctl.fitting.estimation.axis_design import TOLD_APART
 from labctl.fitting.estimation.axis_solutions import leaning, residuals, solve_axes
 from labctl.fitting.estimation.error_metrics import ErrorFigures, rms
-from labctl.fitting.estimation.held.resolution import Fixed, refuse_fixed, with_held
-from labctl.fitting.estimation.joint.findings import joint_findings
+from labctl.fitting.estimation.held import Fixed, refuse_fixed, with_held
+from labctl.fitting.estimation.joint import joint_findings
 from labctl.fitting.estimation.of_poses import of_poses
 from labctl.fitting.estimation.published.common import full_range_dps
 from labctl.fitting.estimation.published.tables import from_coefficients

@@ -13,7 +13,7 @@ from labctl.errors import LabctlError
 from labctl.fitting.data.channels import BODY_AXES
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.estimation.axis_solutions import leaning, residuals, solve_axes
-from labctl.fitting.estimation.held.resolution import Fixed, with_held
+from labctl.fitting.estimation.held import Fixed, with_held
 from labctl.fitting.estimation.requirements import require_enough_data
 from labctl.fitting.estimation.shapes import with_shapes
 from labctl.fitting.models.fitted_model import FittedModel

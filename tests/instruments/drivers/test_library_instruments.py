@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from instruments.bench_config import BenchFile, read_bench
 from instruments.clock import VirtualClock
-from instruments.drivers.references.library_reference import LibraryReference
+from instruments.drivers.library_reference import LibraryReference
 from instruments.drivers.resolution import resolve
 from instruments.errors import LinkError, MalformedReply, NoReply, RequestRejected, WrongInstrument
 from instruments.transport.factory import Ports

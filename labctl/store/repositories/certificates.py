@@ -18,8 +18,8 @@ from labctl.store.connection.transactions import transaction
 from labctl.store.manifests.contents import CERTIFICATE
 from labctl.store.records import Withdrawal
 from labctl.store.repositories.audit import append
-from labctl.store.repositories.documents.withdrawals import withdraw
 from labctl.store.repositories.standards import last_finding
+from labctl.store.repositories.withdrawals import withdraw
 from labctl.store.schema import tables
 from labctl.store.sealing.seals import seal
 
