@@ -23,8 +23,8 @@ from procedures.contracts.steps import (
     SafeState,
     Soak,
 )
-from procedures.execution.by_hand import turn
 from procedures.execution.acquire import acquire
+from procedures.execution.by_hand import turn
 from procedures.execution.context import ExecutionContext
 from procedures.execution.prompting import ask
 from procedures.execution.safe_state import make_safe
