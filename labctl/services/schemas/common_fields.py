@@ -7,6 +7,14 @@ from typing import Annotated
 
 from pydantic import Field
 
+# descriptions of quantities whose types differ
+MOTION = (
+    "How the unit was moved: at constant table rates, at rest, turned by known angles, along a rate profile, or by "
+    "hand between poses."
+)
+POSITION = "Position of the unit: the body axis that points up, such as z or -x."
+KIND = "Kind of data: samples (every reading), points (one mean per data set) or coefficients (a published table)."
+
 # who and what
 Serial = Annotated[str, Field(description="Serial number of the unit.")]
 VersionNumber = Annotated[int, Field(description="Number of the calibration version, counted from 1 for each unit.")]
