@@ -14,6 +14,8 @@ MOTION = (
 )
 POSITION = "Position of the unit: the body axis that points up, such as z or -x."
 KIND = "Kind of data: samples (every reading), points (one mean per data set) or coefficients (a published table)."
+TECHNOLOGY = "Technology of the gyro: fog (fibre-optic), mems or piezo; null: not known."
+ROOM_UNIT = "Unit of the quantity: deg C for temperature, % for relative humidity, hPa for air pressure."
 
 # who and what
 Serial = Annotated[str, Field(description="Serial number of the unit.")]

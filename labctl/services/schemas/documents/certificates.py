@@ -75,7 +75,9 @@ class OrderedConformity(Request):
     """The specification to which conformity is to be stated, and the rule."""
 
     specification: str = Field(min_length=1, max_length=LINE, description="Specification, as the certificate names it.")
-    limit_dps: float = Field(gt=0, allow_inf_nan=False, description="Largest permitted error of a corrected rate.")
+    limit_dps: float = Field(
+        gt=0, allow_inf_nan=False, description="Largest permitted error of a corrected rate, deg/s."
+    )
     about: Use = Field(
         default="any axis",
         description="Rotations that the statement holds for. any axis: rate vectors of any direction up to the "
@@ -132,7 +134,7 @@ class OrderedMagnetometer(OrderedSensor):
 class CertificateOrder(Request):
     """The facts of the order: what a campaign cannot know. They are kept with the certificate."""
 
-    customer: Customer = Field(default=Customer(), description="Who ordered the calibration.")
+    customer: Customer = Field(default=Customer(), description="The customer who ordered the calibration.")
     item: OrderedItem = Field(default=OrderedItem(), description="The item as the laboratory received it.")
     method: OrderedMethod = Field(
         default=OrderedMethod(), description="Facts of the method that the recipe does not state."

@@ -7,12 +7,13 @@ from typing import Literal
 from pydantic import Field
 
 from labctl.services.schemas.base import ResponseModel
+from labctl.services.schemas.common_fields import ReadingCount, Sentences
 
 
 class Estimate(ResponseModel):
     """A value with its standard uncertainty."""
 
-    value: float
+    value: float = Field(description="Value, in the unit that the field of this estimate states.")
     u: float | None = Field(description="Standard uncertainty; null: the value was given.")
 
 
@@ -22,13 +23,13 @@ class MagnetometerResponse(ResponseModel):
     verdict: Literal["adequate", "unexplained"] = Field(
         description="adequate: the readings are those of a constant field up to their noise; unexplained: they are not."
     )
-    hard_iron_ut: dict[str, Estimate]
+    hard_iron_ut: dict[str, Estimate] = Field(description="For each axis: hard iron, uT.")
     soft_iron: dict[str, Estimate] = Field(description="Symmetric matrix: xx, yy, zz, xy, xz, yz.")
-    field_ut: Estimate
+    field_ut: Estimate = Field(description="Magnitude of the field, uT.")
     covariance: list[list[float]] = Field(
         description="Of hard iron x, y, z, soft iron xx, yy, zz, xy, xz, yz, and field."
     )
-    readings: int
+    readings: ReadingCount
     left_out: int = Field(description="Readings further from the ellipsoid than five robust standard deviations.")
     before_ut: float = Field(description="Standard deviation of the size of the raw readings, uT.")
     residual_ut: float = Field(description="Root mean square of the distances from the ellipsoid, uT.")
@@ -40,4 +41,4 @@ class MagnetometerResponse(ResponseModel):
     )
     heading_error_deg: float = Field(description="Angle to which the held-out error turns a field square to it, deg.")
     largest_gap_deg: float = Field(description="From any direction to the nearest that was measured, at most, deg.")
-    text: list[str]
+    text: Sentences
