@@ -194,7 +194,7 @@ class ProfileColumns(ResponseModel):
 
 
 class AxisResponse(ResponseModel):
-    """Delay and bandwidth of one axis, as a version has them; null: not part of its model, or not known."""
+    """Delay and bandwidth of one axis, as a version has them."""
 
     delay_s: float | None = Field(default=None, description="Delay of the output, s; null: not part of the model.")
     u_delay_s: float | None = Field(

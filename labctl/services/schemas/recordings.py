@@ -156,7 +156,7 @@ class ExportedRecording(ResponseModel):
 
 
 class ChannelColumns(ResponseModel):
-    """A channel's figures by data set, in the channel's unit; null: none."""
+    """A channel's figures by data set."""
 
     mean: list[float | None] = Field(description="Mean of each data set, in the unit of the channel; null: none.")
     std: list[float | None] = Field(

@@ -15,7 +15,7 @@ class HealthResponse(ResponseModel):
     """Whether the service is well: its database, its bench and its schedule."""
 
     status: Literal["ok", "look at the bench"] = Field(
-        description="ok: all is well; look at the bench: the last safe state of the bench is not confirmed."
+        description="ok: all is well; else the last safe state of the bench is not confirmed."
     )
     version: LabctlVersion
     database: str = Field(description="Name of the database, or of its file without the folder.")

@@ -168,7 +168,7 @@ class DriftLine(ResponseModel):
 
 
 class Leaving(ResponseModel):
-    """When the bias of an axis leaves the limit; null: not within 50 years, or not known."""
+    """When the bias of an axis leaves the limit."""
 
     axis: OutputAxis
     outside: bool = Field(

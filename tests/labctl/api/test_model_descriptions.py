@@ -5,7 +5,7 @@ from __future__ import annotations
 import importlib
 import pkgutil
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import pytest
 from pydantic import BaseModel
@@ -29,7 +29,7 @@ UNITS = {
 }  # fmt: skip
 
 
-def modules(package: str, path: list[str]) -> Iterator[str]:
+def modules(package: str, path: Iterable[str]) -> Iterator[str]:
     """Yield the names of a package's modules."""
     return (each.name for each in pkgutil.walk_packages(path, f"{package}."))
 
