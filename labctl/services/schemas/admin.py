@@ -78,8 +78,11 @@ class AuditResponse(ResponseModel):
 
     id: int = Field(description="Number of the row in the audit trail, from 1.")
     at: ActTime
-    who: str = Field(description="Name of the API key or of the person that acted; `labctl`: the program itself.")
-    action: str = Field(description="Kind of act, such as certify or import.")
+    who: str = Field(
+        description="Name of the person, from the API key, from `by` or from the command line; `labctl`: the program "
+        "itself."
+    )
+    action: str = Field(description="Kind of act, such as `certify` or `campaign state`.")
     subject: str = Field(description="What was acted on, such as a unit, a version, a campaign or a key.")
     detail: dict[str, JsonValue] = Field(description="Details of the action; the keys depend on `action`.")
     hash: str = Field(description="SHA-256 of this row and of the hash of the row before it.")

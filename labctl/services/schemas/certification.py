@@ -83,8 +83,8 @@ class Objection(ResponseModel):
     """One objection to certifying a version."""
 
     what: Literal["verdict", "worse", "data", "standard"] = Field(
-        description="Kind of objection: the verdict, an error worse than that of another version, errors of the "
-        "data, or a reference standard."
+        description="verdict: the model lacks something, or there is no verdict; worse: an error without compensation "
+        "or of another version is smaller; data: the data are certainly wrong; standard: a reference standard was bad."
     )
     text: str = Field(description="The objection, with figures in deg/s.")
     do: str = Field(description="What to do instead of certifying this version.")

@@ -15,7 +15,7 @@ from labctl.services.schemas.plans import AttendanceResponse
 class StartEventResponse(ResponseModel):
     """Outcome of one past start."""
 
-    at: datetime = Field(description="Time of the outcome.")
+    at: datetime = Field(description="Time at which the service took up the start.")
     due_at: datetime = Field(description="Time at which the start was due, in the time zone of the entry.")
     outcome: Literal["claimed", "started", "refused", "missed"] = Field(
         description="claimed: a service is starting the campaign; started: the campaign began; refused: it could "

@@ -51,7 +51,7 @@ class AccelerometerResponse(ResponseModel):
     misalignment: dict[str, Estimate] = Field(description="xy, xz, yz: of an axis by the force along another.")
     covariance: list[list[float]] = Field(description="Of bias x, y, z, scale factor x, y, z, misalignment xy, xz, yz.")
     gravity_g: float = Field(description="Local gravity, in units of 9.80665 m/s2.")
-    rests: int = Field(description="Number of rests.")
+    rests: int = Field(description="Number of rests, also of those that were left out.")
     left_out: int = Field(description="Rests that do not agree with gravity by five standard deviations.")
     poses: int = Field(description="Different directions among the rests.")
     before_g: float = Field(description="Root mean square by which the raw sizes differ from gravity, g.")

@@ -7,7 +7,7 @@ from typing import Literal
 from pydantic import Field
 
 from labctl.services.schemas.base import ResponseModel
-from labctl.services.schemas.common_fields import ReadingCount, Sentences
+from labctl.services.schemas.common_fields import Sentences
 
 
 class Estimate(ResponseModel):
@@ -25,11 +25,13 @@ class MagnetometerResponse(ResponseModel):
     )
     hard_iron_ut: dict[str, Estimate] = Field(description="For each axis: hard iron, uT.")
     soft_iron: dict[str, Estimate] = Field(description="Symmetric matrix: xx, yy, zz, xy, xz, yz.")
-    field_ut: Estimate = Field(description="Magnitude of the field, uT.")
+    field_ut: Estimate = Field(
+        description="Magnitude of the field, uT: as given, or with a soft iron of determinant 1."
+    )
     covariance: list[list[float]] = Field(
         description="Of hard iron x, y, z, soft iron xx, yy, zz, xy, xz, yz, and field."
     )
-    readings: ReadingCount
+    readings: int = Field(description="Number of readings, also of those that were left out.")
     left_out: int = Field(description="Readings further from the ellipsoid than five robust standard deviations.")
     before_ut: float = Field(description="Standard deviation of the size of the raw readings, uT.")
     residual_ut: float = Field(description="Root mean square of the distances from the ellipsoid, uT.")
