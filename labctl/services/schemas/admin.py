@@ -43,26 +43,27 @@ class Caller:
     via: str
 
 
+#: What a role permits, in the description of a key.
+ROLE = (
+    "What the key may do. viewer: read; operator: also import, fit, improve and run campaigns; approver: also certify, "
+    "revoke, and make and revoke keys."
+)
+
+
 class KeyRequest(Request):
     """A key to make."""
 
     name: Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9][A-Za-z0-9 ._@-]{0,99}$")] = Field(
         description="Name of the key's owner, shown in the audit trail; a name cannot be used for a second key."
     )
-    role: Role = Field(
-        description="What the key may do: viewer: read; operator: also import, fit and run campaigns; approver: "
-        "also certify, revoke, and make and revoke keys."
-    )
+    role: Role = Field(description=ROLE)
 
 
 class KeyResponse(ResponseModel):
     """A key as it may be seen later: without the key."""
 
     name: str = Field(description="Name of the key's owner, as in the audit trail.")
-    role: Role = Field(
-        description="What the key may do: viewer: read; operator: also import, fit and run campaigns; approver: "
-        "also certify, revoke, and make and revoke keys."
-    )
+    role: Role = Field(description=ROLE)
     created_at: datetime = Field(description="Time at which the key was made.")
     revoked_at: datetime | None = Field(description="Time at which the key was revoked; null: it is in force.")
 

@@ -27,14 +27,17 @@ from labctl.services.schemas.base import Request, ResponseModel
 from labctl.services.schemas.certification import CertificationResponse
 from labctl.services.schemas.common_fields import (
     CalibrationHash,
+    EffectIds,
     FittedRms,
     HeldoutRms,
+    InForce,
     ModelName,
     NoiseFloor,
     ParentVersion,
     RawRms,
     Serial,
     VersionNumber,
+    VersionTime,
 )
 from labctl.services.schemas.criticism import ResidualColumns
 from labctl.services.schemas.documents.fixed import FixedCoefficients
@@ -97,7 +100,7 @@ class ModelResponse(ResponseModel):
     """Which effects a calibration is made of; null: made by an older version of labctl, which did not say."""
 
     name: ModelName
-    effects: list[str] = Field(description="Ids of the effects in the model, as the catalogue names them.")
+    effects: EffectIds
     argument: Literal["rate", "output"] = Field(
         description="What the regressors are computed from: `rate`, the true rate (forward law), or `output`, the "
         "gyro's output (direct law)."
@@ -246,9 +249,9 @@ class CalibrationRow(ResponseModel):
     version: VersionNumber
     parent: ParentVersion
     model: ModelName
-    created_at: datetime = Field(description="Time at which the version was stored.")
+    created_at: VersionTime
     hash: CalibrationHash
-    certified: bool = Field(description="Whether this version is in force: certified last, and not revoked.")
+    certified: InForce
     rms_dps: FittedRms = None
     heldout_rms_dps: HeldoutRms = None
     notices: list[str] = Field(default_factory=list, description=NOTICES)
@@ -286,8 +289,8 @@ class Follower(ResponseModel):
 class VersionFacts(ResponseModel):
     """When a version was made, from what, and whether it is in force."""
 
-    created_at: datetime = Field(description="Time at which the version was stored.")
-    in_force: bool = Field(description="Whether this version is in force: certified last, and not revoked.")
+    created_at: VersionTime
+    in_force: InForce
     notices: list[str] = Field(default_factory=list, description=NOTICES)
     due: datetime | None = Field(
         default=None, description="Date until which the certification is valid; null: no date."

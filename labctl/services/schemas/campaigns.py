@@ -8,7 +8,7 @@ from typing import Literal, get_args
 from pydantic import AwareDatetime, Field
 
 from labctl.services.schemas.base import LongText, Request, ResponseModel
-from labctl.services.schemas.common_fields import BenchName, CampaignNumber, Person, Reason, RecipeName, StepCount
+from labctl.services.schemas.common_fields import BenchName, CampaignNumber, Clip, Person, Reason, RecipeName, StepCount
 from labctl.services.schemas.plans import RecipeSource
 from labctl.services.schemas.reports.campaign_parts import (
     AdviceResponse,
@@ -29,9 +29,7 @@ class CampaignRequest(Request):
     """Which recipe to run on the service's bench."""
 
     recipe: RecipeSource
-    clip: bool = Field(
-        default=False, description="Leave out points that are beyond the limits of the bench or of a unit."
-    )
+    clip: Clip = False
     hide: list[str] = Field(
         default_factory=list,
         max_length=20,
@@ -97,9 +95,7 @@ class StartRequest(Request):
         description="Path of a bench file, or the name of a shipped bench; default: the simulated bench that fits "
         "the recipe best.",
     )
-    clip: bool = Field(
-        default=False, description="Leave out points that are beyond the limits of the bench or of a unit."
-    )
+    clip: Clip = False
     hide: list[str] = Field(
         default_factory=list, max_length=20, description="Has the same meaning as in `POST /api/campaigns`."
     )

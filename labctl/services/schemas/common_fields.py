@@ -19,7 +19,10 @@ ROOM_UNIT = "Unit of the quantity: deg C for temperature, % for relative humidit
 
 # who and what
 Serial = Annotated[str, Field(description="Serial number of the unit.")]
+UnitModel = Annotated[str, Field(description="Model of the unit, as its manufacturer names it; empty: not stated.")]
 VersionNumber = Annotated[int, Field(description="Number of the calibration version, counted from 1 for each unit.")]
+VersionTime = Annotated[datetime, Field(description="Time at which the version was stored.")]
+InForce = Annotated[bool, Field(description="Whether this version is in force: certified last, and not revoked.")]
 ParentVersion = Annotated[
     int | None,
     Field(description="Version of which a change of effects made this version; null: it is from a fit."),
@@ -29,12 +32,16 @@ CampaignNumber = Annotated[int, Field(description="Number of the campaign.")]
 BenchName = Annotated[str, Field(description="Name of the bench.")]
 RecipeName = Annotated[str, Field(description="Name of the recipe.")]
 ModelName = Annotated[str, Field(description="Name of the error model.")]
+EffectIds = Annotated[list[str], Field(description="Ids of the effects in the model, as the catalogue names them.")]
+CoefficientName = Annotated[str, Field(description="Name of the coefficient.")]
+CoefficientUnit = Annotated[str, Field(description="Unit of the coefficient.")]
 OutputAxis = Annotated[str, Field(description="Output axis of the unit: x, y or z.")]
 CalibrationHash = Annotated[str, Field(description="SHA-256 of the calibration as it was stored.")]
 ScheduleHash = Annotated[
     str, Field(description="SHA-256 of the steps in their order; it is equal for two plans of the same steps.")
 ]
 StandardLabel = Annotated[str, Field(description="Name of the reference standard in the register.")]
+CertificateNumber = Annotated[str, Field(description="Number of the certificate.")]
 LabctlVersion = Annotated[str, Field(description="Version of labctl that the service runs.")]
 FileName = Annotated[str, Field(description="Path of the file.")]
 FileSize = Annotated[int, Field(description="Size of the file in bytes.")]
@@ -48,6 +55,12 @@ DistributionVersion = Annotated[str, Field(description="Version of that distribu
 Person = Annotated[str, Field(description="Name of the person who acted, as typed.")]
 Reason = Annotated[str, Field(description="Reason for the act, as typed.")]
 ActTime = Annotated[datetime, Field(description="Time of the act.")]
+
+# options of a campaign and of a plan
+Clip = Annotated[
+    bool, Field(description="Whether to leave out points that are beyond the limits of the bench or of a unit.")
+]
+EndsInDraft = Annotated[bool, Field(description="Whether the campaign ends in a draft if its recipe has [fit].")]
 
 # counts, times and sentences
 DatasetCount = Annotated[int, Field(description="Number of data sets.")]

@@ -9,7 +9,7 @@ from pydantic import Field
 
 from labctl.services.schemas.base import Request, ResponseModel
 from labctl.services.schemas.calibrations import FitResponse
-from labctl.services.schemas.common_fields import OutputAxis, Serial
+from labctl.services.schemas.common_fields import CoefficientName, CoefficientUnit, OutputAxis, Serial
 
 #: A serial number, as a recording takes it.
 SERIAL = r"^[A-Za-z0-9][A-Za-z0-9._+# -]{0,63}$"
@@ -76,10 +76,10 @@ class LiveCoefficientResponse(ResponseModel):
     """One coefficient of a live calibration."""
 
     axis: OutputAxis
-    name: str = Field(description="Name of the coefficient.")
+    name: CoefficientName
     value: float = Field(description="Value of the coefficient, in `unit`.")
     expanded: float = Field(description="Expanded uncertainty U with k = 2, in `unit`.")
-    unit: str = Field(description="Unit of the coefficient.")
+    unit: CoefficientUnit
     limit: float | None = Field(description="Limit of U by the target; null: the target states none.")
 
 
@@ -187,8 +187,8 @@ class LiveUncertaintyColumn(ResponseModel):
     """U of one coefficient over the fits of a live calibration."""
 
     axis: OutputAxis
-    name: str = Field(description="Name of the coefficient.")
-    unit: str = Field(description="Unit of the coefficient.")
+    name: CoefficientName
+    unit: CoefficientUnit
     limit: float | None = Field(description="Limit of U by the target; null: the target states none.")
     expanded: list[float | None] = Field(description="U (k = 2) at each fit, in `unit`; null: the fit has none.")
 

@@ -12,6 +12,7 @@ from labctl.services.schemas.base import LongText, Request, ResponseModel
 from labctl.services.schemas.common_fields import (
     BenchName,
     CampaignNumber,
+    Clip,
     DatasetCount,
     ExpectedDuration,
     RecipeName,
@@ -44,9 +45,7 @@ class PlanRequest(Request):
     """Which recipe to plan on the service's bench."""
 
     recipe: RecipeSource
-    clip: bool = Field(
-        default=False, description="Leave out points that are beyond the limits of the bench or of a unit."
-    )
+    clip: Clip = False
     visibility: bool = Field(
         default=False, description="Also compute which effects the plan could detect; takes some seconds."
     )

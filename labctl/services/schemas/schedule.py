@@ -8,14 +8,14 @@ from typing import Literal
 from pydantic import Field
 
 from labctl.services.schemas.base import ResponseModel
-from labctl.services.schemas.common_fields import BenchName, RecipeName
+from labctl.services.schemas.common_fields import BenchName, Clip, EndsInDraft, RecipeName
 from labctl.services.schemas.plans import AttendanceResponse
 
 
 class StartEventResponse(ResponseModel):
     """Outcome of one past start."""
 
-    at: datetime = Field(description="Time at which the service took up the start.")
+    at: datetime = Field(description="Time at which the service acted on the start.")
     due_at: datetime = Field(description="Time at which the start was due, in the time zone of the entry.")
     outcome: Literal["claimed", "started", "refused", "missed"] = Field(
         description="claimed: a service is starting the campaign; started: the campaign began; refused: it could "
@@ -41,12 +41,12 @@ class ScheduledResponse(ResponseModel):
     priority: int = Field(
         description="Priority, -100 to 100: of several starts that are due, the one with the highest begins first."
     )
-    clip: bool = Field(description="Whether points that are beyond the limits of the bench or of a unit are left out.")
+    clip: Clip
     hide: list[str] = Field(
         default_factory=list,
         description="Effects hidden in the units of a simulated bench, each as EFFECT or EFFECT=SIZE.",
     )
-    fit: bool = Field(default=True, description="Whether the campaign ends in a draft if its recipe has [fit].")
+    fit: EndsInDraft = True
     late_limit_s: float | None = Field(description="Limit of the entry on the delay of a start, s; null: none given.")
     missed_after_s: float | None = Field(
         default=None,

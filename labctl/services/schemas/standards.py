@@ -11,6 +11,8 @@ from instruments.bench_config import SERIAL
 from labctl.services.schemas.base import LongText, Request, ResponseModel
 from labctl.services.schemas.common_fields import (
     ActTime,
+    CertificateNumber,
+    InForce,
     Person,
     Reason,
     Sentences,
@@ -72,7 +74,7 @@ class CertifiedPointRequest(Request):
 class StandardCertificateRequest(Request):
     """Enter a certificate of a standard."""
 
-    number: str = Field(min_length=1, max_length=100, description="Number of the certificate.")
+    number: CertificateNumber = Field(min_length=1, max_length=100)
     laboratory: str = Field(min_length=1, max_length=300, description="Laboratory that issued the certificate.")
     calibrated: date = Field(description="Day of the calibration.")
     due: date | None = Field(default=None, description="Last day on which the standard may be used.")
@@ -147,7 +149,7 @@ class CertifiedPointResponse(ResponseModel):
 class StandardCertificateResponse(ResponseModel):
     """A certificate of a standard."""
 
-    number: str = Field(description="Number of the certificate.")
+    number: CertificateNumber
     laboratory: str = Field(description="Laboratory that issued the certificate.")
     calibrated: date = Field(description="Day of the calibration.")
     due: date | None = Field(
@@ -249,7 +251,7 @@ class AffectedCalibration(ResponseModel):
     performed_until: date | None = Field(
         description="Last day of these measurements; null: the date of a recording is not known."
     )
-    in_force: bool = Field(description="Whether this version is in force: certified last, and not revoked.")
+    in_force: InForce
     certificates: list[str] = Field(description="Numbers of the certificates issued of it, the newest first.")
     findings: list[int] = Field(description="Findings of the standard that hold for these days.")
 

@@ -20,6 +20,7 @@ from labctl.services.schemas.common_fields import (
     RmsError,
     Sentences,
     Serial,
+    UnitModel,
     VersionNumber,
 )
 from labctl.services.schemas.reports.drafts import DraftResponse
@@ -46,7 +47,7 @@ class UnitResponse(ResponseModel):
     """A unit, its recordings and its calibrations."""
 
     serial: Serial
-    model: str = Field(description="Model of the unit, as its manufacturer names it; empty: not stated.")
+    model: UnitModel
     technology: str | None = Field(description=TECHNOLOGY)
     recordings: list[int] = Field(description="Numbers of the unit's recordings.")
     calibrations: list[int] = Field(description="Numbers of the unit's calibration versions.")

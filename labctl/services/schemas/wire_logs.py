@@ -8,7 +8,7 @@ from pydantic import BaseModel, Field
 
 from labctl.json_types import JsonObject
 from labctl.services.schemas.base import ResponseModel
-from labctl.services.schemas.common_fields import BenchName, FileName
+from labctl.services.schemas.common_fields import BenchName, Clip, EndsInDraft, FileName
 
 #: What a session does.
 SessionKind = Literal["campaign", "bench check", "campaign resume", "live", "driver test"]
@@ -29,10 +29,8 @@ class RecordedSession(BaseModel):
     recipe: str = Field(
         default="", description="Only for a campaign: name of a shipped recipe, or its own text as TOML; else empty."
     )
-    clip: bool = Field(
-        default=False, description="Whether points that are beyond the limits of the bench or of a unit are left out."
-    )
-    fit: bool = Field(default=False, description="Whether the campaign ends in a draft if its recipe has [fit].")
+    clip: Clip = False
+    fit: EndsInDraft = False
     campaign: int | None = Field(
         default=None,
         description="Number of the campaign that is resumed, in the database of the session; null: none is.",

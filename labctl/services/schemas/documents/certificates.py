@@ -11,7 +11,7 @@ from pydantic import AfterValidator, Field
 from instruments.laboratory import Laboratory
 from labctl.certificates.document import Customer, DecisionRule, Use
 from labctl.services.schemas.base import BY_KEY, LongText, Request, ResponseModel
-from labctl.services.schemas.common_fields import Serial, VersionNumber
+from labctl.services.schemas.common_fields import CertificateNumber, Serial, VersionNumber
 
 #: Most characters of a text, and of one that is one line of a certificate.
 TEXT, LINE = 2000, 300
@@ -196,7 +196,7 @@ class SignatoryResponse(ResponseModel):
 class WithdrawRequest(Request):
     """Withdraw a certificate; it stays withdrawn, and its bytes stay what they are."""
 
-    number: str = Field(min_length=1, max_length=100, description="Number of the certificate.")
+    number: CertificateNumber = Field(min_length=1, max_length=100)
     by: str = Field(min_length=1, max_length=200, description="Name of the person who withdraws it.")
     reason: str = Field(min_length=1, max_length=TEXT, description="Why; the list, the file and the page say it.")
 
@@ -206,7 +206,7 @@ class CertificateResponse(ResponseModel):
 
     serial: Serial
     version: VersionNumber
-    number: str = Field(description="Number of the certificate.")
+    number: CertificateNumber
     issued_at: datetime = Field(description="Time of issue.")
     by: str = Field(description="Name of the person who issued the certificate.")
     by_key: str | None = Field(default=None, description=BY_KEY)
@@ -234,7 +234,7 @@ class CertificateResponse(ResponseModel):
 class PublicCertificate(ResponseModel):
     """What the page behind the QR code of a certificate says: its state, and what to compare with the paper."""
 
-    number: str = Field(description="Number of the certificate.")
+    number: CertificateNumber
     hash: str = Field(description="SHA-256 of the certificate in its JSON form.")
     calibration_hash: str = Field(description="SHA-256 of the calibration, as printed on the certificate.")
     serial: Serial

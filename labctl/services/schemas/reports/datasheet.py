@@ -7,7 +7,7 @@ from typing import Literal
 from pydantic import Field
 
 from labctl.services.schemas.base import ResponseModel
-from labctl.services.schemas.common_fields import TECHNOLOGY, RecordingNumber, Sentences, Serial
+from labctl.services.schemas.common_fields import TECHNOLOGY, RecordingNumber, Sentences, Serial, UnitModel
 
 
 class MeasuredUnder(ResponseModel):
@@ -63,7 +63,7 @@ class DatasheetResponse(ResponseModel):
     """A unit in the terms of IEEE Std 528 and 952."""
 
     serial: Serial
-    model: str = Field(description="Model of the unit, as its manufacturer names it; empty: not stated.")
+    model: UnitModel
     technology: str | None = Field(description=TECHNOLOGY)
     recordings: list[int] = Field(
         description="Ids of the recordings from which the values in this data sheet were computed, ascending."

@@ -11,6 +11,8 @@ from labctl.services.schemas.base import Request, ResponseModel
 from labctl.services.schemas.certification import CertifiedErrors, Objection
 from labctl.services.schemas.common_fields import (
     CampaignNumber,
+    CoefficientName,
+    CoefficientUnit,
     MaxError,
     MeanError,
     ModelName,
@@ -77,13 +79,13 @@ class CoefficientChange(ResponseModel):
     """One coefficient of the draft beside the same of the version in force."""
 
     axis: OutputAxis
-    coefficient: str = Field(description="Name of the coefficient.")
+    coefficient: CoefficientName
     temperature_c: float | None = Field(description="Node of a temperature table, deg C; null: there is no table.")
     in_force: float = Field(description="Value in the version in force, in `unit`.")
     draft: float = Field(description="Value in the draft, in `unit`.")
     change: float = Field(description="`draft` minus `in_force`, in `unit`.")
     u: float | None = Field(description="Standard uncertainty of `change`: root sum of squares; null: unknown.")
-    unit: str = Field(description="Unit of the coefficient.")
+    unit: CoefficientUnit
     significant: bool | None = Field(description="Whether |change| is larger than 2 u; null: u is unknown.")
 
 

@@ -7,6 +7,7 @@ from pydantic import Field
 from labctl.services.schemas.base import ResponseModel
 from labctl.services.schemas.calibrations import FITTED_TO
 from labctl.services.schemas.common_fields import (
+    EffectIds,
     FittedRms,
     HeldoutRms,
     ModelName,
@@ -26,7 +27,7 @@ class LadderRow(ResponseModel):
     recording: int | None = Field(description="The recording that the version was fitted to.")
     recordings: list[int] = Field(default_factory=list, description=FITTED_TO)
     model: ModelName
-    effects: list[str] = Field(description="Ids of the effects in the model, as the catalogue names them.")
+    effects: EffectIds
     applied_rms_dps: float | None = Field(
         default=None,
         description="Only for versions in `others`: RMS error on this recording without refitting, deg/s.",

@@ -25,9 +25,7 @@ class MagnetometerResponse(ResponseModel):
     )
     hard_iron_ut: dict[str, Estimate] = Field(description="For each axis: hard iron, uT.")
     soft_iron: dict[str, Estimate] = Field(description="Symmetric matrix: xx, yy, zz, xy, xz, yz.")
-    field_ut: Estimate = Field(
-        description="Magnitude of the field, uT: as given, or with a soft iron of determinant 1."
-    )
+    field_ut: Estimate = Field(description="Magnitude of the field, uT: given, or with a soft iron of determinant 1.")
     covariance: list[list[float]] = Field(
         description="Of hard iron x, y, z, soft iron xx, yy, zz, xy, xz, yz, and field."
     )
