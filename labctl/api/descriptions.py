@@ -1,7 +1,8 @@
 """Descriptions of the fields of typed dictionaries in the API's description, from the docstrings below the fields.
 
 Models carry theirs as `Field(description=...)`. Typed dictionaries are read by programs that never load pydantic, so
-each field has a docstring below it (PEP 257, attribute docstrings), which is looked up when the description is asked for.
+each field has a docstring below it (PEP 257, attribute docstrings), which is read when the description is asked for.
+Fields whose names are keywords, which only the functional syntax can have, carry theirs as `Annotated[..., Doc(...)]`.
 """
 
 from __future__ import annotations
@@ -11,10 +12,10 @@ import inspect
 import pkgutil
 from importlib import import_module
 from types import ModuleType
-from typing import Any
+from typing import Any, get_type_hints
 
 from fastapi import FastAPI
-from typing_extensions import get_original_bases, is_typeddict
+from typing_extensions import Doc, get_original_bases, is_typeddict
 
 from labctl import json_types
 
@@ -27,7 +28,7 @@ class DescribedAPI(FastAPI):
         if self.openapi_schema is None:
             described = typed_dictionaries()
             for name, schema in super().openapi()["components"]["schemas"].items():
-                fields = described.get(name, {})
+                fields = described.get(name.rpartition("__")[2], {})  # qualified where two classes have one name
                 for key, field in schema.get("properties", {}).items():
                     if key in fields:
                         field.setdefault("description", fields[key])
@@ -43,12 +44,22 @@ def typed_dictionaries() -> dict[str, dict[str, str]]:
 
 
 def _described(module: ModuleType) -> dict[str, dict[str, str]]:
-    own = {
-        node.name: _docstrings(node)
-        for node in ast.parse(inspect.getsource(module)).body
-        if isinstance(node, ast.ClassDef) and is_typeddict(getattr(module, node.name))
+    written = {node.name: node for node in ast.parse(inspect.getsource(module)).body if isinstance(node, ast.ClassDef)}
+    kinds = {
+        name: kind for name, kind in vars(module).items() if is_typeddict(kind) and kind.__module__ == module.__name__
     }
-    return {name: _with_inherited(getattr(module, name), own) for name in own}
+    own = {name: _docstrings(written[name]) if name in written else _docs(kind) for name, kind in kinds.items()}
+    return {name: _with_inherited(kind, own) for name, kind in kinds.items()}
+
+
+def _docs(kind: type) -> dict[str, str]:
+    """Return field -> text of the `Doc` of a typed dictionary in the functional syntax."""
+    return {
+        field: text.documentation
+        for field, hint in get_type_hints(kind, include_extras=True).items()
+        for text in getattr(hint, "__metadata__", ())
+        if isinstance(text, Doc)
+    }
 
 
 def _with_inherited(kind: type, own: dict[str, dict[str, str]]) -> dict[str, str]:
