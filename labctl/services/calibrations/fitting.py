@@ -9,7 +9,7 @@ from labctl.calibration import build_calibration, read_calibration
 from labctl.fitting import fit
 from labctl.fitting.effects.response import IDS
 from labctl.fitting.uncertainty import evidence_of
-from labctl.json_types.models import KeptFit
+from labctl.json_types.kept_answers import KeptFit
 from labctl.recording.info import REFERENCES, RecordingInfo
 from labctl.services.calibrations.certification import certification_response, version_in_force
 from labctl.services.calibrations.comparison import worse_than_raw
