@@ -11,7 +11,6 @@ import ast
 import inspect
 import pkgutil
 from importlib import import_module
-from types import ModuleType
 from typing import Any, get_type_hints
 
 from fastapi import FastAPI
@@ -28,7 +27,7 @@ class DescribedAPI(FastAPI):
         if self.openapi_schema is None:
             described = typed_dictionaries()
             for name, schema in super().openapi()["components"]["schemas"].items():
-                fields = described.get(name.rpartition("__")[2], {})  # qualified where two classes have one name
+                fields = described.get(name, {})
                 for key, field in schema.get("properties", {}).items():
                     if key in fields:
                         field.setdefault("description", fields[key])
@@ -36,20 +35,23 @@ class DescribedAPI(FastAPI):
 
 
 def typed_dictionaries() -> dict[str, dict[str, str]]:
-    """Return name -> field -> description of the typed dictionaries of `labctl.json_types`."""
-    found: dict[str, dict[str, str]] = {}
-    for module in pkgutil.walk_packages(json_types.__path__, f"{json_types.__name__}."):
-        found |= _described(import_module(module.name))
-    return found
+    """Return name -> field -> description of the typed dictionaries of `labctl.json_types`.
 
-
-def _described(module: ModuleType) -> dict[str, dict[str, str]]:
-    written = {node.name: node for node in ast.parse(inspect.getsource(module)).body if isinstance(node, ast.ClassDef)}
-    kinds = {
-        name: kind for name, kind in vars(module).items() if is_typeddict(kind) and kind.__module__ == module.__name__
-    }
-    own = {name: _docstrings(written[name]) if name in written else _docs(kind) for name, kind in kinds.items()}
-    return {name: _with_inherited(kind, own) for name, kind in kinds.items()}
+    Each is there under its name and under the one that an OpenAPI document gives it where two classes share a name.
+    """
+    kinds: dict[str, type] = {}
+    own: dict[str, dict[str, str]] = {}
+    for found in pkgutil.walk_packages(json_types.__path__, f"{json_types.__name__}."):
+        module = import_module(found.name)
+        classes = {
+            node.name: node for node in ast.parse(inspect.getsource(module)).body if isinstance(node, ast.ClassDef)
+        }
+        for name, kind in vars(module).items():
+            if is_typeddict(kind) and kind.__module__ == module.__name__:
+                kinds[name] = kind
+                own[name] = _docstrings(classes[name]) if name in classes else _docs(kind)
+    described = {name: _with_inherited(kind, own) for name, kind in kinds.items()}
+    return described | {f"{kinds[name].__module__.replace('.', '__')}__{name}": described[name] for name in described}
 
 
 def _docs(kind: type) -> dict[str, str]:
@@ -63,7 +65,7 @@ def _docs(kind: type) -> dict[str, str]:
 
 
 def _with_inherited(kind: type, own: dict[str, dict[str, str]]) -> dict[str, str]:
-    """Return the descriptions of a typed dictionary's own fields, and of those of its bases in the same module."""
+    """Return the descriptions of a typed dictionary's own fields, and of those of its bases."""
     found: dict[str, str] = {}
     for base in get_original_bases(kind):
         if is_typeddict(base):
