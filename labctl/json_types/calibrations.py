@@ -151,7 +151,7 @@ class CalibrationJson(TypedDict):
     configuration: NotRequired[dict[str, str]]
     """Setting -> value, as the unit reported them; absent: it reports none."""
     provenance: dict[str, object]
-    """Recordings, campaign and hashes that the file is from."""
+    """Recordings, campaign, recipe and bench that the file is from."""
     how_to_use: str
     """How to apply the model, in words."""
     hash: str

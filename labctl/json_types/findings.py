@@ -25,7 +25,7 @@ class FindingJson(TypedDict):
     said: str
     """What is the case, in words, with value and unit."""
     value: float | None
-    """Value that was found, in `unit`; null: it is not a number."""
+    """Value that was found, in `unit`; null: there is no single number."""
     unit: str
     """Unit of the value; empty: it has none."""
     expected: str

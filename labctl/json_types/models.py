@@ -177,7 +177,7 @@ class SpecificForceJson(TypedDict):
     at_1_g_dps: dict[str, float]
     """Output axis -> upper bound of the error by 1 g in any direction, deg/s."""
     not_measured: dict[str, list[str]]
-    """Output axis -> body axes along which the fit saw no force; without them where there is none."""
+    """Output axis -> body axes along which its fit saw no force; only axes that have such."""
 
 
 class AxisCoefficients(TypedDict):
@@ -313,7 +313,12 @@ UsualRange = TypedDict(
     {
         "from": Annotated[float, Doc("Least usual value, in the unit of the coefficient.")],
         "to": Annotated[float, Doc("Largest usual value, in the unit of the coefficient.")],
-        "inside": Annotated[bool, Doc("Whether the coefficient may be in the range on every axis, within U = 2 u.")],
+        "inside": Annotated[
+            bool,
+            Doc(
+                "Whether it may be within the range on every axis, given U = 2 u; where both signs occur, by its size."
+            ),
+        ],
     },
 )
 
