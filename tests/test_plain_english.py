@@ -11,7 +11,14 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from tests.helpers.written_text import Written, documentation, page_strings, python_comments, python_strings
+from tests.helpers.written_text import (
+    Written,
+    documentation,
+    field_descriptions,
+    page_strings,
+    python_comments,
+    python_strings,
+)
 
 BANNED = {
     r"houses?": "name the package, the service or the laboratory",
@@ -83,7 +90,9 @@ def hits(texts: list[Written]) -> list[str]:
 
 
 @pytest.mark.parametrize(
-    "written", [documentation, python_strings, python_comments, page_strings], ids=lambda each: each.__name__
+    "written",
+    [documentation, python_strings, python_comments, field_descriptions, page_strings],
+    ids=lambda each: each.__name__,
 )
 def test_no_banned_word_is_read(written: Callable[[], Iterator[Written]]) -> None:
     texts = list(written())

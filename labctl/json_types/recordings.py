@@ -8,11 +8,15 @@ from typing_extensions import TypedDict
 
 
 class RawChannelJson(TypedDict):
-    """A channel as a device sends it: value in `unit` = offset + scale x whole number."""
+    """A channel as a device sends it: value = offset + scale x whole number."""
 
     name: str
+    """Name of the channel."""
     unit: str
+    """Unit of the value."""
     scale: float
+    """Value of one count, in `unit`."""
     offset: float
-    #: The column that this channel stands for: a reference thermometer for the unit's own.
+    """Value at count 0, in `unit`."""
     stands_for: NotRequired[str]
+    """Column that it replaces, as a reference thermometer replaces temperature_c; absent: none."""

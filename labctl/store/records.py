@@ -9,7 +9,7 @@ from typing import Literal
 
 from labctl.json_types import JsonDocument, JsonObject
 from labctl.json_types.calibrations import JudgementDetail
-from labctl.json_types.models import KeptAnswer
+from labctl.json_types.kept_answers import KeptAnswer
 from labctl.json_types.recordings import RawChannelJson
 from labctl.json_types.steps import StepJson
 from procedures.contracts.campaign_state import CampaignState

@@ -8,6 +8,7 @@ import re
 import tokenize
 from collections.abc import Iterator
 
+from labctl.api import create_app
 from tests.helpers.paths import ROOT
 from tests.helpers.source_files import sources
 
@@ -50,6 +51,13 @@ def python_comments() -> Iterator[Written]:
             for node in ast.walk(file.tree):
                 if isinstance(node, documented) and (text := ast.get_docstring(node)):
                     yield f"{file.name}:{getattr(node, 'lineno', 1)}", text
+
+
+def field_descriptions() -> Iterator[Written]:
+    """Yield the description of every field of the OpenAPI document, in one line as readers see it."""
+    for name, schema in create_app(None).openapi()["components"]["schemas"].items():
+        for field, found in schema.get("properties", {}).items():
+            yield f"{name}.{field}", " ".join(found.get("description", "").split())
 
 
 def page_strings() -> Iterator[Written]:

@@ -10,7 +10,7 @@ from labctl.fitting import fit
 from labctl.fitting.effects.response import IDS
 from labctl.fitting.models.memory import split_memory
 from labctl.fitting.uncertainty import evidence_of
-from labctl.json_types.models import KeptFit
+from labctl.json_types.kept_answers import KeptFit
 from labctl.recording.info import REFERENCES, RecordingInfo
 from labctl.services.calibrations.certification import certification_response, version_in_force
 from labctl.services.calibrations.comparison import worse_than_raw

@@ -19,7 +19,8 @@ from labctl.fitting.estimation.shapes import with_shapes
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.presets import changed
 from labctl.fitting.uncertainty import use_evidence
-from labctl.json_types.models import ChangeFigures, KeptChange, UsualRange
+from labctl.json_types.kept_answers import ChangeFigures, KeptChange
+from labctl.json_types.models import UsualRange
 from labctl.recording import Recording
 from labctl.services.cache import RecentResults, cached
 from labctl.services.calibrations.comparison import worse_than_before

@@ -12,7 +12,7 @@ from sqlalchemy import exc
 
 from labctl.errors import Conflict, NotCertified, NotFound, VersionTaken
 from labctl.json_types.calibrations import JudgementDetail
-from labctl.json_types.models import KeptAnswer
+from labctl.json_types.kept_answers import KeptAnswer
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.manifests.contents import CALIBRATION, CERTIFICATION

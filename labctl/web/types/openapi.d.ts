@@ -1969,14 +1969,23 @@ export interface components {
     schemas: {
         /**
          * AccelerometerCoefficient
-         * @description One number with its standard uncertainty `u`.
+         * @description One coefficient with its standard uncertainty.
          */
         AccelerometerCoefficient: {
-            /** Value */
+            /**
+             * Value
+             * @description Estimate, in `unit`.
+             */
             value: number;
-            /** U */
+            /**
+             * U
+             * @description Standard uncertainty, in `unit`.
+             */
             u: number;
-            /** Unit */
+            /**
+             * Unit
+             * @description Unit of the numbers; 1: a ratio.
+             */
             unit: string;
         };
         /**
@@ -1984,19 +1993,34 @@ export interface components {
          * @description The accelerometer by gravity: reading = bias + force + scale_factor x own force + misalignment x another.
          */
         AccelerometerJson: {
-            /** Axes */
+            /**
+             * Axes
+             * @description Axis -> name -> coefficient: bias in g, scale_factor and misalignment_y, misalignment_z as ratios.
+             */
             axes: {
                 [key: string]: {
                     [key: string]: components["schemas"]["AccelerometerCoefficient"];
                 };
             };
-            /** Gravity G */
+            /**
+             * Gravity G
+             * @description Local gravity, in standard gravities (9.80665 m/s2).
+             */
             gravity_g: number;
-            /** Gravity Source */
+            /**
+             * Gravity Source
+             * @description Where the local gravity is from.
+             */
             gravity_source: string;
-            /** Residual G */
+            /**
+             * Residual G
+             * @description RMS residual of the magnitude of the specific force at rest, g.
+             */
             residual_g: number;
-            /** Frame */
+            /**
+             * Frame
+             * @description How the body axes are defined.
+             */
             frame: string;
         };
         /**
@@ -2319,20 +2343,33 @@ export interface components {
         };
         /**
          * Advice
-         * @description Whether to add a named effect, and why not; the errors, deg/s, are those of what would be exported.
-         *
-         *     They are of parts of the data left out of the fits, without the effect and with it; null: no part can be left out.
+         * @description Whether to add a named effect, by the errors of what would be exported on parts of the data left out.
          */
         Advice: {
-            /** Effect */
+            /**
+             * Effect
+             * @description Id of the effect.
+             */
             effect: string;
-            /** Add */
+            /**
+             * Add
+             * @description Whether the exported calibration becomes better with the effect.
+             */
             add: boolean;
-            /** Why */
+            /**
+             * Why
+             * @description Why not to add it; empty where `add` is true.
+             */
             why: string;
-            /** Before Dps */
+            /**
+             * Before Dps
+             * @description RMS error on the parts left out without the effect, deg/s; null: no part can be left out.
+             */
             before_dps: number | null;
-            /** After Dps */
+            /**
+             * After Dps
+             * @description RMS error on the parts left out with the effect, deg/s; null: no part can be left out.
+             */
             after_dps: number | null;
         };
         /**
@@ -2440,47 +2477,87 @@ export interface components {
         };
         /**
          * AlignmentJson
-         * @description Rotation of the gyro triad from the accelerometer triad, as a small angle about each axis, deg.
+         * @description Rotation of the gyro triad from the accelerometer triad.
          */
         AlignmentJson: {
-            /** Axes */
+            /**
+             * Axes
+             * @description Axis -> component of the rotation vector, deg.
+             */
             axes: {
                 [key: string]: components["schemas"]["AccelerometerCoefficient"];
             };
-            /** Covariance Deg2 */
+            /**
+             * Covariance Deg2
+             * @description Covariance of the components, (3, 3), deg2.
+             */
             covariance_deg2: number[][];
-            /** Definition */
+            /**
+             * Definition
+             * @description How the rotation is defined.
+             */
             definition: string;
         };
         /**
          * AllanJson
-         * @description The overlapping Allan deviation of an axis with its 95 % interval, the sum of the terms, and the figures.
-         *
-         *     `model_dps` is null at averaging times below `from_s`, which the figures do not rest on.
+         * @description The overlapping Allan deviation of one axis, and the figures that it shows; lists over the averaging times.
          */
         AllanJson: {
-            /** Tau S */
+            /**
+             * Tau S
+             * @description Averaging times, s.
+             */
             tau_s: (number | null)[];
-            /** Deviation Dps */
+            /**
+             * Deviation Dps
+             * @description Overlapping Allan deviation, deg/s.
+             */
             deviation_dps: (number | null)[];
-            /** Low Dps */
+            /**
+             * Low Dps
+             * @description Lower limit of the 95 % interval of the deviation, deg/s.
+             */
             low_dps: (number | null)[];
-            /** High Dps */
+            /**
+             * High Dps
+             * @description Upper limit of the 95 % interval of the deviation, deg/s.
+             */
             high_dps: (number | null)[];
-            /** Model Dps */
+            /**
+             * Model Dps
+             * @description Allan deviation of the sum of the terms that were fitted, deg/s; null: below `from_s`.
+             */
             model_dps: (number | null)[];
+            /** @description Angle random walk. */
             N: components["schemas"]["NoiseFigure"];
+            /** @description Bias instability. */
             B: components["schemas"]["NoiseFigure"];
+            /** @description Rate random walk. */
             K: components["schemas"]["NoiseFigure"];
-            /** Trend Dps */
+            /**
+             * Trend Dps
+             * @description Range of the slow trend that was subtracted before the terms were fitted, deg/s; 0: none was.
+             */
             trend_dps: number | null;
-            /** Replaces Datasheet */
+            /**
+             * Replaces Datasheet
+             * @description Whether the bias instability is used in place of that of the data sheet.
+             */
             replaces_datasheet: boolean;
-            /** From S */
+            /**
+             * From S
+             * @description Shortest averaging time that the figures rest on, s; absent: the first.
+             */
             from_s?: number;
-            /** Smoothing S */
+            /**
+             * Smoothing S
+             * @description Mean distance of two instants that the output filter weighs together, s; absent: it does not smooth.
+             */
             smoothing_s?: number;
-            /** Step Dps */
+            /**
+             * Step Dps
+             * @description Quantization step of the output, deg/s; absent: it does not hide the noise.
+             */
             step_dps?: number;
         };
         /**
@@ -2525,32 +2602,59 @@ export interface components {
         };
         /**
          * AngleLine
-         * @description A wave in the table angle: whole cycles per turn, and its amplitude.
+         * @description A sine wave in the angle of the table.
          */
         AngleLine: {
-            /** Cycles Per Turn */
+            /**
+             * Cycles Per Turn
+             * @description Cycles per turn of the table, at least 1.
+             */
             cycles_per_turn: number;
-            /** Amplitude Dps */
+            /**
+             * Amplitude Dps
+             * @description Amplitude, deg/s; null: unknown.
+             */
             amplitude_dps: number | null;
         };
         /**
          * AngleSpectrum
-         * @description Power of waves in the table angle over white noise, the limit of chance, and the lines above it.
+         * @description Spectrum of the readings over the angle of the table, mean over the data sets that turn at least twice.
          */
         AngleSpectrum: {
-            /** Axis */
+            /**
+             * Axis
+             * @description Output axis, x, y or z.
+             */
             axis: string;
-            /** Datasets */
+            /**
+             * Datasets
+             * @description Number of data sets.
+             */
             datasets: number;
-            /** Cycles Per Turn */
+            /**
+             * Cycles Per Turn
+             * @description Cycles per turn of each point, at least 1.
+             */
             cycles_per_turn: number[];
-            /** Over White */
+            /**
+             * Over White
+             * @description Power divided by that of white noise, 1.
+             */
             over_white: (number | null)[];
-            /** Limit */
+            /**
+             * Limit
+             * @description Limit of `over_white` that noise alone exceeds at any of the points in 5 % of recordings, 1.
+             */
             limit: (number | null)[];
-            /** Lines */
+            /**
+             * Lines
+             * @description The highest points above the limit, at most 8, highest first.
+             */
             lines: components["schemas"]["AngleLine"][];
-            /** Stepper Lines */
+            /**
+             * Stepper Lines
+             * @description Lines of the stepper motor, which are subtracted before the spectrum.
+             */
             stepper_lines: components["schemas"]["AngleLine"][];
         };
         /**
@@ -2832,10 +2936,13 @@ export interface components {
         };
         /**
          * AxisCoefficients
-         * @description The coefficients of one output axis, by name.
+         * @description The coefficients of one output axis.
          */
         AxisCoefficients: {
-            /** Coefficients */
+            /**
+             * Coefficients
+             * @description Name -> coefficient; of a temperature table, temperature_c lists its nodes in deg C.
+             */
             coefficients: {
                 [key: string]: components["schemas"]["Coefficient"] | components["schemas"]["CoefficientTable"] | number[];
             };
@@ -2845,15 +2952,30 @@ export interface components {
          * @description The noise that weighted one axis of a fit.
          */
         AxisNoiseJson: {
-            /** White Dps */
+            /**
+             * White Dps
+             * @description Standard deviation of a data set mean by white noise, RMS, deg/s; null: only the total is known.
+             */
             white_dps: number | null;
-            /** Drift Dps */
+            /**
+             * Drift Dps
+             * @description Standard deviation of the drift between data sets, deg/s; 0: none was found.
+             */
             drift_dps: number;
-            /** Drift Tau S */
+            /**
+             * Drift Tau S
+             * @description Correlation time of the drift, s; null: there is none.
+             */
             drift_tau_s: number | null;
-            /** Per Rate */
+            /**
+             * Per Rate
+             * @description Standard deviation of the part that grows with the rate, per deg/s of table rate, 1.
+             */
             per_rate: number;
-            /** Covariance Scale */
+            /**
+             * Covariance Scale
+             * @description Factor on the covariance by the residuals; 1: the white noise is known; null: nothing shows the noise.
+             */
             covariance_scale: number | null;
         };
         /**
@@ -3302,16 +3424,28 @@ export interface components {
         };
         /**
          * BetweenSets
-         * @description The amplitude of waves in the mean residuals by cycles per hour, and what noise alone gives, deg/s.
+         * @description Periodogram of the mean residuals over time (Lomb-Scargle).
          */
         BetweenSets: {
-            /** Axis */
+            /**
+             * Axis
+             * @description Output axis, x, y or z.
+             */
             axis: string;
-            /** Per Hour */
+            /**
+             * Per Hour
+             * @description Frequency of each point, cycles per hour, 1/h.
+             */
             per_hour: (number | null)[];
-            /** Amplitude Dps */
+            /**
+             * Amplitude Dps
+             * @description Amplitude of a sine wave of that frequency in the mean residuals, deg/s.
+             */
             amplitude_dps: (number | null)[];
-            /** Noise Dps */
+            /**
+             * Noise Dps
+             * @description Amplitude that noise and drift alone give on average, deg/s.
+             */
             noise_dps: (number | null)[];
         };
         /** Body_import_log_api_recordings_logs_post */
@@ -3981,43 +4115,86 @@ export interface components {
         };
         /**
          * CataloguedEffect
-         * @description The same, with the unit of its plausible sizes, and whether a calibration is exported with it.
+         * @description The same, with what a calibration makes of it.
          */
         CataloguedEffect: {
-            /** Id */
+            /**
+             * Id
+             * @description Id by which fits and criticisms name the effect.
+             */
             id: string;
-            /** Term */
+            /**
+             * Term
+             * @description Standard term (IEEE Std 528, IEEE Std 952).
+             */
             term: string;
-            /** Sentence */
+            /**
+             * Sentence
+             * @description What the effect is, in one sentence.
+             */
             sentence: string;
             /**
              * Origin
+             * @description What the effect belongs to; only those of sensor and package are exported.
              * @enum {string}
              */
             origin: "sensor" | "package" | "fixture" | "bench" | "environment";
-            /** Rows */
+            /**
+             * Rows
+             * @description Output axes that it shows on: own, the axis that turns; cross, the others; all.
+             */
             rows: string;
-            /** Needs */
+            /**
+             * Needs
+             * @description Channels that it needs beside rate and temperature.
+             */
             needs: string[];
-            /** Order */
+            /**
+             * Order
+             * @description Default polynomial order; null: there is no order to choose.
+             */
             order: number | null;
-            /** Max Order */
+            /**
+             * Max Order
+             * @description Largest polynomial order; null: there is no order to choose.
+             */
             max_order: number | null;
-            /** Parameters */
+            /**
+             * Parameters
+             * @description Nonlinear parameters.
+             */
             parameters: components["schemas"]["ParameterJson"][];
-            /** Plausible */
+            /**
+             * Plausible
+             * @description Technology -> least and largest plausible first coefficient, in the unit of the coefficient.
+             */
             plausible: {
                 [key: string]: number[];
             };
-            /** Aliases */
+            /**
+             * Aliases
+             * @description Ids of effects that no schedule can distinguish from it in one of its shapes.
+             */
             aliases: string[];
-            /** Experiment */
+            /**
+             * Experiment
+             * @description What would distinguish it from similar effects; empty: unknown.
+             */
             experiment: string;
-            /** Draws */
+            /**
+             * Draws
+             * @description Views of a criticism, or channels, in which its signature appears.
+             */
             draws: string[];
-            /** Unit */
+            /**
+             * Unit
+             * @description Unit of the plausible sizes.
+             */
             unit: string;
-            /** Leaves */
+            /**
+             * Leaves
+             * @description Whether an exported calibration contains the effect.
+             */
             leaves: boolean;
         };
         /**
@@ -4489,24 +4666,48 @@ export interface components {
         };
         /**
          * ChannelLine
-         * @description The same against one channel; against the table's rate, for one position.
+         * @description The mean residual against one channel; against the rate of the table, for one position.
          */
         ChannelLine: {
-            /** Axis */
+            /**
+             * Axis
+             * @description Output axis, x, y or z.
+             */
             axis: string;
-            /** Channel */
+            /**
+             * Channel
+             * @description Channel along which the mean is computed.
+             */
             channel: string;
-            /** Position */
+            /**
+             * Position
+             * @description Position of the unit: the body axis that points up, such as -x; only where `channel` is table_rate_dps.
+             */
             position?: string;
-            /** At */
+            /**
+             * At
+             * @description Mean of the channel at each point, in its unit.
+             */
             at: (number | null)[];
-            /** Mean Dps */
+            /**
+             * Mean Dps
+             * @description Mean residual at each point, measured minus modelled error, deg/s.
+             */
             mean_dps: (number | null)[];
-            /** Low Dps */
+            /**
+             * Low Dps
+             * @description Lower limit of the 95 % band of the mean by noise and drift, deg/s.
+             */
             low_dps: (number | null)[];
-            /** High Dps */
+            /**
+             * High Dps
+             * @description Upper limit of the 95 % band of the mean by noise and drift, deg/s.
+             */
             high_dps: (number | null)[];
-            /** Z */
+            /**
+             * Z
+             * @description Largest size of a mean over its standard uncertainty, at least 0; null: unknown.
+             */
             z: number | null;
         };
         /**
@@ -4802,20 +5003,33 @@ export interface components {
         };
         /**
          * Coefficient
-         * @description One number with its standard uncertainty `u`; null where there were no more data sets than coefficients.
-         *
-         *     A root of an estimated square is `identified` or not; where it is not, `at_most` is its 95 % bound.
+         * @description One coefficient with its standard uncertainty.
          */
         Coefficient: {
-            /** Value */
+            /**
+             * Value
+             * @description Estimate, in `unit`.
+             */
             value: number;
-            /** U */
+            /**
+             * U
+             * @description Standard uncertainty, in `unit`; null: too few data sets, or a derived value that is only a bound.
+             */
             u: number | null;
-            /** Identified */
+            /**
+             * Identified
+             * @description Whether the data determine a derived value (a root or a bandwidth); absent: it is not derived.
+             */
             identified?: boolean;
-            /** At Most */
+            /**
+             * At Most
+             * @description 95 % upper bound of a root that is not identified, in `unit`; null: identified, or no bound is known.
+             */
             at_most?: number | null;
-            /** Unit */
+            /**
+             * Unit
+             * @description Unit of the numbers; 1: a ratio.
+             */
             unit: string;
         };
         /**
@@ -4871,18 +5085,33 @@ export interface components {
         };
         /**
          * CoefficientTable
-         * @description The same at each node of a temperature table.
+         * @description One coefficient at each node of a temperature table; lists over the nodes.
          */
         CoefficientTable: {
-            /** Value */
+            /**
+             * Value
+             * @description Estimates, in `unit`.
+             */
             value: number[];
-            /** U */
+            /**
+             * U
+             * @description Standard uncertainties, in `unit`; null: too few data sets, or only a bound.
+             */
             u: (number | null)[];
-            /** Identified */
+            /**
+             * Identified
+             * @description Whether the data determine each derived value (a root or a bandwidth); absent: not derived.
+             */
             identified?: boolean[];
-            /** At Most */
+            /**
+             * At Most
+             * @description 95 % upper bounds of roots that are not identified, in `unit`; null: identified, or no bound is known.
+             */
             at_most?: (number | null)[];
-            /** Unit */
+            /**
+             * Unit
+             * @description Unit of the numbers; 1: a ratio.
+             */
             unit: string;
         };
         /**
@@ -5247,24 +5476,43 @@ export interface components {
         };
         /**
          * CourseJson
-         * @description One channel in bins in the order of time: begin of each, least and largest reading; all `readings` are in them.
-         *
-         *     null: no number, or a data set ends there.
+         * @description The course of one channel, in bins in the order of time; null ends a data set.
          */
         CourseJson: {
-            /** Channel */
+            /**
+             * Channel
+             * @description Name of the channel.
+             */
             channel: string;
-            /** Unit */
+            /**
+             * Unit
+             * @description Unit of the channel.
+             */
             unit: string;
-            /** T S */
+            /**
+             * T S
+             * @description Time of the first reading of each bin, s; null: a data set ends there.
+             */
             t_s: (number | null)[];
-            /** Low */
+            /**
+             * Low
+             * @description Least reading of each bin, in `unit`; null: no number, or a data set ends there.
+             */
             low: (number | null)[];
-            /** High */
+            /**
+             * High
+             * @description Largest reading of each bin, in `unit`; null: no number, or a data set ends there.
+             */
             high: (number | null)[];
-            /** Readings */
+            /**
+             * Readings
+             * @description Number of readings that are finite numbers; all of them are in the bins.
+             */
             readings: number;
-            /** Bins */
+            /**
+             * Bins
+             * @description Number of bins.
+             */
             bins: number;
         };
         /**
@@ -5294,28 +5542,41 @@ export interface components {
             noise_floor_source: string;
             /**
              * Explained
-             * @description Share of the chi2 of the raw error in excess of noise that the model explains, 0 to 1; null: there is none.
+             * @description Share of the raw chi2 that the model and the noise explain, 0 to 1; null: there was too little for a verdict.
              */
             explained: number | null;
             /**
              * Direct Form Rms Dps
-             * @description RMS residual of the same model as a function of the output, deg/s; null: it is that form, or has none.
+             * @description RMS residual of the model as it is applied to the output, deg/s; null: it is a function of the true rate.
              */
             direct_form_rms_dps: number | null;
         };
         /**
          * CriticisedNoise
-         * @description Noise of the recording; `vs_datasheet`: the drift divided by what the data sheet lets expect.
+         * @description Noise of the data set means of the recording, and of its record at rest.
          */
         CriticisedNoise: {
-            /** White Dps */
+            /**
+             * White Dps
+             * @description Standard deviation of a data set mean by white noise, RMS over the axes, deg/s; null: unknown.
+             */
             white_dps: number | null;
-            /** Drift Dps */
+            /**
+             * Drift Dps
+             * @description Standard deviation of the drift between data sets, of the axis where it is largest, deg/s; null: unknown.
+             */
             drift_dps: number | null;
-            /** Drift Tau S */
+            /**
+             * Drift Tau S
+             * @description Correlation time of that drift, s; null: there is no drift, or it is unknown.
+             */
             drift_tau_s: number | null;
-            /** Vs Datasheet */
+            /**
+             * Vs Datasheet
+             * @description Largest drift divided by half the bias stability of the data sheet, at least 0; null: unknown.
+             */
             vs_datasheet: number | null;
+            /** @description Allan deviation of the longest stretch at rest; null: there is none with enough readings. */
             static: components["schemas"]["StaticRecordJson"] | null;
         };
         /**
@@ -5548,34 +5809,62 @@ export interface components {
         };
         /**
          * DataSetColumns
-         * @description The data sets one by one, as columns of equal length; `of`: how many the recording has.
-         *
-         *     Where no time is known (`timed`), the channel `order` counts the data sets from 1. Empty without any axis.
+         * @description The data sets one by one, as columns of equal length; empty without any axis.
          */
         DataSetColumns: {
-            /** Of */
+            /**
+             * Of
+             * @description Number of data sets of the recording; of more than 3000, the columns have 3000 that are spread over them.
+             */
             of?: number;
-            /** Timed */
+            /**
+             * Timed
+             * @description Whether the time of the data sets is known; else the channel `order` counts them from 1 in place of `t_s`.
+             */
             timed?: boolean;
-            /** Dataset */
+            /**
+             * Dataset
+             * @description Numbers of the data sets; over several recordings they count through all.
+             */
             dataset?: number[];
-            /** Recording */
+            /**
+             * Recording
+             * @description Number of the recording of each data set; only of several recordings.
+             */
             recording?: number[];
-            /** Own Dataset */
+            /**
+             * Own Dataset
+             * @description Number of each data set in its own recording; only of several recordings.
+             */
             own_dataset?: number[];
-            /** Position */
+            /**
+             * Position
+             * @description Position of the unit: the body axis that points up, such as x, -x or x@180.
+             */
             position?: string[];
-            /** Run */
+            /**
+             * Run
+             * @description Number of the powered run; it changes with each power-on.
+             */
             run?: number[];
-            /** Channels */
+            /**
+             * Channels
+             * @description Channel -> value at each data set, in the unit of the channel; null: unknown.
+             */
             channels?: {
                 [key: string]: (number | null)[];
             };
-            /** Residual Dps */
+            /**
+             * Residual Dps
+             * @description Output axis -> mean residual, measured minus modelled error, deg/s; null: unknown.
+             */
             residual_dps?: {
                 [key: string]: (number | null)[];
             };
-            /** Over Floor */
+            /**
+             * Over Floor
+             * @description Output axis -> residual divided by its noise floor, with the sign of the residual; null: unknown.
+             */
             over_floor?: {
                 [key: string]: (number | null)[];
             };
@@ -6242,26 +6531,53 @@ export interface components {
         };
         /**
          * EffectAgreement
-         * @description Whether recordings, each fitted alone, agree on an effect: chi2 of the differences; null: no freedom left.
+         * @description Whether recordings, each fitted alone, agree on an effect.
          */
         EffectAgreement: {
-            /** Effect */
+            /**
+             * Effect
+             * @description Id of the effect.
+             */
             effect: string;
-            /** Chi2 */
+            /**
+             * Chi2
+             * @description Chi2 of the coefficients of the recordings about their weighted mean, at least 0.
+             */
             chi2: number;
-            /** Freedom */
+            /**
+             * Freedom
+             * @description Degrees of freedom of `chi2`; 0: not comparable.
+             */
             freedom: number;
-            /** P Value */
+            /**
+             * P Value
+             * @description Probability of a larger chi2 from noise alone, 0 to 1; null: no degree of freedom.
+             */
             p_value: number | null;
-            /** Chi2 Beside Shifts */
+            /**
+             * Chi2 Beside Shifts
+             * @description The same beside a shift between recordings; null: no shift is estimated for the effect.
+             */
             chi2_beside_shifts: number | null;
-            /** Freedom Beside Shifts */
+            /**
+             * Freedom Beside Shifts
+             * @description Degrees of freedom of `chi2_beside_shifts`; null: no shift is estimated for the effect.
+             */
             freedom_beside_shifts: number | null;
-            /** P Value Beside Shifts */
+            /**
+             * P Value Beside Shifts
+             * @description Probability of a larger `chi2_beside_shifts` from noise alone, 0 to 1; null: no shift, or no freedom.
+             */
             p_value_beside_shifts: number | null;
-            /** Shift */
+            /**
+             * Shift
+             * @description Standard term under which a difference common to all temperatures is reported; null: none is.
+             */
             shift: string | null;
-            /** Agree */
+            /**
+             * Agree
+             * @description Whether they agree, at a probability of 1 % over all effects.
+             */
             agree: boolean;
         };
         /**
@@ -6391,21 +6707,42 @@ export interface components {
          * @description A changed recipe that would separate effects which the recording cannot.
          */
         Experiment: {
-            /** Separates */
+            /**
+             * Separates
+             * @description Ids of the effects that it separates: the leading one, then those that are distinguished from it.
+             */
             separates: string[];
-            /** Do */
+            /**
+             * Do
+             * @description The change of the recipe in words.
+             */
             do: string;
-            /** Recipe */
+            /**
+             * Recipe
+             * @description The changed recipe.
+             */
             recipe: {
                 [key: string]: components["schemas"]["JsonValue"];
             };
-            /** Toml */
+            /**
+             * Toml
+             * @description The changed recipe as a TOML file.
+             */
             toml: string;
-            /** Power */
+            /**
+             * Power
+             * @description Probability that the experiment decides between the leading effect and its nearest rival, 0 to 1.
+             */
             power: number;
-            /** Hours */
+            /**
+             * Hours
+             * @description Expected duration, h.
+             */
             hours: number;
-            /** Per Hour */
+            /**
+             * Per Hour
+             * @description Least chi2 (at most 40) by which a rival fails to explain the leading effect, per hour, 1/h.
+             */
             per_hour: number;
         };
         /**
@@ -6438,17 +6775,35 @@ export interface components {
         };
         /** FailingRange */
         FailingRange: {
-            /** Axis */
+            /**
+             * Axis
+             * @description Output axis, x, y or z.
+             */
             axis: string;
-            /** Channel */
+            /**
+             * Channel
+             * @description Channel by which the data sets are divided; table_rate_dps is the true rate along the axis.
+             */
             channel: string;
-            /** From */
+            /**
+             * From
+             * @description Lowest value of the channel among the data sets, in the unit of the channel.
+             */
             from: number;
-            /** To */
+            /**
+             * To
+             * @description Highest value of the channel among the data sets, in the unit of the channel.
+             */
             to: number;
-            /** Rms Dps */
+            /**
+             * Rms Dps
+             * @description RMS residual of the data sets in the range, deg/s.
+             */
             rms_dps: number;
-            /** Z */
+            /**
+             * Z
+             * @description Size of the mean of residual over noise floor, times the root of the number of data sets; >= 3.
+             */
             z: number;
         };
         /**
@@ -6530,22 +6885,40 @@ export interface components {
         };
         /**
          * FitEnvironment
-         * @description Which thermometer a fit went by, and how the Earth's rate was treated.
+         * @description Which thermometer a fit used, and how the Earth's rate was treated.
          */
         FitEnvironment: {
-            /** Temperature */
+            /**
+             * Temperature
+             * @description Which thermometer the temperatures are from; absent: that of the unit.
+             */
             temperature?: string;
-            /** Earth Rate */
+            /**
+             * Earth Rate
+             * @description How the Earth's rate was treated, in words.
+             */
             earth_rate?: string;
-            /** Latitude Deg */
+            /**
+             * Latitude Deg
+             * @description Geodetic latitude of the bench, deg; absent: unknown.
+             */
             latitude_deg?: number;
-            /** Along Table Axis Dps */
+            /**
+             * Along Table Axis Dps
+             * @description Earth's rate along the axis of the table, deg/s; absent: the latitude is unknown.
+             */
             along_table_axis_dps?: number;
-            /** Once Per Turn Dps */
+            /**
+             * Once Per Turn Dps
+             * @description Output axis -> amplitudes of the waves once per turn that were fitted, deg/s; absent: none were.
+             */
             once_per_turn_dps?: {
                 [key: string]: number[];
             };
-            /** Once Per Turn Expected Dps */
+            /**
+             * Once Per Turn Expected Dps
+             * @description Amplitude expected from the horizontal part of the Earth's rate, deg/s; absent: none was fitted.
+             */
             once_per_turn_expected_dps?: number;
         };
         /**
@@ -6821,18 +7194,33 @@ export interface components {
         };
         /**
          * FrequencySpectrum
-         * @description Power of waves in time within data sets over white noise, by frequency in Hz, and the limit of chance.
+         * @description Spectrum of the readings over time within data sets, mean over the data sets.
          */
         FrequencySpectrum: {
-            /** Axis */
+            /**
+             * Axis
+             * @description Output axis, x, y or z.
+             */
             axis: string;
-            /** Datasets */
+            /**
+             * Datasets
+             * @description Number of data sets.
+             */
             datasets: number;
-            /** Hz */
+            /**
+             * Hz
+             * @description Frequency of each point, Hz.
+             */
             hz: (number | null)[];
-            /** Over White */
+            /**
+             * Over White
+             * @description Power divided by that of white noise, 1.
+             */
             over_white: (number | null)[];
-            /** Limit */
+            /**
+             * Limit
+             * @description Limit of `over_white` that noise alone exceeds at any of the points in 5 % of recordings, 1.
+             */
             limit: (number | null)[];
         };
         /**
@@ -6936,30 +7324,49 @@ export interface components {
         };
         /**
          * HeldCoefficientJson
-         * @description A coefficient that was not fitted, with its standard uncertainty `u`; null: not stated.
-         *
-         *     Of a table, `value` and `u` are lists over `temperature_c`.
+         * @description A coefficient that was not fitted.
          */
         HeldCoefficientJson: {
-            /** Effect */
+            /**
+             * Effect
+             * @description Id of the effect that it belongs to.
+             */
             effect: string;
-            /** Value */
+            /**
+             * Value
+             * @description Value in `unit`; of a table a list over `temperature_c`.
+             */
             value: number | number[];
-            /** U */
+            /**
+             * U
+             * @description Standard uncertainty in `unit`, at least 0; of a table a list; null: not stated.
+             */
             u: number | (number | null)[] | null;
-            /** Unit */
+            /**
+             * Unit
+             * @description Unit of value and uncertainty; 1: a ratio.
+             */
             unit: string;
-            /** Temperature C */
+            /**
+             * Temperature C
+             * @description Temperatures of a table, rising, deg C; absent: one value for all temperatures.
+             */
             temperature_c?: number[];
         };
         /**
          * HeldJson
-         * @description The coefficients that a fit held at known values, axis -> name -> coefficient, and where they are from.
+         * @description The coefficients that a fit held at known values.
          */
         HeldJson: {
-            /** Source */
+            /**
+             * Source
+             * @description Where the values are from.
+             */
             source: string;
-            /** Axes */
+            /**
+             * Axes
+             * @description Output axis -> name -> coefficient.
+             */
             axes: {
                 [key: string]: {
                     [key: string]: components["schemas"]["HeldCoefficientJson"];
@@ -6968,26 +7375,44 @@ export interface components {
         };
         /**
          * HeldOutMovesJson
-         * @description Each used move predicted by a fit to the others: root mean square, and the share within U = 2 u.
+         * @description Each used move predicted by a fit to the others.
          */
         HeldOutMovesJson: {
-            /** Rms Deg */
+            /**
+             * Rms Deg
+             * @description RMS error of a component, deg.
+             */
             rms_deg: number;
-            /** Within 2U */
+            /**
+             * Within 2U
+             * @description Share of the components within the expanded uncertainty U = 2 u, 0 to 1.
+             */
             within_2u: number;
-            /** Components */
+            /**
+             * Components
+             * @description Number of components, two for each move.
+             */
             components: number;
         };
         /**
          * HeldOutRecording
-         * @description Errors of a fit to all other recordings on this one, without refitting, deg/s.
+         * @description Error on one recording of a fit to all others, without refitting.
          */
         HeldOutRecording: {
-            /** Recording */
+            /**
+             * Recording
+             * @description Number of the recording that was left out.
+             */
             recording: number;
-            /** Rms Dps */
+            /**
+             * Rms Dps
+             * @description RMS error over data sets and axes, deg/s; null: see `why`.
+             */
             rms_dps: number | null;
-            /** Why */
+            /**
+             * Why
+             * @description Why there is no figure; empty where there is one.
+             */
             why: string;
         };
         /**
@@ -7378,24 +7803,45 @@ export interface components {
         };
         /**
          * JointJson
-         * @description What several recordings say together.
+         * @description What several recordings report together.
          */
         JointJson: {
-            /** Recordings */
+            /**
+             * Recordings
+             * @description Numbers of the recordings, in the order of time.
+             */
             recordings: number[];
-            /** Repeatability */
+            /**
+             * Repeatability
+             * @description Output axis -> repeatability of each kind.
+             */
             repeatability: {
                 [key: string]: components["schemas"]["RepeatabilityJson"][];
             };
-            /** Agreement */
+            /**
+             * Agreement
+             * @description Agreement of the recordings, effect by effect.
+             */
             agreement: components["schemas"]["EffectAgreement"][];
-            /** Not Compared */
+            /**
+             * Not Compared
+             * @description Why the recordings could not be compared; empty where they were.
+             */
             not_compared: string;
-            /** Held Out */
+            /**
+             * Held Out
+             * @description Error on each recording of a fit to the others.
+             */
             held_out: components["schemas"]["HeldOutRecording"][];
-            /** Heldout Rms Dps */
+            /**
+             * Heldout Rms Dps
+             * @description RMS error over all recordings that were left out, deg/s; null: none could be.
+             */
             heldout_rms_dps: number | null;
-            /** Text */
+            /**
+             * Text
+             * @description The same in sentences.
+             */
             text: string[];
         };
         JsonValue: unknown;
@@ -7559,12 +8005,18 @@ export interface components {
         };
         /**
          * LackOfFit
-         * @description Chi2 of the whitened residual over its degrees of freedom, and its p-value.
+         * @description Chi-square test of the whitened residual, over all axes.
          */
         LackOfFit: {
-            /** Statistic */
+            /**
+             * Statistic
+             * @description Chi2 divided by its degrees of freedom, at least 0; null: there was too little for a verdict.
+             */
             statistic: number | null;
-            /** P Value */
+            /**
+             * P Value
+             * @description Probability of a larger chi2 from noise alone, 0 to 1; null: there was too little for a verdict.
+             */
             p_value: number | null;
         };
         /**
@@ -7729,24 +8181,48 @@ export interface components {
         };
         /**
          * LegLine
-         * @description The residual reached from a lower temperature minus that from a higher, deg/s, along a channel.
+         * @description The residual where a temperature was reached from below, minus that where it was reached from above.
          */
         LegLine: {
-            /** Axis */
+            /**
+             * Axis
+             * @description Output axis, x, y or z.
+             */
             axis: string;
-            /** Channel */
+            /**
+             * Channel
+             * @description Channel along which the mean is computed: temperature_c or table_rate_dps.
+             */
             channel: string;
-            /** Pairs */
+            /**
+             * Pairs
+             * @description Number of pairs of data sets at equal rate, temperature and position.
+             */
             pairs: number;
-            /** At */
+            /**
+             * At
+             * @description Mean of the channel at each point, in its unit.
+             */
             at: (number | null)[];
-            /** Mean Dps */
+            /**
+             * Mean Dps
+             * @description Mean difference of the residuals at each point, from below minus from above, deg/s.
+             */
             mean_dps: (number | null)[];
-            /** Low Dps */
+            /**
+             * Low Dps
+             * @description Lower limit of the 95 % band of the mean by noise and drift, deg/s.
+             */
             low_dps: (number | null)[];
-            /** High Dps */
+            /**
+             * High Dps
+             * @description Upper limit of the 95 % band of the mean by noise and drift, deg/s.
+             */
             high_dps: (number | null)[];
-            /** Z */
+            /**
+             * Z
+             * @description Largest size of a mean over its standard uncertainty, at least 0; null: unknown.
+             */
             z: number | null;
         };
         /**
@@ -8683,22 +9159,38 @@ export interface components {
         };
         /**
          * MarkJson
-         * @description Where one kind of finding is in a channel: the times of the longest of `places` stretches.
-         *
-         *     `whole`: it is about all of the channel. An empty channel is every channel.
+         * @description Where one kind of finding is in a channel.
          */
         MarkJson: {
-            /** What */
+            /**
+             * What
+             * @description Kind of the finding.
+             */
             what: string;
-            /** Channel */
+            /**
+             * Channel
+             * @description Name of the channel; empty: every channel.
+             */
             channel: string;
-            /** From S */
+            /**
+             * From S
+             * @description Time of the last reading before each of the longest stretches, at most 60, s.
+             */
             from_s: number[];
-            /** Until S */
+            /**
+             * Until S
+             * @description Time of the first reading after each of these stretches, s.
+             */
             until_s: number[];
-            /** Places */
+            /**
+             * Places
+             * @description Number of all stretches; 0 where `whole` is true.
+             */
             places: number;
-            /** Whole */
+            /**
+             * Whole
+             * @description Whether it concerns all of the channel.
+             */
             whole: boolean;
         };
         /**
@@ -8931,44 +9423,81 @@ export interface components {
         };
         /**
          * MoveLeftOutJson
-         * @description A move that the fit did without, and why.
+         * @description A move that the fit did not use.
          */
         MoveLeftOutJson: {
-            /** From S */
+            /**
+             * From S
+             * @description Begin of the move, s.
+             */
             from_s: number;
-            /** Until S */
+            /**
+             * Until S
+             * @description End of the move, s.
+             */
             until_s: number;
-            /** Why */
+            /**
+             * Why
+             * @description Why it was not used.
+             */
             why: string;
         };
         /**
          * MovesJson
-         * @description The moves between rests, and what is left of them; a residual is one of two components square to gravity.
-         *
-         *     `applied_rms_dps` is what the exported calibration leaves: one bias throughout, no sensitivity to specific force.
+         * @description The moves between rests, and the residuals of those that were used: two components square to gravity each.
          */
         MovesJson: {
-            /** Count */
+            /**
+             * Count
+             * @description Number of moves.
+             */
             count: number;
-            /** Used */
+            /**
+             * Used
+             * @description Number of moves that were used.
+             */
             used: number;
-            /** Left Out */
+            /**
+             * Left Out
+             * @description Moves that were not used.
+             */
             left_out: components["schemas"]["MoveLeftOutJson"][];
-            /** Turned Deg */
+            /**
+             * Turned Deg
+             * @description Axis -> sum of the magnitudes of all turns about it in the moves that were used, deg.
+             */
             turned_deg: {
                 [key: string]: number;
             };
-            /** Residual Deg */
+            /**
+             * Residual Deg
+             * @description RMS residual of a component, deg.
+             */
             residual_deg: number;
-            /** Applied Rms Dps */
+            /**
+             * Applied Rms Dps
+             * @description RMS error of the exported calibration (one bias throughout, no sensitivity to specific force), deg/s.
+             */
             applied_rms_dps: number;
-            /** Known Deg */
+            /**
+             * Known Deg
+             * @description Standard deviation of a component by all sources that are known, RMS, deg.
+             */
             known_deg: number;
-            /** Extra Deg */
+            /**
+             * Extra Deg
+             * @description Standard deviation of a component beyond that, by the scatter of the residuals, deg.
+             */
             extra_deg: number;
-            /** Condition */
+            /**
+             * Condition
+             * @description Condition number of the scaled equations of scale factors and misalignments, at least 1.
+             */
             condition: number;
-            /** Jitter S */
+            /**
+             * Jitter S
+             * @description Standard deviation of the time stamps about a straight line, median of the moves, s.
+             */
             jitter_s: number;
         };
         /**
@@ -9002,35 +9531,60 @@ export interface components {
         };
         /**
          * NoiseFigure
-         * @description One figure of IEEE Std 952 with its standard uncertainty; without one `at_most` may bound it, `why` says why.
+         * @description One figure of IEEE Std 952.
          */
         NoiseFigure: {
-            /** Value */
+            /**
+             * Value
+             * @description Value, in `unit`; null: the record does not show it.
+             */
             value: number | null;
-            /** U */
+            /**
+             * U
+             * @description Standard uncertainty, in `unit`; null: there is no value.
+             */
             u: number | null;
-            /** Unit */
+            /**
+             * Unit
+             * @description Unit of the numbers.
+             */
             unit: string;
-            /** At Most */
+            /**
+             * At Most
+             * @description 95 % upper bound, in `unit`; null: there is a value, or no bound is known.
+             */
             at_most: number | null;
-            /** Why */
+            /**
+             * Why
+             * @description Why there is no value; empty where there is one.
+             */
             why: string;
         };
         /**
          * NotTestable
-         * @description An effect that the recording cannot show, because a channel is missing or the schedule hides it.
+         * @description An effect that the recording cannot show.
          */
         NotTestable: {
-            /** Effect */
+            /**
+             * Effect
+             * @description Id of the effect.
+             */
             effect: string;
             /**
              * Why
+             * @description channel: a channel that it needs was not logged; schedule: the model absorbs it in this schedule.
              * @enum {string}
              */
             why: "channel" | "schedule";
-            /** Needs */
+            /**
+             * Needs
+             * @description Channels that it needs and that were not logged; empty where `why` is schedule.
+             */
             needs: string[];
-            /** Visible */
+            /**
+             * Visible
+             * @description Share of the effect that the model does not absorb, 0 to 1; only where `why` is schedule.
+             */
             visible?: number;
         };
         /**
@@ -9343,12 +9897,18 @@ export interface components {
         };
         /**
          * OutputStep
-         * @description Step in which an output comes, and what it leaves in a mean, as a standard deviation, deg/s.
+         * @description Quantization step of an output, and what it leaves in a mean.
          */
         OutputStep: {
-            /** Step Dps */
+            /**
+             * Step Dps
+             * @description Step of the output, deg/s.
+             */
             step_dps: number;
-            /** Left Dps */
+            /**
+             * Left Dps
+             * @description Standard deviation of a data set mean by the steps, RMS over the data sets, deg/s.
+             */
             left_dps: number;
         };
         /**
@@ -9380,16 +9940,28 @@ export interface components {
         };
         /**
          * ParameterJson
-         * @description A nonlinear parameter of an effect, and between which values it is searched.
+         * @description A nonlinear parameter of an effect.
          */
         ParameterJson: {
-            /** Name */
+            /**
+             * Name
+             * @description Name of the parameter.
+             */
             name: string;
-            /** Unit */
+            /**
+             * Unit
+             * @description Unit of the parameter.
+             */
             unit: string;
-            /** Low */
+            /**
+             * Low
+             * @description Least value that is tried, in `unit`.
+             */
             low: number;
-            /** High */
+            /**
+             * High
+             * @description Largest value that is tried, in `unit`.
+             */
             high: number;
         };
         /**
@@ -9563,15 +10135,23 @@ export interface components {
         };
         /**
          * PosesJson
-         * @description All of it.
+         * @description What a calibration in poses reports beside its coefficients.
          */
         PosesJson: {
+            /** @description The rests. */
             rests: components["schemas"]["RestsJson"];
+            /** @description The accelerometer, calibrated by gravity. */
             accelerometer: components["schemas"]["AccelerometerJson"];
+            /** @description Rotation between gyro and accelerometer; absent: fitted by an older version of labctl. */
             alignment?: components["schemas"]["AlignmentJson"];
+            /** @description The moves between rests. */
             moves: components["schemas"]["MovesJson"];
+            /** @description Each move predicted by a fit to the others. */
             held_out: components["schemas"]["HeldOutMovesJson"];
-            /** Not Determined */
+            /**
+             * Not Determined
+             * @description What such a recording cannot determine, in words.
+             */
             not_determined: string;
         };
         /**
@@ -9579,9 +10159,15 @@ export interface components {
          * @description A model that a fit can be asked for by name.
          */
         PresetJson: {
-            /** Name */
+            /**
+             * Name
+             * @description Name of the model.
+             */
             name: string;
-            /** Sentence */
+            /**
+             * Sentence
+             * @description What the model is, in one sentence.
+             */
             sentence: string;
         };
         /**
@@ -9675,20 +10261,38 @@ export interface components {
         };
         /**
          * PreviousRateLine
-         * @description The same against the rate before.
+         * @description The mean residual against the rate of the table before the data set.
          */
         PreviousRateLine: {
-            /** Axis */
+            /**
+             * Axis
+             * @description Output axis, x, y or z.
+             */
             axis: string;
-            /** At */
+            /**
+             * At
+             * @description Mean of the previous rate at each point, deg/s.
+             */
             at: (number | null)[];
-            /** Mean Dps */
+            /**
+             * Mean Dps
+             * @description Mean residual at each point, measured minus modelled error, deg/s.
+             */
             mean_dps: (number | null)[];
-            /** Low Dps */
+            /**
+             * Low Dps
+             * @description Lower limit of the 95 % band of the mean by noise and drift, deg/s.
+             */
             low_dps: (number | null)[];
-            /** High Dps */
+            /**
+             * High Dps
+             * @description Upper limit of the 95 % band of the mean by noise and drift, deg/s.
+             */
             high_dps: (number | null)[];
-            /** Z */
+            /**
+             * Z
+             * @description Largest size of a mean over its standard uncertainty, at least 0; null: unknown.
+             */
             z: number | null;
         };
         /**
@@ -10144,7 +10748,10 @@ export interface components {
          * @description What the terms of a model are centred on.
          */
         ReferenceJson: {
-            /** Temperature C */
+            /**
+             * Temperature C
+             * @description Temperature at which the terms in temperature are 0, deg C.
+             */
             temperature_c: number;
         };
         /**
@@ -10219,14 +10826,23 @@ export interface components {
         };
         /**
          * Remainder
-         * @description What remains beside all that was named: its share of the excess chi2, and what it follows.
+         * @description What remains beside all effects that were named.
          */
         Remainder: {
-            /** Share */
+            /**
+             * Share
+             * @description Share of the chi2 in excess of the noise that remains, 0 to 1.
+             */
             share: number;
-            /** Over Floor */
+            /**
+             * Over Floor
+             * @description Root of the chi2 that remains over its degrees of freedom, at least 1.
+             */
             over_floor: number;
-            /** Depends On */
+            /**
+             * Depends On
+             * @description Channels that the remainder depends on, strongest first.
+             */
             depends_on: string[];
         };
         /**
@@ -10257,57 +10873,115 @@ export interface components {
         };
         /**
          * RepeatabilityJson
-         * @description Standard deviation of what is different after each power-on, day or mounting, on one axis.
+         * @description Standard deviation of what differs after each power-on, day or mounting, on one output axis.
          */
         RepeatabilityJson: {
             /**
              * Kind
+             * @description turn_on: bias from run to run; day_to_day: scale factor; mounting: misalignment.
              * @enum {string}
              */
             kind: "turn_on" | "day_to_day" | "mounting";
-            /** Term */
+            /**
+             * Term
+             * @description Standard term of the repeatability.
+             */
             term: string;
-            /** Unit */
+            /**
+             * Unit
+             * @description Unit of the numbers: deg/s of turn_on, 1 of day_to_day, rad of mounting.
+             */
             unit: string;
-            /** Value */
+            /**
+             * Value
+             * @description Standard deviation, median of its posterior distribution, at least 0, in `unit`.
+             */
             value: number;
-            /** U */
+            /**
+             * U
+             * @description Half width of its central 68 % interval, in `unit`.
+             */
             u: number;
-            /** Low */
+            /**
+             * Low
+             * @description Lower limit of its 95 % interval, at least 0, in `unit`.
+             */
             low: number;
-            /** High */
+            /**
+             * High
+             * @description Upper limit of its 95 % interval, in `unit`.
+             */
             high: number;
-            /** Freedom */
+            /**
+             * Freedom
+             * @description Number of independent shifts behind the estimate, less those that the fit uses; 0: none is left.
+             */
             freedom: number;
-            /** P Value */
+            /**
+             * P Value
+             * @description Probability of shifts as large as these from noise alone, 0 to 1.
+             */
             p_value: number;
-            /** Seen */
+            /**
+             * Seen
+             * @description Whether the shifts are more than noise: `p_value` below 0.01.
+             */
             seen: boolean;
-            /** Shifts */
+            /**
+             * Shifts
+             * @description Each shift.
+             */
             shifts: components["schemas"]["ShiftJson"][];
         };
         /**
          * Repeats
-         * @description How far data sets at one rate, temperature and position scatter, deg/s; `apart_s` only where times are known.
+         * @description How far the residuals of data sets at one rate, temperature and position scatter.
          */
         Repeats: {
-            /** Axis */
+            /**
+             * Axis
+             * @description Output axis, x, y or z.
+             */
             axis: string;
-            /** Pairs */
+            /**
+             * Pairs
+             * @description Number of pairs of data sets at one rate, temperature and position.
+             */
             pairs: number;
-            /** Scatter Dps */
+            /**
+             * Scatter Dps
+             * @description Standard deviation of one residual, from the differences of the pairs, deg/s.
+             */
             scatter_dps: number | null;
-            /** Floor Dps */
+            /**
+             * Floor Dps
+             * @description Standard deviation that noise and drift give at the distances in time of the pairs, deg/s.
+             */
             floor_dps: number | null;
-            /** Over Floor */
+            /**
+             * Over Floor
+             * @description Scatter divided by its floor, at least 0; null: the floor is 0.
+             */
             over_floor: number | null;
-            /** Datasets */
+            /**
+             * Datasets
+             * @description The numbers of the two data sets of each pair; of more than 3000 pairs, 3000 of every size of difference.
+             */
             datasets: number[][];
-            /** Apart Sets */
+            /**
+             * Apart Sets
+             * @description Distance of the two data sets of each pair of `datasets`, as a number of data sets.
+             */
             apart_sets: number[];
-            /** Apart S */
+            /**
+             * Apart S
+             * @description Distance of the two data sets of each pair of `datasets` in time, s; absent where no time is known.
+             */
             apart_s?: (number | null)[];
-            /** Difference Dps */
+            /**
+             * Difference Dps
+             * @description Difference of the residuals of each pair of `datasets`, second minus first, deg/s.
+             */
             difference_dps: (number | null)[];
         };
         /**
@@ -10393,28 +11067,58 @@ export interface components {
         };
         /**
          * ResidualMap
-         * @description Residual over floor in rate x temperature, one axis in one position: lists of equal length.
+         * @description Residual over rate and temperature, of one output axis in one position: lists with one entry per data set.
          */
         ResidualMap: {
-            /** Axis */
+            /**
+             * Axis
+             * @description Output axis, x, y or z.
+             */
             axis: string;
-            /** Position */
+            /**
+             * Position
+             * @description Position of the unit: the body axis that points up, such as x, -x or x@180.
+             */
             position: string;
-            /** Dataset */
+            /**
+             * Dataset
+             * @description Numbers of the data sets.
+             */
             dataset: number[];
-            /** Table Rate Dps */
+            /**
+             * Table Rate Dps
+             * @description Rate of the table, deg/s.
+             */
             table_rate_dps: number[];
-            /** Temperature C */
+            /**
+             * Temperature C
+             * @description Temperature by the thermometer of the axis, deg C.
+             */
             temperature_c: number[];
-            /** Rate Level Dps */
+            /**
+             * Rate Level Dps
+             * @description Centre of the rate level that the data set belongs to, deg/s; the same levels in all maps of an axis.
+             */
             rate_level_dps: number[];
-            /** Temperature Level C */
+            /**
+             * Temperature Level C
+             * @description Centre of the temperature level that the data set belongs to, deg C; the same in all maps of an axis.
+             */
             temperature_level_c: number[];
-            /** Level Width C */
+            /**
+             * Level Width C
+             * @description Largest difference of the temperatures in one level, K.
+             */
             level_width_c: number;
-            /** Residual Dps */
+            /**
+             * Residual Dps
+             * @description Mean residual, measured minus modelled error, deg/s.
+             */
             residual_dps: number[];
-            /** Over Floor */
+            /**
+             * Over Floor
+             * @description Residual divided by its noise floor, with the sign of the residual.
+             */
             over_floor: number[];
         };
         /**
@@ -10498,25 +11202,50 @@ export interface components {
         };
         /**
          * RestsJson
-         * @description The rests that were found, and by which threshold.
+         * @description The rests of a recording in poses.
          */
         RestsJson: {
-            /** Count */
+            /**
+             * Count
+             * @description Number of rests.
+             */
             count: number;
-            /** Poses */
+            /**
+             * Poses
+             * @description Number of different directions of gravity among the rests.
+             */
             poses: number;
-            /** Used */
+            /**
+             * Used
+             * @description Number of rests that the accelerometer was calibrated with.
+             */
             used: number;
-            /** Window S */
+            /**
+             * Window S
+             * @description Window over which the scatter is computed, s.
+             */
             window_s: number;
-            /** Factor */
+            /**
+             * Factor
+             * @description A window is at rest where each channel scatters by less than this many times its static noise.
+             */
             factor: number;
+            /** @description Static noise of one reading. */
             noise: components["schemas"]["StaticNoiseJson"];
-            /** T S */
+            /**
+             * T S
+             * @description Middle of each rest, s.
+             */
             t_s: number[];
-            /** Duration S */
+            /**
+             * Duration S
+             * @description Duration of each rest, s.
+             */
             duration_s: number[];
-            /** Bias Dps */
+            /**
+             * Bias Dps
+             * @description Output axis -> mean output at each rest without what the specific force adds, deg/s.
+             */
             bias_dps: {
                 [key: string]: number[];
             };
@@ -11030,18 +11759,33 @@ export interface components {
         };
         /**
          * ShiftJson
-         * @description By how much one run, day or mounting is off the common coefficient.
+         * @description Difference of one run, day or mounting from the common coefficient.
          */
         ShiftJson: {
-            /** Recording */
+            /**
+             * Recording
+             * @description Number of the recording.
+             */
             recording: number;
-            /** Number */
+            /**
+             * Number
+             * @description Number of the run or mounting, counted through all recordings; of a day that of the recording.
+             */
             number: number;
-            /** Along */
+            /**
+             * Along
+             * @description Of a mounting, the body axis that the unit was turned about; else empty.
+             */
             along: string;
-            /** Value */
+            /**
+             * Value
+             * @description Difference, in the unit of the repeatability.
+             */
             value: number;
-            /** U */
+            /**
+             * U
+             * @description Standard uncertainty of the difference, in the same unit.
+             */
             u: number;
         };
         /**
@@ -11169,18 +11913,25 @@ export interface components {
         };
         /**
          * SlowProcess
-         * @description A slow process in the residual of a record at rest: its size by axis, time constant, and how much is common.
-         *
-         *     `common` is the share of the axes' variance, each over its own size, that one common course explains.
+         * @description A slow process in the residual of a record at rest.
          */
         SlowProcess: {
-            /** Rms Dps */
+            /**
+             * Rms Dps
+             * @description Output axis -> RMS of the residual about its mean, deg/s; only the axes with a slow process.
+             */
             rms_dps: {
                 [key: string]: number;
             };
-            /** Tau S */
+            /**
+             * Tau S
+             * @description Time in which the autocorrelation falls to 1/e, median of the axes, s.
+             */
             tau_s: number;
-            /** Common */
+            /**
+             * Common
+             * @description Share of the axes' variance, each normalised, that one common course explains, 0 to 1; null: one axis only.
+             */
             common: number | null;
         };
         /**
@@ -11603,22 +12354,43 @@ export interface components {
         };
         /**
          * StartProfile
-         * @description The mean course within data sets, deg/s, and the same per deg/s of the step in rate before it.
+         * @description The mean course of the residual within data sets, each without its own mean.
          */
         StartProfile: {
-            /** Axis */
+            /**
+             * Axis
+             * @description Output axis, x, y or z.
+             */
             axis: string;
-            /** Datasets */
+            /**
+             * Datasets
+             * @description Number of data sets.
+             */
             datasets: number;
-            /** Since S */
+            /**
+             * Since S
+             * @description Time of each point since the first reading of the data set, s.
+             */
             since_s: (number | null)[];
-            /** Mean Dps */
+            /**
+             * Mean Dps
+             * @description Mean over the data sets, deg/s.
+             */
             mean_dps: (number | null)[];
-            /** Band Dps */
+            /**
+             * Band Dps
+             * @description Half width of the 95 % band of the mean, deg/s.
+             */
             band_dps: (number | null)[];
-            /** Per Step */
+            /**
+             * Per Step
+             * @description The part proportional to the step in rate before the data set, per deg/s of it, 1; absent without steps.
+             */
             per_step?: (number | null)[];
-            /** Per Step Band */
+            /**
+             * Per Step Band
+             * @description Half width of the 95 % band of `per_step`, 1; absent without steps.
+             */
             per_step_band?: (number | null)[];
         };
         /**
@@ -11649,26 +12421,44 @@ export interface components {
         };
         /**
          * StaticNoiseJson
-         * @description Noise of one reading at rest, by axis.
+         * @description Standard deviation of one reading at rest, over the axes x, y, z.
          */
         StaticNoiseJson: {
-            /** Accel G */
+            /**
+             * Accel G
+             * @description Of the accelerometer, g.
+             */
             accel_g: number[];
-            /** Gyro Dps */
+            /**
+             * Gyro Dps
+             * @description Of the gyro, deg/s.
+             */
             gyro_dps: number[];
         };
         /**
          * StaticRecordJson
-         * @description One stretch at rest: its first and last data set, its temperature and duration, and the noise by axis.
+         * @description The longest stretch at rest and at one temperature.
          */
         StaticRecordJson: {
-            /** Datasets */
+            /**
+             * Datasets
+             * @description Numbers of its first and its last data set.
+             */
             datasets: number[];
-            /** Temperature C */
+            /**
+             * Temperature C
+             * @description Mean temperature, deg C; null: no thermometer.
+             */
             temperature_c: number | null;
-            /** Duration S */
+            /**
+             * Duration S
+             * @description Duration, s.
+             */
             duration_s: number | null;
-            /** Axes */
+            /**
+             * Axes
+             * @description Output axis -> noise; axes with too few readings are absent.
+             */
             axes: {
                 [key: string]: components["schemas"]["AllanJson"];
             };
@@ -11762,17 +12552,35 @@ export interface components {
          * @description An effect that may be missing: the evidence, its size, and the error with it.
          */
         Suspect: {
-            /** Effect */
+            /**
+             * Effect
+             * @description Id of the effect.
+             */
             effect: string;
-            /** Probability */
+            /**
+             * Probability
+             * @description Probability that it is the one missing, 0 to 1; 0 where the technology of the unit cannot have its size.
+             */
             probability: number;
-            /** P Value */
+            /**
+             * P Value
+             * @description Probability of such a gain in chi2 by chance, corrected for the number of shapes tried, 0 to 1.
+             */
             p_value: number;
-            /** Log Bayes Factor */
+            /**
+             * Log Bayes Factor
+             * @description Natural logarithm of the Bayes factor of the model with the effect against the model.
+             */
             log_bayes_factor: number;
-            /** Share Removed */
+            /**
+             * Share Removed
+             * @description Share of the chi2 in excess of the noise that the effect removes, 0 to 1.
+             */
             share_removed: number;
-            /** Coefficients */
+            /**
+             * Coefficients
+             * @description Output axis -> name -> coefficient of the effect.
+             */
             coefficients: {
                 [key: string]: {
                     [key: string]: components["schemas"]["Coefficient"];
@@ -11780,147 +12588,266 @@ export interface components {
             };
             /**
              * Coefficients From
+             * @description fit: those of a fit of the model with the effect; comparison: estimated beside the model, without that fit.
              * @enum {string}
              */
             coefficients_from: "fit" | "comparison";
-            /** Parameters */
+            /**
+             * Parameters
+             * @description Name -> nonlinear parameter that goes with the coefficients; the effect in the catalogue states its unit.
+             */
             parameters: {
                 [key: string]: number;
             };
-            /** Physical */
+            /**
+             * Physical
+             * @description Whether the technology of the unit can have an effect of this size.
+             */
             physical: boolean;
-            /** Plausible */
+            /**
+             * Plausible
+             * @description Least and largest plausible first coefficient for the technology of the unit, in its unit; null: unknown.
+             */
             plausible: number[] | null;
-            /** Rms After Dps */
+            /**
+             * Rms After Dps
+             * @description RMS residual of a fit of the model with the effect, deg/s; null: not fitted, or cannot be.
+             */
             rms_after_dps: number | null;
-            /** Heldout Rms After Dps */
+            /**
+             * Heldout Rms After Dps
+             * @description RMS error of that fit on data sets left out in turn, deg/s; null: not fitted, or none can be left out.
+             */
             heldout_rms_after_dps: number | null;
-            /** Alias Group */
+            /**
+             * Alias Group
+             * @description Ids of the effects that the recording cannot distinguish from it, itself first.
+             */
             alias_group: string[];
             /**
              * Origin
+             * @description What the effect belongs to.
              * @enum {string}
              */
             origin: "sensor" | "package" | "fixture" | "bench" | "environment";
-            /** Explanation */
+            /**
+             * Explanation
+             * @description What the effect is, in one sentence.
+             */
             explanation: string;
-            /** Experiment */
+            /**
+             * Experiment
+             * @description What would distinguish it from similar effects.
+             */
             experiment: string;
         };
         /**
          * TemperatureBasisJson
-         * @description How temperature enters a model: not at all, or as a table with Lagrange interpolation between its nodes.
+         * @description How temperature enters a model.
          */
         TemperatureBasisJson: {
             /**
              * Kind
+             * @description constant: not at all; lagrange: a table with Lagrange interpolation between its nodes.
              * @enum {string}
              */
             kind: "constant" | "lagrange";
-            /** Points */
+            /**
+             * Points
+             * @description Nodes of one interpolation, at least 2; only where `kind` is lagrange.
+             */
             points?: number;
-            /** Nodes C */
+            /**
+             * Nodes C
+             * @description Temperatures of the nodes, rising, deg C; only where `kind` is lagrange.
+             */
             nodes_c?: number[];
         };
         /**
          * TermJson
-         * @description One effect of a model: its order and nonlinear parameters, and its expression where a user wrote it.
+         * @description One effect of a model.
          */
         TermJson: {
-            /** Effect */
+            /**
+             * Effect
+             * @description Id of the effect.
+             */
             effect: string;
-            /** Order */
+            /**
+             * Order
+             * @description Polynomial order; null: the default order of the effect, or it has none.
+             */
             order: number | null;
-            /** Parameters */
+            /**
+             * Parameters
+             * @description Name -> nonlinear parameter, in the unit that the catalogue states for it.
+             */
             parameters: {
                 [key: string]: number;
             };
-            /** Formula */
+            /**
+             * Formula
+             * @description Expression of an effect that a user wrote; empty: an effect of the catalogue.
+             */
             formula?: string;
-            /** Steady */
+            /**
+             * Steady
+             * @description Whether it has one coefficient for all temperatures, also in a model with a temperature table.
+             */
             steady?: boolean;
         };
         /**
          * ThermalFamilyJson
-         * @description A thermal response that predicts stretches of the temperature course that it has not seen.
-         *
-         *     `time_constants` by name (`tau_x_s` of axis x, `tau_s` of all), `alike`: other effects that predict as well alone;
-         *     errors of the stretches left out without and with it, deg/s.
+         * @description A thermal response that predicts stretches of the temperature course which it was not fitted to.
          */
         ThermalFamilyJson: {
-            /** Structure */
+            /**
+             * Structure
+             * @description Structure of the response: one, per_axis, curved, two_flows, ...
+             */
             structure: string;
-            /** Time Constants */
+            /**
+             * Time Constants
+             * @description Name -> time constant, s: tau_s of all axes, tau_x_s of axis x; empty: not computed.
+             */
             time_constants: {
                 [key: string]: components["schemas"]["Coefficient"];
             };
-            /** Alike */
+            /**
+             * Alike
+             * @description Ids of the other effects that alone predict as well.
+             */
             alike: string[];
-            /** Before Rms Dps */
+            /**
+             * Before Rms Dps
+             * @description RMS error of the stretches left out without the response, deg/s.
+             */
             before_rms_dps: number;
-            /** After Rms Dps */
+            /**
+             * After Rms Dps
+             * @description RMS error of the stretches left out with the response, deg/s.
+             */
             after_rms_dps: number;
         };
         /**
          * ThermalHintJson
-         * @description A thermal response that predicts too little to be named, and `why`; what other effects leave alone, deg/s.
-         *
-         *     `text` says it in a sentence.
+         * @description A thermal response that predicts too little to be named.
          */
         ThermalHintJson: {
-            /** Structure */
+            /**
+             * Structure
+             * @description Structure of the response: one, per_axis, curved, two_flows, ...
+             */
             structure: string;
-            /** Time Constants */
+            /**
+             * Time Constants
+             * @description Name -> time constant, s: tau_s of all axes, tau_x_s of axis x; empty: not computed.
+             */
             time_constants: {
                 [key: string]: components["schemas"]["Coefficient"];
             };
-            /** Alike */
+            /**
+             * Alike
+             * @description Ids of the other effects that alone predict as well.
+             */
             alike: string[];
-            /** Before Rms Dps */
+            /**
+             * Before Rms Dps
+             * @description RMS error of the stretches left out without the response, deg/s.
+             */
             before_rms_dps: number;
-            /** After Rms Dps */
+            /**
+             * After Rms Dps
+             * @description RMS error of the stretches left out with the response, deg/s.
+             */
             after_rms_dps: number;
-            /** Rivals Rms Dps */
+            /**
+             * Rivals Rms Dps
+             * @description Effect -> RMS error of the stretches left out with that effect alone, deg/s.
+             */
             rivals_rms_dps: {
                 [key: string]: number;
             };
-            /** Why */
+            /**
+             * Why
+             * @description Why it is not certain.
+             */
             why: string;
-            /** Text */
+            /**
+             * Text
+             * @description The hint in a sentence.
+             */
             text: string;
         };
         /**
          * TimeLine
-         * @description The same against time, or against the order of the data sets where no time is known, with where power came.
-         *
-         *     `lag1`: correlation of neighbours; `runs_z`, `runs_p`: the runs test; both null for too few data sets.
+         * @description The mean residual against time, or against the order of the data sets where no time is known.
          */
         TimeLine: {
-            /** T S */
+            /**
+             * T S
+             * @description Time of each point since the start of the recording, s; absent where no time is known.
+             */
             t_s?: (number | null)[];
-            /** Power On T S */
+            /**
+             * Power On T S
+             * @description Time of the first data set of each powered run, s; absent where no time is known.
+             */
             power_on_t_s?: (number | null)[];
-            /** Order */
+            /**
+             * Order
+             * @description Place of each point in the order of the data sets, from 1; only where no time is known.
+             */
             order?: (number | null)[];
-            /** Power On Order */
+            /**
+             * Power On Order
+             * @description Place of the first data set of each powered run, from 1; only where no time is known.
+             */
             power_on_order?: (number | null)[];
-            /** Axis */
+            /**
+             * Axis
+             * @description Output axis, x, y or z.
+             */
             axis: string;
-            /** Mean Dps */
+            /**
+             * Mean Dps
+             * @description Mean residual at each point, measured minus modelled error, deg/s.
+             */
             mean_dps: (number | null)[];
-            /** Low Dps */
+            /**
+             * Low Dps
+             * @description Lower limit of the 95 % band of the mean by noise and drift, deg/s.
+             */
             low_dps: (number | null)[];
-            /** High Dps */
+            /**
+             * High Dps
+             * @description Upper limit of the 95 % band of the mean by noise and drift, deg/s.
+             */
             high_dps: (number | null)[];
-            /** Z */
+            /**
+             * Z
+             * @description Largest size of a mean over its standard uncertainty, at least 0; null: unknown.
+             */
             z: number | null;
-            /** Lag1 */
+            /**
+             * Lag1
+             * @description Correlation of the residuals of neighbouring data sets of a powered run, -1 to 1; null: too few data sets.
+             */
             lag1: number | null;
-            /** Lag1 Whitened */
+            /**
+             * Lag1 Whitened
+             * @description The same of the residuals whitened by the noise and drift found, -1 to 1; null: too few data sets.
+             */
             lag1_whitened: number | null;
-            /** Runs Z */
+            /**
+             * Runs Z
+             * @description z of the Wald-Wolfowitz runs test of the whitened residuals; negative: neighbours are alike; null: too few.
+             */
             runs_z: number | null;
-            /** Runs P */
+            /**
+             * Runs P
+             * @description Two-sided p-value of the runs test, 0 to 1; null: fewer than 12 data sets.
+             */
             runs_p: number | null;
         };
         /**
@@ -12389,11 +13316,20 @@ export interface components {
         };
         /** UsualRange */
         UsualRange: {
-            /** From */
+            /**
+             * From
+             * @description Least usual value, in the unit of the coefficient.
+             */
             from: number;
-            /** To */
+            /**
+             * To
+             * @description Largest usual value, in the unit of the coefficient.
+             */
             to: number;
-            /** Inside */
+            /**
+             * Inside
+             * @description Whether it may be within the range on every axis, given U = 2 u; where both signs occur, by its size.
+             */
             inside: boolean;
         };
         /** ValidationError */
@@ -12698,26 +13634,57 @@ export interface components {
          * @description All views of a criticism; empty where there was too little for a verdict.
          */
         Views: {
+            /** @description The data sets one by one. */
             sets?: components["schemas"]["DataSetColumns"];
-            /** Channels */
+            /**
+             * Channels
+             * @description Mean residual against each channel that varies, by axis.
+             */
             channels?: components["schemas"]["ChannelLine"][];
-            /** Time */
+            /**
+             * Time
+             * @description Mean residual against time, by axis.
+             */
             time?: components["schemas"]["TimeLine"][];
-            /** Frequency */
+            /**
+             * Frequency
+             * @description Periodogram of the mean residuals, by axis; only where times are known, of 16 data sets and more.
+             */
             frequency?: components["schemas"]["BetweenSets"][];
-            /** Legs */
+            /**
+             * Legs
+             * @description Hysteresis: difference of the residuals between rising and falling temperature, by axis and channel.
+             */
             legs?: components["schemas"]["LegLine"][];
-            /** Previous Rate */
+            /**
+             * Previous Rate
+             * @description Mean residual against the rate before, by axis; only where it is known and varies.
+             */
             previous_rate?: components["schemas"]["PreviousRateLine"][];
-            /** Repeats */
+            /**
+             * Repeats
+             * @description Scatter of repeated data sets, by axis; only where there are any.
+             */
             repeats?: components["schemas"]["Repeats"][];
-            /** Angle */
+            /**
+             * Angle
+             * @description Spectrum over the angle of the table, by axis; only of readings with angles.
+             */
             angle?: components["schemas"]["AngleSpectrum"][];
-            /** Frequency Within */
+            /**
+             * Frequency Within
+             * @description Spectrum over time within data sets, by axis; only of readings.
+             */
             frequency_within?: components["schemas"]["FrequencySpectrum"][];
-            /** Time In Set */
+            /**
+             * Time In Set
+             * @description Mean course within data sets, by axis; only of readings.
+             */
             time_in_set?: components["schemas"]["StartProfile"][];
-            /** Draws */
+            /**
+             * Draws
+             * @description View or channel -> ids of the effects of which the signature would appear there.
+             */
             draws?: {
                 [key: string]: string[];
             };
@@ -12839,33 +13806,52 @@ export interface components {
          * @description A data set far from the model.
          */
         WorstDataSet: {
-            /** Axis */
+            /**
+             * Axis
+             * @description Output axis, x, y or z.
+             */
             axis: string;
-            /** Dataset */
+            /**
+             * Dataset
+             * @description Number of the data set in the recording.
+             */
             dataset: number;
-            /** Residual Dps */
+            /**
+             * Residual Dps
+             * @description Mean residual of the data set, measured minus modelled error, deg/s.
+             */
             residual_dps: number;
-            /** Over Floor */
+            /**
+             * Over Floor
+             * @description Residual divided by its noise floor, with the sign of the residual.
+             */
             over_floor: number;
         };
         /**
          * LeftOut
          * @description An effect of a fit that no correction by output and temperature contains.
-         *
-         *     It does not belong to the unit, or its input is known on the bench only; `specific_force` of a file has those for
-         *     which a consumer needs an accelerometer.
          */
         labctl__json_types__models__LeftOut: {
-            /** Effect */
+            /**
+             * Effect
+             * @description Id of the effect.
+             */
             effect: string;
             /**
              * Origin
+             * @description What the effect belongs to.
              * @enum {string}
              */
             origin: "sensor" | "package" | "fixture" | "bench" | "environment";
-            /** Term */
+            /**
+             * Term
+             * @description Standard term of the effect (IEEE Std 528).
+             */
             term: string;
-            /** Rms Dps */
+            /**
+             * Rms Dps
+             * @description RMS of what it adds to the data sets of the fit, deg/s; null or absent: unknown.
+             */
             rms_dps?: number | null;
         };
         /**
