@@ -77,15 +77,22 @@ class AlignmentJson(TypedDict):
 
 
 class FieldAlignmentJson(TypedDict):
-    """Rotation of the magnetometer's axes from the accelerometer's, about each axis, and the dip of the field, deg."""
+    """Rotation of the magnetometer's axes from the accelerometer's, and the dip of the field."""
 
     axes: dict[str, AccelerometerCoefficient]
+    """Axis -> component of the rotation vector, deg."""
     dip: AccelerometerCoefficient
+    """Angle of the field below the horizontal, deg, -90 to 90."""
     covariance_deg2: list[list[float]]
+    """Covariance of the three components and the dip, (4, 4), deg2."""
     place_deg: float
+    """Standard deviation of a component of the field's direction from rest to rest, beyond the noise, deg."""
     rests: int
+    """Number of rests that were used."""
     moves: int
+    """Number of moves that were used."""
     definition: str
+    """How the rotation is defined."""
 
 
 class MoveLeftOutJson(TypedDict):

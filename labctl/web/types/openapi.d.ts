@@ -6831,23 +6831,42 @@ export interface components {
         };
         /**
          * FieldAlignmentJson
-         * @description Rotation of the magnetometer's axes from the accelerometer's, about each axis, and the dip of the field, deg.
+         * @description Rotation of the magnetometer's axes from the accelerometer's, and the dip of the field.
          */
         FieldAlignmentJson: {
-            /** Axes */
+            /**
+             * Axes
+             * @description Axis -> component of the rotation vector, deg.
+             */
             axes: {
                 [key: string]: components["schemas"]["AccelerometerCoefficient"];
             };
+            /** @description Angle of the field below the horizontal, deg, -90 to 90. */
             dip: components["schemas"]["AccelerometerCoefficient"];
-            /** Covariance Deg2 */
+            /**
+             * Covariance Deg2
+             * @description Covariance of the three components and the dip, (4, 4), deg2.
+             */
             covariance_deg2: number[][];
-            /** Place Deg */
+            /**
+             * Place Deg
+             * @description Standard deviation of a component of the field's direction from rest to rest, beyond the noise, deg.
+             */
             place_deg: number;
-            /** Rests */
+            /**
+             * Rests
+             * @description Number of rests that were used.
+             */
             rests: number;
-            /** Moves */
+            /**
+             * Moves
+             * @description Number of moves that were used.
+             */
             moves: number;
-            /** Definition */
+            /**
+             * Definition
+             * @description How the rotation is defined.
+             */
             definition: string;
         };
         /**
