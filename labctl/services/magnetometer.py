@@ -81,8 +81,8 @@ def _of_recording(path: Path, field_ut: float | None, serial: str | None) -> Mag
     absent = [f"field_{a}_ut" for a in AXES if f"field_{a}_ut" not in recording.columns]
     if absent:
         raise BadRecording(
-            f"{path}: this recording has no column {absent[0]}; a magnetometer needs field_x_ut, field_y_ut and "
-            "field_z_ut, uT"
+            f"{path}: this recording has no column {absent[0]}; record field_x_ut, field_y_ut and field_z_ut, uT, "
+            "in every pose"
         )
     readings = readings_of(recording)
     columns = recording.columns

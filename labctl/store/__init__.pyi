@@ -6,7 +6,7 @@ from labctl.store.connection.writer_lock import (
     ServiceAddress as ServiceAddress,
     holder_of as holder_of,
 )
-from labctl.store.integrity.migration import Copy as Copy, copy_database as copy_database
+from labctl.store.integrity.backup import Copy as Copy, copy_database as copy_database
 from labctl.store.integrity.check import Checked as Checked, Finding as Finding, Progress as Progress, check as check
 from labctl.store.integrity.migration import (
     Migrated as Migrated,

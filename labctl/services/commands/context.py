@@ -123,5 +123,5 @@ class BenchAct(Generic[RequestT, ResponseT]):
     wait_s: float = WRITES_S  #: how long another process of the service waits for it
 
     def execute(self, context: CommandContext, asked: RequestT) -> ResponseT:
-        """Have it carried out by whoever controls the bench. Raises LabctlError."""
+        """Have it carried out by the process that controls the bench. Raises LabctlError."""
         return context.control.perform(self, context, asked)
