@@ -63,6 +63,10 @@ class TableSettings(DeviceSettings):
     acceleration_dps2: float = Field(gt=0)
 
 
+#: Time constant with which the air of a chamber follows a ramp where a bench file states none, s: a guess.
+USUAL_AIR_TAU_S = 180.0
+
+
 class ChamberSettings(DeviceSettings):
     """Address and limits of a chamber controller."""
 
@@ -70,6 +74,8 @@ class ChamberSettings(DeviceSettings):
     max_c: float = 150.0
     safe_c: float = 25.0
     ramp_c_per_min: float = Field(default=1.67, gt=0)
+    #: Time constant with which the air follows a ramp, for the expected time of a plan; absent: a guess is used.
+    air_tau_s: float | None = Field(default=None, gt=0)
 
     @model_validator(mode="after")
     def _in_order(self) -> ChamberSettings:
@@ -224,6 +230,15 @@ class BenchFile(Strict):
                 "give each a different name"
             )
         return self
+
+    @property
+    def air_tau_s(self) -> float | None:
+        """Time constant of the chamber's air, s, as the file states or simulates it; None where it does neither."""
+        stated = None if self.chamber is None else self.chamber.air_tau_s
+        if stated is not None or self.simulation is None:
+            return stated
+        simulated = self.simulation.chamber.get("air_tau_s", USUAL_AIR_TAU_S)
+        return float(simulated) if isinstance(simulated, int | float) else None  # another is refused when it is opened
 
     @property
     def is_simulated(self) -> bool:

@@ -19,15 +19,15 @@ class Contact(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, str_strip_whitespace=True)
 
-    name: str = Field(default="", pattern=LINE)
+    name: str = Field(default="", pattern=LINE, description="Name of the organisation; empty: not stated.")
     street: str = Field(default="", pattern=LINE, description="Street and number, or post-office box.")
-    post_code: str = Field(default="", pattern=LINE)
-    city: str = Field(default="", pattern=LINE)
+    post_code: str = Field(default="", pattern=LINE, description="Postal code; empty: not stated.")
+    city: str = Field(default="", pattern=LINE, description="City; empty: not stated.")
     country: str = Field(
         default="", pattern=rf"{COUNTRY}|^$", description="Code of the country (ISO 3166-1 alpha-2), such as DE."
     )
-    email: str = Field(default="", pattern=LINE)
-    phone: str = Field(default="", pattern=LINE)
+    email: str = Field(default="", pattern=LINE, description="E-mail address; empty: not stated.")
+    phone: str = Field(default="", pattern=LINE, description="Telephone number; empty: not stated.")
 
 
 class Laboratory(Contact):
@@ -36,11 +36,19 @@ class Laboratory(Contact):
     accreditation: str = Field(
         default="", pattern=LINE, description="Accreditation number of the laboratory; empty: not accredited."
     )
-    place: Place = "laboratory"
-    #: Address of labctl as a customer reaches it: a certificate's QR code leads to the version there.
-    url: str = Field(default="", pattern=r"^(https?://[^\s\x00-\x1f]{1,300})?$")
-    #: Prefix of the number of every certificate, so that no two laboratories have a number in common.
-    number_prefix: str = Field(default="", pattern=r"^[A-Za-z0-9._/-]{0,40}$")
+    place: Place = Field(
+        default="laboratory", description="Where the calibration was performed, in the words of the DCC schema."
+    )
+    url: str = Field(
+        default="",
+        pattern=r"^(https?://[^\s\x00-\x1f]{1,300})?$",
+        description="Address of labctl as a customer reaches it, for the QR code of a certificate; empty: none.",
+    )
+    number_prefix: str = Field(
+        default="",
+        pattern=r"^[A-Za-z0-9._/-]{0,40}$",
+        description="Prefix of the number of every certificate, so that no two laboratories have a number in common.",
+    )
     procedure: str = Field(
         default="", pattern=LINE, description="Number of the laboratory's written calibration procedure."
     )

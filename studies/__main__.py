@@ -18,6 +18,7 @@ STUDIES = (
     "figures_agree",
     "hand_turns",
     "poses",
+    "triads",
     "accelerometer_temperature",
     "joint_recordings",
     "criticism",

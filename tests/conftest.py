@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import itertools
 import os
 import shutil
 import sys
@@ -14,6 +15,7 @@ from typing import Any
 import pytest
 from hypothesis import settings
 
+from tests.helpers import memory_folder
 from tests.helpers.cortex_m import INSTALL_CORTEX_M, has_cortex_m
 from tests.helpers.leftovers import leftover_tasks, leftover_threads
 from tests.helpers.signal_defaults import default_signals
@@ -24,6 +26,8 @@ settings.load_profile("labctl")
 #: How long a coroutine of a test may take, seconds.
 LOOP_S = 60.0
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+#: In memory, for this process and its workers; before anything asks where temporary files go.
+IN_MEMORY = memory_folder.enter()
 # `labctl stop` finds benches by what is kept here: those of the tests are no benches of the user.
 os.environ["XDG_STATE_HOME"] = str(Path(tempfile.gettempdir()) / f"labctl-tests-state-{os.getuid()}-{os.getpid()}")
 # The processes that tests start would each compile all modules again.
@@ -56,19 +60,26 @@ def cache_of_fixtures(run_folder: Path) -> Iterator[None]:
         yield
 
 
+@pytest.fixture(scope="session")
+def next_cache(tmp_path_factory: pytest.TempPathFactory) -> Callable[[], Path]:
+    """Return what makes another folder. `mktemp` would list all that are there to find the next number."""
+    caches, numbers = tmp_path_factory.mktemp("caches"), itertools.count()
+    return lambda: caches / str(next(numbers))
+
+
 @pytest.fixture(autouse=True)
-def cache(run_folder: Path, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
+def cache(run_folder: Path, next_cache: Callable[[], Path], monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """Each test its own kept answers: nothing is taken from the user's cache, and nothing goes there.
 
     Walks through plans are kept for all tests: their files are named by all that they depend on.
     """
-    folder = tmp_path_factory.mktemp("cache", numbered=True)
-    walks = run_folder / "walks"
+    folder, walks = next_cache(), run_folder / "walks"
     for place in (walks, folder / "labctl"):
-        place.mkdir(mode=0o700, exist_ok=True)
+        place.mkdir(mode=0o700, parents=True, exist_ok=True)
     (folder / "labctl" / "walks").symlink_to(walks, target_is_directory=True)
     monkeypatch.setenv("XDG_CACHE_HOME", str(folder))
-    return folder
+    yield folder
+    shutil.rmtree(folder)
 
 
 @pytest.fixture
@@ -123,3 +134,9 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         for item in items if not is_there else ():
             if item.get_closest_marker(marker):
                 item.add_marker(pytest.mark.skip(reason=reason))
+
+
+def pytest_sessionfinish(exitstatus: int) -> None:
+    """Give the memory back, unless a test failed: then the next run does."""
+    if IN_MEMORY is not None and exitstatus == pytest.ExitCode.OK:
+        shutil.rmtree(IN_MEMORY, ignore_errors=True)

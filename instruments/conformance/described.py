@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from instruments.clock import Clock
-from instruments.drivers.references.line_reference import LineReference
+from instruments.drivers.line_reference import LineReference
 from instruments.drivers.request_reply.chamber import DescribedChamber
 from instruments.drivers.request_reply.dialogue import Dialogue
 from instruments.drivers.request_reply.table import DescribedTable

@@ -30,6 +30,7 @@ from instruments.transport.adapters import require_adapter
 from instruments.transport.factory import Ports
 from instruments.transport.sample_timing import FRESH_PERIODS, StreamTime, refuse_other_rate
 from instruments.transport.serial_stream import SerialStream, line_of
+from instruments.transport.undecided import Undecided
 
 SILENCE_S = 2.0
 EMPTY_EVERY_S = 1.0
@@ -75,6 +76,7 @@ class KvhGyro:
         self._unfinished = b""
         self._in_line = False
         self._time = StreamTime(1.0 / self.sample_rate_hz, 0.0)
+        self._undecided = Undecided()
         self._last_line_s = 0.0
 
     @property
@@ -116,9 +118,7 @@ class KvhGyro:
         """
         readings = self._decode(self._stream.read_for(duration_s, EMPTY_EVERY_S))
         now_s = self._clock.now_s()
-        if len(readings):
-            self._last_line_s, self._stream.unused = now_s, 0
-        elif now_s - self._last_line_s > max(SILENCE_S, 5 / self.sample_rate_hz):
+        if now_s - self._last_line_s > max(SILENCE_S, 5 / self.sample_rate_hz):
             raise self._no_line(now_s - self._last_line_s)
         return readings
 
@@ -130,7 +130,6 @@ class KvhGyro:
             self._clock.sleep(FRESH_PERIODS / self.sample_rate_hz)
             data = self._stream.read_available()
             if data and len(readings := self._decode(data)):
-                self._last_line_s, self._stream.unused = self._clock.now_s(), 0
                 return readings.newest()
         raise self._no_line(SILENCE_S)
 
@@ -166,6 +165,7 @@ class KvhGyro:
         self._stream.discard_input()
         self._unfinished, self._in_line = b"", False
         self._time.drop()
+        self._undecided.drop()
 
     def _no_line(self, silence_s: float) -> NoReply:
         advice = self._stream.advice(f"baud rate {self._baudrate} and options.pattern")
@@ -183,14 +183,16 @@ class KvhGyro:
         raw = {channel.name: codes[:, i] for i, channel in enumerate(self.channels)}
         if not good:
             return Readings(np.zeros(0), raw, np.zeros(0, dtype=bool), 0, damaged, arrival_s=np.zeros(0))
+        self._last_line_s, self._stream.unused = self._clock.now_s(), 0
         came = self._stream.last
+        arrival_s = self._stream.arrival_s(behind[[line is not None for line in lines]])
         advance = np.ones(len(good), dtype=np.int64)
         advance[0] += damaged  # a damaged line has taken its sampling period too
-        times, lost = self._time.times(advance, came.now_s, newest_s=came.newest_s, width_s=came.width_s)
+        times, lost = self._time.times(advance, came.now_s, width_s=came.width_s, arrival_s=arrival_s)
         refuse_other_rate(self.name, self.settings.port, self._time.line)
         valid = np.asarray([line.flag and abs(line.rate) <= self._limit_counts for line in good])
-        arrival_s = self._stream.arrival_s(behind[[line is not None for line in lines]])
-        return Readings(times, raw, valid, lost, damaged, arrival_s=arrival_s)
+        readings = Readings(times, raw, valid, lost, damaged, arrival_s=arrival_s)
+        return self._undecided.pass_on(readings, self._time)
 
     def _parse(self, piece: bytes) -> Line | None:
         line = parse_line(piece.decode("latin-1"), self._pattern, self._length)

@@ -16,6 +16,7 @@ from instruments.protocols.stim300.datagrams import (
     ASK_BIAS_TRIM,
     ASK_CONFIGURATION,
     ASK_SERIAL_NUMBER,
+    SAMPLE_RATES_HZ,
     Configuration,
     parse_bias_trim,
     parse_configuration,
@@ -33,6 +34,7 @@ from instruments.protocols.stim300.frames import (
     layout_of,
     scan,
 )
+from instruments.protocols.stim300.layouts import SPECIALS
 from instruments.protocols.stim300.settings import Stim300Settings
 from instruments.transport.adapters import require_adapter
 from instruments.transport.device_time import DeviceTime
@@ -41,6 +43,7 @@ from instruments.transport.sample_counter import SampleCounter
 from instruments.transport.sample_timing import FRESH_PERIODS, StreamTime, refuse_other_rate
 from instruments.transport.serial_stream import SerialStream, line_of
 from instruments.transport.stream_period import OF_A_CRYSTAL
+from instruments.transport.undecided import Undecided
 
 SILENCE_S = 2.0
 COUNTER_WRAP = 256
@@ -83,6 +86,7 @@ class Stim300:
         )
         self._time = StreamTime(1.0 / self.sample_rate_hz, 0.0, OF_A_CRYSTAL)
         self._device_time = DeviceTime(1.0 / COUNTS_PER_S, COUNTER_WRAP)
+        self._undecided = Undecided()
         self._last_frame_s = 0.0
         self._set: Configuration | None = None  # as the unit says
         self._serial: str | None = None
@@ -130,9 +134,7 @@ class Stim300:
         """
         readings = self._decode(self._stream.read_for(duration_s, self._empty_every_s))
         now_s = self._clock.now_s()
-        if len(readings):
-            self._last_frame_s, self._stream.unused = now_s, 0
-        elif now_s - self._last_frame_s > SILENCE_S:
+        if now_s - self._last_frame_s > SILENCE_S:
             raise self._no_datagram(f"for {now_s - self._last_frame_s:.1f} s")
         return readings
 
@@ -152,7 +154,6 @@ class Stim300:
             self._clock.sleep(FRESH_PERIODS / self.sample_rate_hz)
             data = self._stream.read_available()
             if data and len(readings := self._decode(data)):
-                self._last_frame_s, self._stream.unused = self._clock.now_s(), 0
                 newest = readings.newest()
             if newest is not None and not self._is_unknown:
                 return newest
@@ -183,6 +184,7 @@ class Stim300:
         self._unfinished = b""
         self._counter.drop()
         self._time.drop()
+        self._undecided.drop()
 
     def _no_datagram(self, when: str) -> NoReply:
         options = self.options
@@ -196,6 +198,12 @@ class Stim300:
             f"{START_WITHIN_S:g} s; check the wire to the unit's receiver, or set options.ask = false if there is no "
             "such wire",
         )
+
+    @property
+    def _possible_rates_hz(self) -> tuple[int, ...]:
+        """What the unit can be set to; none where something else triggers it."""
+        triggered = self._set is not None and self._set.sample_rate_hz is None
+        return () if triggered or self.sample_rate_hz not in SAMPLE_RATES_HZ else SAMPLE_RATES_HZ
 
     @property
     def _is_unknown(self) -> bool:
@@ -255,6 +263,7 @@ class Stim300:
         found = scan(self._unfinished + data, self.layout)
         self._unfinished = found.rest
         for special in found.specials:
+            self._stream.answered(SPECIALS[special[0]].stride)
             self._hear(special)
         frames, layout, behind = found.frames, self.layout, found.behind
         damaged = found.damaged
@@ -278,18 +287,20 @@ class Stim300:
             valid &= (frames[:, layout.temperature_status] & BAD_STATUS) == 0
         raw["status"] = status
         counter = frames[:, layout.counter].astype(np.int64)
-        times, lost = self._times(counter)
+        self._last_frame_s, self._stream.unused = self._clock.now_s(), 0
         arrival_s = self._stream.arrival_s(behind)
-        return Readings(times, raw, valid, lost, damaged, self._device_time.of(counter, times), arrival_s)
+        times, lost = self._times(counter, arrival_s)
+        readings = Readings(times, raw, valid, lost, damaged, None, arrival_s)
+        return self._undecided.pass_on(readings, self._time, self._device_time, counter)
 
-    def _times(self, counter: NDArray[np.int64]) -> tuple[NDArray[np.float64], int]:
+    def _times(self, counter: NDArray[np.int64], arrival_s: NDArray[np.float64]) -> tuple[NDArray[np.float64], int]:
         """Return the clock times of frames, (n,) s, and the number of frames missing by counter and by clock."""
         advance = self._counter.advance(counter)
         came = self._stream.last
         times, uncounted = self._time.times(
-            advance, came.now_s, self._counter.readings_per_turn, newest_s=came.newest_s, width_s=came.width_s
+            advance, came.now_s, self._counter.readings_per_turn, width_s=came.width_s, arrival_s=arrival_s
         )
-        refuse_other_rate(self.name, self.settings.port, self._time.line)
+        refuse_other_rate(self.name, self.settings.port, self._time.line, self._possible_rates_hz)
         return times, int(advance.sum() - len(advance)) + uncounted
 
 

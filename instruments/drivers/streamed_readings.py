@@ -17,6 +17,7 @@ from instruments.transport.device_time import DeviceTime
 from instruments.transport.sample_counter import SampleCounter
 from instruments.transport.sample_timing import FRESH_PERIODS, StreamTime, refuse_other_rate
 from instruments.transport.serial_stream import SerialStream
+from instruments.transport.undecided import Undecided
 
 SILENCE_S = 2.0
 #: Least size of a port's input buffer; a simulated port is emptied when half of it can be full.
@@ -54,6 +55,7 @@ class StreamedReadings:
         self._stamp: int | None = None  #: time stamp of the newest reading
         self._time = StreamTime(1.0 / law.rate_hz, 0.0)
         self._device_time = self._new_device_time()
+        self._undecided = Undecided()
         self._last_s = 0.0
 
     @property
@@ -80,9 +82,7 @@ class StreamedReadings:
         """
         readings = self._decode(self._stream.read_for(duration_s, self._empty_every_s))
         now_s = self._clock.now_s()
-        if len(readings):
-            self._last_s, self._stream.unused = now_s, 0
-        elif now_s - self._last_s > self._silence_s:
+        if now_s - self._last_s > self._silence_s:
             raise self._no_reading(now_s - self._last_s)
         return readings
 
@@ -94,7 +94,6 @@ class StreamedReadings:
             self._clock.sleep(FRESH_PERIODS / self._law.rate_hz)
             data = self._stream.read_available()
             if data and len(readings := self._decode(data)):
-                self._last_s, self._stream.unused = self._clock.now_s(), 0
                 return readings.newest()
         raise self._no_reading(self._clock.now_s() - began_s)
 
@@ -121,6 +120,7 @@ class StreamedReadings:
         if self._counter is not None:
             self._counter.drop()
         self._time.drop()
+        self._undecided.drop()
 
     def _no_reading(self, silence_s: float) -> NoReply:
         return NoReply(self._device, self._unread(self._stream, silence_s))
@@ -137,26 +137,18 @@ class StreamedReadings:
         if not len(valid):
             device_s = None if self._device_time is None else np.zeros(0)
             return Readings(np.zeros(0), raw, valid, 0, damaged, device_s, np.zeros(0))
+        self._last_s, self._stream.unused = self._clock.now_s(), 0
         advance = self._advance(found, kept)
-        came = self._stream.last
+        came, arrival_s = self._stream.last, self._stream.arrival_s(found.behind[kept])
         turn = 0 if self._counter is None else self._counter.readings_per_turn
-        times, uncounted = self._time.times(
-            advance, came.now_s, turn, newest_s=came.newest_s, width_s=came.width_s
-        )  # fmt: skip
+        times, uncounted = self._time.times(advance, came.now_s, turn, width_s=came.width_s, arrival_s=arrival_s)
         refuse_other_rate(self._device, self._port, self._time.line)
         counts = self._counter is not None or self._law.stamps is not None
         lost = int(advance.sum()) - len(advance) + uncounted if counts else uncounted
-        device_s = self._device_s(found, kept, times)
-        return Readings(times, raw, valid, lost, damaged, device_s, self._stream.arrival_s(found.behind[kept]))
-
-    def _device_s(
-        self, found: Decoded, kept: NDArray[np.bool_], t_s: NDArray[np.float64]
-    ) -> NDArray[np.float64] | None:
-        """Return the times (n,) of readings by the unit's own clock, s; None where it tells none."""
         told = self._law.stamps or self._law.counter
-        if self._device_time is None or told is None:
-            return None
-        return self._device_time.of(found.values[told.field][kept], t_s)
+        ticks = None if told is None else found.values[told.field][kept].astype(np.int64)
+        readings = Readings(times, raw, valid, lost, damaged, None, arrival_s)
+        return self._undecided.pass_on(readings, self._time, self._device_time, ticks)
 
     def _advance(self, found: Decoded, kept: NDArray[np.bool_]) -> NDArray[np.int64]:
         """Return how many periods each reading, (n,), is from the one before."""

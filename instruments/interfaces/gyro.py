@@ -56,6 +56,20 @@ class Readings:
             arrival_s=None if self.arrival_s is None else self.arrival_s[which],
         )
 
+    def after(self, before: Readings) -> Readings:
+        """Return these readings after those that came before them, with the counts of both."""
+        own = (self.device_s, self.arrival_s), (before.device_s, before.arrival_s)
+        device_s, arrival_s = (
+            None if late is None or early is None else np.concatenate([early, late])
+            for late, early in zip(*own, strict=True)
+        )
+        return Readings(
+            np.concatenate([before.t_s, self.t_s]),
+            {name: np.concatenate([before.raw[name], values]) for name, values in self.raw.items()},
+            np.concatenate([before.valid, self.valid]),
+            before.lost + self.lost, before.damaged + self.damaged, device_s, arrival_s,
+        )  # fmt: skip
+
 
 @dataclass(frozen=True)
 class GyroLimits:

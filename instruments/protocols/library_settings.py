@@ -54,6 +54,8 @@ class LibraryChamberSettings(LibraryOptions, ChamberSettings):
     stop: str = ""  #: switches heating and cooling off
     program: str = ""  #: other than 0 while a program runs; empty: the class does not tell
     program_mask: int | None = None  #: bits of `program` that count
+    running: str = ""  #: other than 0 while heating and cooling are on; empty: the class does not tell
+    running_mask: int | None = None  #: bits of `running` that count
     alarms: str = ""  #: other than 0 while there is an alarm
     resolution_c: float = Field(default=0.1, gt=0)
     safe_state: Literal["setpoint", "off"] = "setpoint"

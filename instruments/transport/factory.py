@@ -20,8 +20,8 @@ from instruments.transport.adapters import require_adapter
 from instruments.transport.can_port import open_can
 from instruments.transport.opened_port import open_port
 from instruments.transport.port_failures import reason, remedy
-from instruments.transport.rpc.channel import RpcChannel, TimedChannel
-from instruments.transport.rtu.client import NOT_OPENED, RtuClient
+from instruments.transport.rpc import RpcChannel, TimedChannel
+from instruments.transport.rtu import NOT_OPENED, RtuClient
 from instruments.transport.serial import EIGHT_N_1, Line, SerialPort
 from instruments.transport.stream_reader import PolledReader, StreamReader, ThreadedReader
 from instruments.transport.tcp_client import TcpClient

@@ -14,7 +14,7 @@ from instruments.clock import Clock
 from instruments.errors import InstrumentError, LinkError, MalformedReply, NoReply, RequestRejected
 from instruments.protocols.text_lines.line_syntax import LineSyntax
 from instruments.transport.factory import Ports
-from instruments.transport.rtu.line import RtuLine
+from instruments.transport.rtu import RtuLine
 from instruments.transport.serial import BROKEN, EIGHT_N_1, Line, SerialPort
 
 log = logging.getLogger(__name__)
@@ -99,7 +99,9 @@ class LineLink:
             self.awaits_slow = False
             port = self._opened()
             for request in requests:
-                port.write(self._encoded(request) * (2 if self._syntax.end else 1))
+                data = self._encoded(request) * (2 if self._syntax.end else 1)
+                self._line.send(data)
+                port.write(data)
         except BROKEN as error:
             raise self._broken(what, error) from error
         finally:

@@ -48,6 +48,7 @@ class SerialStream:
         self.last = Received(b"", clock.now_s())  #: what was read last: its time is that of the bytes returned last
         self._pieces: list[tuple[int, float]] = []  #: of what `read_for` or `read_available` returned last
         self.unused = 0  #: bytes that came since the last reading; the driver sets it to 0
+        self._answers = 0  #: of these, what the driver has asked for
 
     @property
     def is_open(self) -> bool:
@@ -82,7 +83,7 @@ class SerialStream:
 
     def discard_input(self) -> None:
         """Drop every byte that was not read yet; raises LinkError."""
-        self.unused = 0
+        self.unused = self._answers = 0
         try:
             self._reading().discard()
         except BROKEN as error:
@@ -112,17 +113,29 @@ class SerialStream:
         except BROKEN as error:
             self._fail(error)
         last = self.last
+        if not self.unused:
+            self._answers = 0
         self.unused += len(last.data)
         if last.data:
             came_s = last.now_s if last.newest_s is None else last.newest_s
             self._pieces += last.pieces or [(len(last.data), came_s)]
         return last.data
 
+    def answered(self, n_bytes: int) -> None:
+        """Note that so many of the bytes that came are an answer to what the driver asked."""
+        self._answers += n_bytes
+
     def advice(self, sent_as: str) -> str:
         """Return what came where a reading should have, and what to check; `sent_as` names what readings depend on."""
-        if not self.unused:
+        strange = max(self.unused - self._answers, 0)
+        if self.unused and not strange:
+            return (
+                f"the unit answers questions ({self.unused} bytes) but sends no reading; check that it measures, that "
+                f"nothing else has to trigger it, and {sent_as}"
+            )
+        if not strange:
             return f"no bytes arrived; check power, cable and {sent_as}"
-        return f"{self.unused} bytes arrived that are not readings; check {sent_as}, and what else sends on this line"
+        return f"{strange} bytes arrived that are not readings; check {sent_as}, and what else sends on this line"
 
     def read_for(self, duration_s: float, every_s: float) -> bytes:
         """Return the bytes of the next `duration_s` clock seconds; the port is emptied every `every_s` seconds.

@@ -9,7 +9,7 @@ from labctl.fitting.estimation.error_metrics import (
     rms as rms,
 )
 from labctl.fitting.estimation.fit import fit as fit
-from labctl.fitting.estimation.held.resolution import Fixed as Fixed
+from labctl.fitting.estimation.held import Fixed as Fixed
 from labctl.fitting.estimation.result import FitResult as FitResult, coefficients_json as coefficients_json
 from labctl.fitting.models.error_model import ErrorModel as ErrorModel
 from labctl.fitting.models.fitted_model import FittedModel as FittedModel

@@ -71,9 +71,28 @@ class AlignmentJson(TypedDict):
     axes: dict[str, AccelerometerCoefficient]
     """Axis -> component of the rotation vector, deg."""
     covariance_deg2: list[list[float]]
-    """Covariance of the components, (3, 3), deg2."""
+    """Covariance of the components, (3, 3), deg^2."""
     definition: str
     """How the rotation is defined."""
+
+
+class FieldAlignmentJson(TypedDict):
+    """Rotation of the magnetometer's axes from the accelerometer's, and the dip of the field."""
+
+    axes: dict[str, AccelerometerCoefficient]
+    """Axis -> component of the rotation vector, deg."""
+    dip: AccelerometerCoefficient
+    """Angle of the field below the horizontal, deg."""
+    covariance_deg2: list[list[float]]
+    """Covariance of the three components and the dip, (4, 4), deg^2."""
+    place_deg: float
+    """Standard deviation of a component of the direction from rest to rest, beyond the noise, deg."""
+    rests: int
+    """Number of rests that were used."""
+    moves: int
+    """Number of moves between rests that were used."""
+    definition: str
+    """How rotation and dip are defined."""
 
 
 class MoveLeftOutJson(TypedDict):

@@ -6,20 +6,61 @@ import atexit
 import logging
 import os
 import sys
+import threading
 from collections.abc import Iterable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
+from types import TracebackType
 
 import structlog
 from structlog.stdlib import ExtraAdder, ProcessorFormatter, add_logger_name
 
+from labctl.log import get_logger
 from labctl.log.redaction import Redaction, secrets_of
 from labctl.log.rendering import Rendering
 from labctl.log.repetition import MOST_FOREIGN, ForeignRecordLimit, RepetitionLimit
 from labctl.log.settings import is_read_by_a_person, level_asked
 from labctl.log.silence import be_silent
-from labctl.log.uncaught import uncaught_errors_logged
 from labctl.log.writer import LogWriter
+
+log = get_logger()
+
+
+def _of_the_process(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+    if issubclass(kind, KeyboardInterrupt):
+        log.warning("process.interrupted")
+        return
+    log.critical("process.failed", error_type=kind.__name__, exc_info=(kind, error, trace))
+
+
+def _of_a_thread(found: threading.ExceptHookArgs) -> None:
+    if issubclass(found.exc_type, SystemExit):
+        return
+    error = found.exc_value or found.exc_type()
+    name = found.thread.name if found.thread is not None else ""
+    info = (found.exc_type, error, found.exc_traceback)
+    log.error("thread.failed", thread=name, error_type=found.exc_type.__name__, exc_info=info)
+
+
+def _of_a_finalizer(found: sys.UnraisableHookArgs) -> None:
+    error = found.exc_value or found.exc_type()
+    info = (found.exc_type, error, found.exc_traceback)
+    where = found.err_msg or "ignored"
+    with suppress(Exception):  # an object that is half gone may not have a text any more
+        where = f"{where}: {found.object!r:.100}"
+    log.error("error.ignored", where=where, error_type=found.exc_type.__name__, exc_info=info)
+
+
+@contextmanager
+def uncaught_errors_logged() -> Iterator[None]:
+    """Log uncaught errors while the block runs; an error that leaves it is logged where it ends the process."""
+    before = sys.excepthook, threading.excepthook, sys.unraisablehook
+    sys.excepthook, threading.excepthook, sys.unraisablehook = _of_the_process, _of_a_thread, _of_a_finalizer
+    try:
+        yield
+    finally:
+        sys.excepthook, threading.excepthook, sys.unraisablehook = before
+
 
 STDERR = 2
 

@@ -16,6 +16,7 @@ from labctl.log.context import for_request
 from labctl.processes.calls import Answer, Call, UnderWay, answer_with
 from labctl.processes.held_address import HeldAddress
 from labctl.processes.supervision import Supervision
+from labctl.services.commands.acts.catalogue import BENCH_ACTS
 from labctl.services.commands.context import CommandContext
 from labctl.services.local_bench import LocalBench
 from labctl.store import Store
@@ -28,8 +29,6 @@ BEAT_S = 1.0
 LEAST_BEAT_S = 0.1
 #: Calls that are under way when the process ends have so long to be answered, s.
 UNDER_WAY_S = 2.0
-#: Acts of a person on a campaign; each is a method of CampaignControl.
-CONTROL = frozenset({"start", "schedule", "resume", "pause", "abort", "confirm", "check", "start_live", "end_live"})
 
 
 @dataclass(frozen=True)
@@ -95,8 +94,8 @@ class BenchCalls:
         area, _, name = call.name.partition(".")
         if area == "store":
             return self._store.run(name, *call.args)
-        if area == "control" and name in CONTROL:
-            return getattr(self._local.control, name)(self._context, *call.args)
+        if area == "control":
+            return BENCH_ACTS[name].execute(self._context, *call.args)
         if call.name == "bench.live":
             return self._local.runs(*call.args), self._local.status(*call.args)
         if call.name == "bench.describe":

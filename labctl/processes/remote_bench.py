@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable, Mapping
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 from instruments.bench_config import BenchFile
 from labctl.acting_user import actor
@@ -20,13 +20,13 @@ from labctl.processes.settings import CALLS
 from labctl.services.benches.bench_left import BenchLeft
 from labctl.services.benches.stops import describe_stop, late_stop
 from labctl.services.campaigns.listeners import ChangeListeners
-from labctl.services.commands.context import CommandContext
-from labctl.services.commands.requests import CampaignResume, CampaignStart, ToBench, ToCampaign
+from labctl.services.commands.acts.abort import ABORT
+from labctl.services.commands.context import WRITES_S, BenchAct, CommandContext, RequestT, ResponseT
+from labctl.services.commands.requests import CampaignStart, ToCampaign
 from labctl.services.commands.service_control import NO_BENCH
-from labctl.services.schemas.benches import BenchCheckResponse, BenchDescription, CheckRequest, StopResponse
-from labctl.services.schemas.campaigns import CampaignResponse, ConfirmRequest, ReasonRequest
-from labctl.services.schemas.live import LiveEndRequest, LiveHistoryResponse, LiveRequest, LiveStateResponse
-from labctl.services.schemas.schedule import ScheduledResponse
+from labctl.services.schemas.benches import BenchDescription, StopResponse
+from labctl.services.schemas.campaigns import CampaignResponse, ReasonRequest
+from labctl.services.schemas.live import LiveHistoryResponse, LiveStateResponse
 from labctl.stop.client import StopAttempt, not_stopped_text
 from labctl.stop.latch import LatchState, StopRequest
 from labctl.stop.places import BenchPlace, place_of
@@ -35,10 +35,6 @@ log = get_logger()
 
 #: A question that the bench process answers from its memory.
 ANSWER_S = 3.0
-#: A transaction: the engine may have the writing connection for a moment.
-TRANSACTION_S = 30.0
-#: Opening a bench: every instrument is asked.
-OPENING_S = 180.0
 #: A stop is answered within this: that the table stands, or that the bench is not stopped, s.
 STANDS_S = 4.5
 #: A bench process without an answer for so long gets no request but to stop.
@@ -53,7 +49,7 @@ class RemoteWriter:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._caller = Caller(folder / CALLS, TRANSACTION_S)
+        self._caller = Caller(folder / CALLS, WRITES_S)
 
     def run(self, name: str, args: tuple[object, ...], kwargs: Mapping[str, object]) -> object:
         """Run a transaction there; returns or raises what it did. Raises BenchSilent."""
@@ -90,23 +86,13 @@ class RemoteControl:
             raise Conflict(NO_BENCH)
         return self._bench
 
-    def start(self, _: CommandContext, asked: CampaignStart) -> CampaignResponse:
-        """Start a campaign on the bench."""
-        return self._ask("start", asked, timeout_s=OPENING_S)
+    def perform(self, act: BenchAct[RequestT, ResponseT], _: CommandContext, asked: RequestT) -> ResponseT:
+        """Have the bench process carry out an act; an abort stops the bench by a way of its own first."""
+        if act.name == ABORT.name:
+            return cast(ResponseT, self._abort(cast(ToCampaign[ReasonRequest], asked)))
+        return self._ask(act, asked, act.wait_s)
 
-    def schedule(self, _: CommandContext, asked: CampaignStart) -> ScheduledResponse:
-        """Enter a campaign into the schedule of the bench."""
-        return self._ask("schedule", asked, timeout_s=TRANSACTION_S)
-
-    def resume(self, _: CommandContext, asked: CampaignResume) -> CampaignResponse:
-        """Continue a paused campaign, or resume an interrupted one."""
-        return self._ask("resume", asked, timeout_s=OPENING_S)
-
-    def pause(self, _: CommandContext, asked: ToCampaign[ReasonRequest]) -> CampaignResponse:
-        """Ask a running campaign to hold after the present data set."""
-        return self._ask("pause", asked, timeout_s=TRANSACTION_S)
-
-    def abort(self, _: CommandContext, asked: ToCampaign[ReasonRequest]) -> CampaignResponse:
+    def _abort(self, asked: ToCampaign[ReasonRequest]) -> CampaignResponse:
         """End a campaign now, in the safe state: first the stop, by a way of its own; then it is written down.
 
         Raises NotStopped where it is not confirmed within some seconds that the table stands.
@@ -145,27 +131,10 @@ class RemoteControl:
         return StopAttempt(self._place, _asked_before(stop, self._place.latch.state()) or stop)
 
     def _recorded(self, asked: ToCampaign[ReasonRequest]) -> CampaignResponse:
-        answer: CampaignResponse = self._ask("abort", asked, timeout_s=ANSWER_S)
-        return answer
+        return self._ask(ABORT, asked, ANSWER_S)
 
-    def confirm(self, _: CommandContext, asked: ToCampaign[ConfirmRequest]) -> CampaignResponse:
-        """Answer the question that a campaign waits for."""
-        return self._ask("confirm", asked, timeout_s=TRANSACTION_S)
-
-    def check(self, _: CommandContext, asked: ToBench[CheckRequest]) -> BenchCheckResponse:
-        """Ask every instrument of the bench what it is and how it does."""
-        return self._ask("check", asked, timeout_s=OPENING_S)
-
-    def start_live(self, _: CommandContext, asked: LiveRequest) -> LiveStateResponse:
-        """Begin a live calibration."""
-        return self._ask("start_live", asked, timeout_s=OPENING_S)
-
-    def end_live(self, _: CommandContext, asked: LiveEndRequest) -> LiveStateResponse:
-        """End the live calibration that runs."""
-        return self._ask("end_live", asked, timeout_s=TRANSACTION_S)
-
-    def _ask(self, act: str, asked: object, timeout_s: float) -> Any:
-        return self._calls.call(f"control.{act}", asked, timeout_s=timeout_s)
+    def _ask(self, act: BenchAct[RequestT, ResponseT], asked: RequestT, timeout_s: float) -> ResponseT:
+        return self._calls.call(f"control.{act.name}", asked, timeout_s=timeout_s)
 
     def close(self) -> None:
         """Close the connections."""

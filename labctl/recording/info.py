@@ -48,9 +48,15 @@ class OutputUnit(BaseModel):
 
     model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True)
 
-    unit: Literal["deg/s", "rad/s", "deg/h", "V", "mV", "count", "arb"] = "deg/s"
-    offset: float = 0.0
-    scale: float = 1.0
+    unit: Literal["deg/s", "rad/s", "deg/h", "V", "mV", "count", "arb"] = Field(
+        default="deg/s", description="Unit of the gyro column."
+    )
+    offset: float = Field(default=0.0, description="Value of the column at rate 0, in `unit`.")
+    scale: float = Field(
+        default=1.0,
+        description="Change of the column per deg/s, in `unit`, not 0; default for deg/s, rad/s and deg/h: that of "
+        "the unit.",
+    )
 
     @model_validator(mode="before")
     @classmethod
@@ -76,11 +82,11 @@ class LeftOut(BaseModel):
 
     model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True)
 
-    what: str  #: the kind of the finding, such as "spikes"
-    channel: str = ""  #: empty: of the whole rows
-    n: int = Field(ge=0)
-    of: int = Field(ge=0)
-    why: str  #: what was found
+    what: str = Field(description="Kind of the finding, as a fixed word for programs, such as spikes.")
+    channel: str = Field(default="", description="Column whose readings were left out; empty: the whole rows.")
+    n: int = Field(ge=0, description="Number of readings that were left out.")
+    of: int = Field(ge=0, description="Number of readings of the recording.")
+    why: str = Field(description="What was found, in words.")
 
 
 class RecordingInfo(BaseModel):

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from instruments.toml_documents import listed, read_toml, shown
 from labctl.calibration import Calibration, read_calibration
 from labctl.errors import BadInput
-from labctl.fitting.estimation.held.resolution import Fixed
+from labctl.fitting.estimation.held import Fixed
 from labctl.fitting.models.fitted_model import AxisFit, FittedModel
 from labctl.fitting.models.held import HeldCoefficient
 from labctl.fitting.models.temperature import LagrangeTable

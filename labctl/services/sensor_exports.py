@@ -73,5 +73,6 @@ def _magnetometer(answer: MagnetometerResponse) -> MagnetometerParameters:
     for i, j in PLACES:
         soft[i, j] = soft[j, i] = answer.soft_iron[AXES[i] + AXES[j]].value
     return MagnetometerParameters(
-        np.array([answer.hard_iron_ut[axis].value for axis in AXES]), soft, np.array(answer.covariance)
-    )
+        np.array([answer.hard_iron_ut[axis].value for axis in AXES]), soft, np.array(answer.covariance),
+        None if answer.alignment is None else np.radians([answer.alignment["axes"][axis]["value"] for axis in AXES]),
+    )  # fmt: skip

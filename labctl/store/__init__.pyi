@@ -6,7 +6,7 @@ from labctl.store.connection.writer_lock import (
     ServiceAddress as ServiceAddress,
     holder_of as holder_of,
 )
-from labctl.store.integrity.backup import Copy as Copy, copy_database as copy_database
+from labctl.store.integrity.migration import Copy as Copy, copy_database as copy_database
 from labctl.store.integrity.check import Checked as Checked, Finding as Finding, Progress as Progress, check as check
 from labctl.store.integrity.migration import (
     Migrated as Migrated,
@@ -44,12 +44,12 @@ from labctl.store.repositories.certified_versions import (
     CertifiedVersions as CertifiedVersions,
 )
 from labctl.store.repositories.check_gyros import CheckGyroRow as CheckGyroRow, CheckGyros as CheckGyros
-from labctl.store.repositories.documents.certificates import (
+from labctl.store.repositories.certificates import (
     CertificateForms as CertificateForms,
     CertificateRow as CertificateRow,
     Certificates as Certificates,
 )
-from labctl.store.repositories.drafts.records import (
+from labctl.store.repositories.drafts.repository import (
     DraftEvent as DraftEvent,
     DraftRow as DraftRow,
     DraftState as DraftState,
@@ -98,7 +98,7 @@ from labctl.store.repositories.standards import (
     Standards as Standards,
 )
 from labctl.store.repositories.units import Units as Units
-from labctl.store.sealing.signers import (
+from labctl.store.sealing.signing import (
     SEAL_KEY as SEAL_KEY,
     Signer as Signer,
     create_key as create_key,

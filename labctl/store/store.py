@@ -15,9 +15,9 @@ from labctl.store.repositories.audit import Audit
 from labctl.store.repositories.benches import Benches
 from labctl.store.repositories.calibrations import Calibrations
 from labctl.store.repositories.campaigns import Campaigns
+from labctl.store.repositories.certificates import Certificates
 from labctl.store.repositories.certified_versions import CertifiedVersions
 from labctl.store.repositories.check_gyros import CheckGyros
-from labctl.store.repositories.documents.certificates import Certificates
 from labctl.store.repositories.drafts.repository import Drafts
 from labctl.store.repositories.fetches import Fetches
 from labctl.store.repositories.keys import Keys

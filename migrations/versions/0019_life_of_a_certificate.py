@@ -79,7 +79,7 @@ def upgrade() -> None:
     for table, name, kind in _ADDED:
         op.add_column(table, sa.Column(name, kind, nullable=True))
     if not context.is_offline_mode():
-        from labctl.store.repositories.documents.withdrawals import withdraw_of_revocations  # noqa: PLC0415  as in 0017
+        from labctl.store.repositories.withdrawals import withdraw_of_revocations  # noqa: PLC0415  as in 0017
 
         withdraw_of_revocations(op.get_bind())
 

@@ -14,7 +14,7 @@ from procedures.contracts.steps import Acquire
 from procedures.execution import late_readings
 from procedures.execution.context import UNIT_FAULTS, ExecutionContext, raise_violation
 from procedures.execution.course import take_course
-from procedures.execution.gate_readings import count_missing, demand_readings, read_late, read_round
+from procedures.execution.gate_readings import count_missing, count_silence, demand_readings, read_late, read_round
 from procedures.execution.table_checks import follow_clock
 from procedures.execution.waiting import checkpoint, pass_time
 from procedures.monitoring.bench_snapshot import ReadingCounts
@@ -113,6 +113,7 @@ def _take(context: ExecutionContext, step: Acquire) -> dict[str, float]:
             rates = _note_angles(context, encoder, spin, gate, number)
         except BaseException as error:
             reason = str(error) or type(error).__name__
+            count_silence(context, number, gate, counts, error)
             context.recorder.journal.dataset_closed(number, DataSetState.PARTIAL, reason)
             raise
     context.recorder.journal.dataset_closed(number, DataSetState.COMPLETE)

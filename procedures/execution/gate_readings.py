@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from instruments.errors import LinkError
 from instruments.interfaces.gyro import Gyro, Readings
 from procedures.contracts.errors import BadData
 from procedures.execution import late_readings
@@ -39,13 +40,33 @@ def count_missing(
     for name, gyro in context.bench.gyros.items():
         at_edges = late_readings.dropped(gyro, gate, counts[name]) + late_readings.pending(gyro, gate, counts[name])
         if missing := max(missing_of(gyro, gate, counts[name]), at_edges):
-            lost = late_readings.lost_readings(gyro, missing)
-            counts[name].add(lost)
-            context.recorder.journal.readings(number, name, lost, context.monitor.air_c)
-            expected = round(late_readings.promise_of(gyro, gate[1] - gate[0]).readings)
-            text = f"{name}: {missing} of {expected} readings of a data set did not arrive; they are counted as lost"
-            context.recorder.event(warning("readings_lost", text, name))
+            _write_lost(context, number, name, gate, counts[name], missing)
     raise_violation(context.monitor.check_guards())
+
+
+def count_silence(
+    context: ExecutionContext, number: int, gate: tuple[float, float], counts: dict[str, ReadingCounts],
+    error: BaseException,
+) -> None:  # fmt: skip
+    """Count what a unit promised until now as lost, where its link failed: the data set ends without it."""
+    if not isinstance(error, LinkError) or (gyro := context.bench.gyros.get(error.device)) is None:
+        return
+    passed = gate[0], min(max(context.clock.now_s(), gate[0]), gate[1])
+    if missing := missing_of(gyro, passed, counts[error.device]):
+        _write_lost(context, number, error.device, passed, counts[error.device], missing)
+
+
+def _write_lost(
+    context: ExecutionContext, number: int, name: str, gate: tuple[float, float], count: ReadingCounts, missing: int
+) -> None:
+    """Write down, count and say that `missing` readings of a gate, or of its beginning, did not arrive."""
+    gyro = context.bench.gyros[name]
+    lost = late_readings.lost_readings(gyro, missing)
+    count.add(lost)
+    context.recorder.journal.readings(number, name, lost, context.monitor.air_c)
+    expected = round(late_readings.promise_of(gyro, gate[1] - gate[0]).readings)
+    text = f"{name}: {missing} of {expected} readings of a data set did not arrive; they are counted as lost"
+    context.recorder.event(warning("readings_lost", text, name))
 
 
 def read_round(

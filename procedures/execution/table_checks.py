@@ -115,8 +115,11 @@ def _say_clock(context: ExecutionContext, found: MeasuredClock) -> None:
         f"u = {found.u_ppm:.1f} ppm with {found.fit.freedom} degrees of freedom by the scatter of {found.runs} runs "
         f"({1e3 * found.fit.scatter_s:.1f} ms), limit {found.limit_ppm:.0f} ppm; rates are by the measured clock"
     )
-    if found.fit.has_drift:
-        text += f"; it drifts by {found.fit.drift_ppm_per_h:+.1f} ppm/h, u = {found.fit.drift_u_ppm_per_h:.1f} ppm/h"
+    drift = f"{found.fit.drift_ppm_per_h:+.1f} ppm/h, u = {found.fit.drift_u_ppm_per_h:.1f} ppm/h"
+    if found.fit.is_drift_applied:
+        text += f"; it drifts by {drift}"
+    elif found.fit.has_drift:
+        text += f"; a drift of {drift}, is not significant: it is not applied, and u contains it"
     if beyond:
         text += f": set step_clock_hz = {found.nominal.nominal_hz * found.ratio:.0f} in the bench file"
     level = "warning" if beyond else "info"

@@ -5,10 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
 
 from instruments.errors import InstrumentError, LinkError
 from instruments.interfaces.chamber import ChamberState
 from instruments.interfaces.gyro import Gyro, Readings
+from instruments.interfaces.reference import Reference
 from instruments.interfaces.table import Spin
 from procedures.contracts.bench import MonitoredBench
 from procedures.contracts.journal import EnvironmentSample, Event
@@ -16,8 +21,98 @@ from procedures.monitoring.bench_snapshot import BenchSnapshot, ReadingCounts, g
 from procedures.monitoring.event_recorder import CampaignRecorder
 from procedures.monitoring.guards import Guards, GuardViolation
 from procedures.monitoring.host_stalls import HostStalls, not_run
-from procedures.monitoring.links import LinkStates
-from procedures.monitoring.references import ReferenceWatch
+
+LinkState = Literal["well", "degraded", "lost"]  #: degraded: silent for a moment; lost: silent for too long
+
+
+class LinkStates:
+    """The links of one bench. A change of state is an event; only what is not well is shown in the progress."""
+
+    def __init__(self, recorder: CampaignRecorder, stalls: HostStalls) -> None:
+        self._recorder, self._stalls = recorder, stalls
+        #: device -> campaign time, and the stalls of this computer until then, s of the bench's clock
+        self._heard_s: dict[str, tuple[float, float]] = {}
+        self._broken: dict[str, LinkState] = {}
+
+    def restart(self) -> None:
+        """Forget when any device has answered."""
+        self._heard_s = {}
+
+    def heard(self, device: str) -> None:
+        """Note that a device answered just now."""
+        self._heard_s[device] = self._recorder.t_s(), self._stalls.total_clock_s()
+
+    def forget(self, device: str, *, repaired: bool = False) -> None:
+        """Note that a device no longer answers; with `repaired` a broken link is well again without an event."""
+        self._heard_s.pop(device, None)
+        if repaired:
+            self._broken.pop(device, None)
+
+    def is_broken(self, device: str) -> bool:
+        """Return whether a device is degraded or lost."""
+        return device in self._broken
+
+    def silent_s(self, t_s: float) -> dict[str, float]:
+        """Return how long each device has been silent at campaign time `t_s`, in s, without this computer's stalls."""
+        stalled_s = self._stalls.total_clock_s()
+        return {
+            device: max(t_s - heard_s - (stalled_s - before_s), 0.0)
+            for device, (heard_s, before_s) in self._heard_s.items()
+        }
+
+    def change(self, device: str, state: LinkState, why: str = "") -> None:
+        """Take in how a device can be reached. What is lost is not merely degraded again."""
+        before = self._broken.get(device, "well")
+        if state == before or (before == "lost" and state == "degraded"):
+            return
+        if state == "well":
+            del self._broken[device]
+            self._recorder.event(Event("link.well", f"{device}: answers again", device=device))
+        else:
+            self._broken[device] = state
+            level = "warning" if state == "degraded" else "error"
+            self._recorder.event(Event(f"link.{state}", why, level=level, device=device))
+        self._recorder.tracker.update(links=dict(self._broken))
+
+
+class ReferenceWatch:
+    """Reads each instrument at every poll; its last answer holds until the next one, for as long as the links allow."""
+
+    def __init__(self, references: Mapping[str, Reference], links: LinkStates) -> None:
+        self._references, self._links = references, links
+        self._raw: dict[str, int] = {}
+        self.values: dict[str, float] = {}  #: column -> value, in the unit of its channel
+
+    def begin(self) -> None:
+        """Ask each for the first time; here silence is an error at once. Raises InstrumentError."""
+        for reference in self._references.values():
+            self._take(reference)
+
+    def poll(self, on_silence: Callable[[str, LinkError], None]) -> None:
+        """Ask each; one that is silent is reported, and keeps its last value."""
+        for name, reference in self._references.items():
+            try:
+                self._take(reference)
+            except LinkError as error:
+                on_silence(name, error)
+            else:
+                self._links.change(name, "well")
+
+    def beside(self, readings: Readings) -> Readings:
+        """Return readings of a unit with a column for each quantity, as it was last read."""
+        if not self._raw:
+            return readings
+        columns = {name: np.full(len(readings), value, dtype=np.int64) for name, value in self._raw.items()}
+        return replace(readings, raw={**readings.raw, **columns})
+
+    def _take(self, reference: Reference) -> None:
+        raw = reference.read().raw
+        self._raw |= raw
+        self.values |= {
+            channel.name: channel.offset + channel.scale * raw[channel.name] for channel in reference.channels
+        }
+        self._links.heard(reference.name)
+
 
 Listener = Callable[[float, float, Mapping[str, float]], None]  #: campaign time, air and unit temperatures
 

@@ -3,7 +3,8 @@
 A run of N steps at the nominal step rate f takes T = a + (N/f)(1 + x), where 1 + x is the reciprocal of the ratio and
 a what ramps and replies take, equal in all runs of one session at one step rate. Least squares over all runs of a
 campaign give x and its drift; the standard uncertainty is that of their scatter with its degrees of freedom (GUM 4.2,
-G.3): how late replies are need not be known.
+G.3): how late replies are need not be known. A drift is applied where it differs from 0 by more than its expanded
+uncertainty; one that is not applied is less than that, which u contains at every time.
 """
 
 from __future__ import annotations
@@ -37,12 +38,13 @@ class ClockFit:
     x_per_h: float
     covariance: NDArray[np.float64]  #: (2, 2); zero for a drift that was not fitted
     scatter_s: float  #: standard deviation of what a run leaves
-    has_drift: bool
+    has_drift: bool  #: whether the runs tell a drift, with its uncertainty
+    is_drift_applied: bool  #: whether it is significant; `x` is then that of the line, else that of a steady clock
     freedom: int
 
     def ratio(self, t_s: float) -> float:
         """Return the step rate over the nominal one at campaign time `t_s`."""
-        return 1.0 / (1.0 + self.x + self.x_per_h * self._hours(t_s))
+        return 1.0 / (1.0 + self.x + (self.x_per_h * self._hours(t_s) if self.is_drift_applied else 0.0))
 
     def u_ppm(self, t_s: float) -> float:
         """Return the standard uncertainty of the ratio at campaign time `t_s`, ppm."""
@@ -118,8 +120,13 @@ def fitted(runs: Sequence[ClockRun]) -> ClockFit | None:
     scatter_s = math.sqrt(float(np.sum((late_s - matrix @ values) ** 2)) / freedom)
     covariance = np.zeros((2, 2))
     covariance[:terms, :terms] = (scatter_s**2 * np.linalg.inv(matrix.T @ matrix))[:terms, :terms]
-    x_per_h = float(values[1]) if spans else 0.0
-    return ClockFit(middle_s, float(t_s.max()), float(values[0]), x_per_h, covariance, scatter_s, spans, freedom)
+    x, x_per_h = float(values[0]), float(values[1]) if spans else 0.0
+    is_applied = spans and abs(x_per_h) > coverage_factor(freedom) * math.sqrt(float(covariance[1, 1]))
+    if spans and not is_applied:
+        x = float(np.linalg.lstsq(np.delete(matrix, 1, axis=1), late_s, rcond=None)[0][0])
+    return ClockFit(
+        middle_s, float(t_s.max()), x, x_per_h, covariance, scatter_s, spans, is_applied, freedom
+    )  # fmt: skip
 
 
 def _offsets(runs: Sequence[ClockRun]) -> list[NDArray[np.float64]]:

@@ -34,15 +34,17 @@ class BenchLimits:
     needs_person: bool = True  #: whether a person turns the units; a unit handler takes no time that a plan counts
     #: whether the table moves in a campaign; in a simulation without bytes any table follows any course of the rate
     is_driven: bool = True
+    air_tau_s: float | None = None  #: time constant of the chamber's air, for the forecast; None: a guess is used
 
     @classmethod
-    def of(cls, bench: Bench, *, needs_person: bool = True) -> BenchLimits:
-        """Return the limits of an opened bench; `needs_person` as its file says (`BenchFile.needs_person`)."""
+    def of(cls, bench: Bench, *, needs_person: bool = True, air_tau_s: float | None = None) -> BenchLimits:
+        """Return the limits of an opened bench; `needs_person` and `air_tau_s` as its file says (`BenchFile`)."""
         units = {name: gyro.limits for name, gyro in bench.gyros.items()}
         chamber = None if bench.chamber is None else bench.chamber.limits
         if bench.table is None:
-            return cls(None, chamber, units, needs_person=needs_person)
-        return cls(bench.table.limits, chamber, units, bench.table.achievable_dps, needs_person)
+            return cls(None, chamber, units, needs_person=needs_person, air_tau_s=air_tau_s)
+        achievable_dps = bench.table.achievable_dps
+        return cls(bench.table.limits, chamber, units, achievable_dps, needs_person, air_tau_s=air_tau_s)
 
     @property
     def max_acceleration_dps2(self) -> float:

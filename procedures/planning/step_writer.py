@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+from instruments.bench_config import USUAL_AIR_TAU_S
 from procedures.contracts.steps import (
     Acquire,
     CheckHome,
@@ -18,6 +19,7 @@ from procedures.contracts.steps import (
     Soak,
     Step,
 )
+from procedures.planning.chamber_time import counted_move_s, move_s
 from procedures.planning.clock_runs import BLOCK_EVERY_S, FIRST_RUNS, LATER_RUNS, run_lengths_s
 from procedures.planning.limits import BenchLimits
 from procedures.planning.point_order import Level, MountingBlock, order_points, verification_blocks
@@ -26,7 +28,6 @@ from procedures.recipe.recipe import Recipe
 
 # What is expected of things that have no limit to compute with; only the forecast depends on them.
 ROOM_C = 25.0
-CHAMBER_SETTLING_S = 300.0  #: from the end of the ramp until the air is in the band
 HOMING_S = 30.0
 CHECK_S = 10.0  #: back to home by counted steps, and the homing
 CLOCK_SHORT_S = 10.0  #: steady part of the shorter run that measures the step clock
@@ -56,6 +57,7 @@ class _StepWriter:
         self.datasets = 0
         self.timed_runs = 0
         self.timed_at = 0
+        self.not_counted_s = 0.0  #: by which moves of the chamber count as longer than they are expected to take
 
     def write(self) -> None:
         self.steps.append(Home(expected_s=HOMING_S))
@@ -99,13 +101,14 @@ class _StepWriter:
         step = MeasureClock(rate_dps=rate_dps, short_s=CLOCK_SHORT_S, runs_s=runs_s, expected_s=expected_s)
         self.steps.append(step)
         self.timed_runs += runs
-        self.timed_at = len(self.steps)
+        self.timed_at, self.not_counted_s = len(self.steps), 0.0
 
     def measure_clock_again(self) -> None:
         """Time it again where the last time was long ago."""
         since = self.steps[self.timed_at :]
         # as if a person mounted the units: what is done does not depend on who does
-        if math.fsum(MOUNTING_S if isinstance(step, Mount) else step.expected_s for step in since) >= BLOCK_EVERY_S:
+        each_s = [MOUNTING_S if isinstance(step, Mount) else step.expected_s for step in since]
+        if math.fsum([*each_s, self.not_counted_s]) >= BLOCK_EVERY_S:
             self.measure_clock(LATER_RUNS)
 
     def check_home(self, level: Level) -> None:
@@ -139,9 +142,9 @@ class _StepWriter:
     def move_chamber(self, temperature_c: float) -> None:
         rules = self.recipe.soak
         way_c = abs(temperature_c - self.air_c)
-        expected_s = 60.0 * way_c / self.limits.ramp_c_per_min
-        if way_c > rules.band_c:
-            expected_s += CHAMBER_SETTLING_S
+        ramp_c_per_min = self.limits.ramp_c_per_min
+        expected_s = move_s(way_c, ramp_c_per_min, rules.band_c, self.limits.air_tau_s or USUAL_AIR_TAU_S)
+        self.not_counted_s += counted_move_s(way_c, ramp_c_per_min, rules.band_c) - expected_s
         self.air_c = temperature_c
         self.steps.append(
             MoveChamber(

@@ -6,15 +6,15 @@ import difflib
 import tomllib
 from importlib import resources
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field, ValidationError, ValidationInfo, field_validator, model_validator
 from pydantic_core import PydanticCustomError
 
+from instruments.interfaces import rate_course
 from instruments.toml_documents import listed, parse_toml, read_toml_text, shown
 from procedures.contracts.errors import RecipeError
 from procedures.recipe.fit_rules import FitRules
-from procedures.recipe.profiles import Profile
 from procedures.recipe.rules import (
     AcquireRules,
     GuardRules,
@@ -33,6 +33,40 @@ from procedures.recipe.rules import (
     Whole,
 )
 from procedures.recipe.turns import TurnRules
+
+
+class Ramp(Table):
+    """A rate that changes evenly."""
+
+    kind: Literal["ramp"]
+    from_dps: Number
+    to_dps: Number
+    duration_s: Number = Field(gt=0, le=7200)
+
+    @property
+    def course(self) -> rate_course.Ramp:
+        """The rate over time."""
+        return rate_course.Ramp(self.from_dps, self.to_dps, self.duration_s)
+
+
+class SineSweep(Table):
+    """A sine whose frequency grows by the same factor in equal times; its size fades in and out."""
+
+    kind: Literal["sine_sweep"]
+    amplitude_dps: Number = Field(gt=0)
+    from_hz: Number = Field(gt=0, le=500)
+    to_hz: Number = Field(gt=0, le=500)
+    duration_s: Number = Field(gt=0, le=7200)
+    fade_s: Number = Field(default=2.0, ge=0)
+
+    @property
+    def course(self) -> rate_course.SineSweep:
+        """The rate over time."""
+        return rate_course.SineSweep(self.amplitude_dps, self.from_hz, self.to_hz, self.duration_s, self.fade_s)
+
+
+Profile = Annotated[Ramp | SineSweep, Field(discriminator="kind")]
+
 
 #: A key that is not known is shown up to here.
 LONGEST_KEY = 80

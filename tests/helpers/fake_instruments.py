@@ -101,6 +101,7 @@ class FakeChamber(Fake):
     misread_c = 0.0
     given_c: float | None = None
     hindrance = ""  #: a set point is refused because of it
+    runs = True  #: heating and cooling are on; a set point switches them on
 
     def at_the_panel(self, setpoint_c: float) -> None:
         """Let a person change the set point."""
@@ -123,7 +124,7 @@ class FakeChamber(Fake):
         if self.hindrance:
             raise RequestRejected(self.name, self.hindrance)
         self.at_the_panel(temperature_c)
-        self.given_c = temperature_c
+        self.given_c, self.runs = temperature_c, True
         return temperature_c + self.misread_c
 
     def read(self) -> ChamberState:
@@ -131,6 +132,8 @@ class FakeChamber(Fake):
         foreign = [self.hindrance] if self.hindrance and self.given_c is not None else []
         if self.given_c is not None and self.setpoint_c != self.given_c:
             foreign.append(f"the set point is {self.setpoint_c:g} deg C, labctl gave {self.given_c:g} deg C")
+        if self.given_c is not None and not self.runs:
+            foreign.append("event output 1 is off")
         now_s, air_c = self.clock.now_s(), self.air_c()
         return ChamberState(now_s, air_c, self.setpoint_c, self.alarms, self.given_c, tuple(foreign))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import shutil
 import sqlite3
 from contextlib import closing
 from pathlib import Path
@@ -30,6 +31,11 @@ class Lab:
     def json(self, *arguments: str, status: int = 0) -> Any:
         """Return the JSON document that a command prints with --json; it must end with this exit status."""
         return json.loads(self.run(*arguments, "--json", status=status).stdout)
+
+    def copy(self, folder: Path) -> Lab:
+        """Copy everything of this lab, which no process may have open, into a folder; returns the copy."""
+        shutil.copytree(self.folder, folder, dirs_exist_ok=True)
+        return Lab(folder)
 
     def content(self) -> str:
         """Return a digest of every row of the database."""

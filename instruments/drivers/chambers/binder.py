@@ -17,6 +17,8 @@ REPLY_S = 1.0
 class Binder(SetpointChamber):
     """Driver of a chamber on a Binder controller. Which set point counts is chosen at the panel: manual or basic."""
 
+    switches_on = False
+
     def __init__(self, settings: binder.BinderSettings, ports: Ports, clock: Clock) -> None:
         def link() -> Client:
             return ports.modbus_rtu(
@@ -55,14 +57,16 @@ class Binder(SetpointChamber):
         return self._registers.get(self._map.air)
 
     def _alarms(self) -> tuple[str, ...]:
-        return ("the chamber does not run",) if self._has_controlled and not self._runs() else ()
+        return ()  # no public source says where they are
 
     def _mode(self) -> int | None:
         return None if self._map.mode is None else self._registers.get_int(self._map.mode)
 
-    def _runs(self) -> bool:
+    def _stopped(self) -> str:
         mode = self._mode()
-        return mode is None or bool(mode & (binder.BASIC | binder.MANUAL))
+        if mode is None or mode & (binder.BASIC | binder.MANUAL):
+            return ""
+        return "the controller is idle (mode neither manual nor basic)"
 
     def _profile_runs(self) -> bool:
         mode = self._mode()
@@ -73,11 +77,8 @@ class Binder(SetpointChamber):
             self.name, "a program is running, and labctl cannot end it; end it at the panel of the chamber"
         )
 
-    def _switch_on(self) -> None:
-        if not self._runs():
-            raise RequestRejected(
-                self.name, "the controller is idle (mode neither manual nor basic); switch it on at its panel"
-            )
+    def _start(self) -> None:
+        """Do nothing: the mode is chosen at the panel."""
 
 
 DRIVER = ChamberDriver(binder.BinderSettings, Binder, Trial(section={"port": "sim://binder", "controller": "mk53"}))

@@ -18,6 +18,7 @@ class LibraryChamber(SetpointChamber):
         self._instrument = LibraryInstrument(self.name, settings, ports, clock)
         super().__init__(settings, self._instrument, clock)
         self._names = settings
+        self.switches_on = bool(settings.start)
 
     def identify(self) -> str:
         """Get what the instrument says of itself, after its air temperature was read; raises InstrumentError."""
@@ -58,11 +59,17 @@ class LibraryChamber(SetpointChamber):
         return (f"{self._names.alarms} {found}",) if found else ()
 
     def _profile_runs(self) -> bool:
-        if not self._names.program:
-            return False
-        if (mask := self._names.program_mask) is None:
-            return bool(self._instrument.get(self._names.program))
-        return bool(int(self._instrument.number(self._names.program)) & mask)
+        return bool(self._names.program) and self._holds(self._names.program, self._names.program_mask)
+
+    def _holds(self, attribute: str, mask: int | None) -> bool:
+        if mask is None:
+            return bool(self._instrument.get(attribute))
+        return bool(int(self._instrument.number(attribute)) & mask)
+
+    def _stopped(self) -> str:
+        if not self._names.running or self._holds(self._names.running, self._names.running_mask):
+            return ""
+        return "the chamber does not run"
 
     def _end_profile(self) -> None:
         if not self._names.stop:
@@ -74,8 +81,13 @@ class LibraryChamber(SetpointChamber):
         self._instrument.call(self._names.stop)
 
     def _switch_on(self) -> None:
-        if self._names.start and not self._has_controlled:
-            self._instrument.call(self._names.start)
+        if self._names.start and (not self._has_controlled or self._stopped()):
+            self._start()
+        elif not self._names.start:
+            super()._switch_on()
+
+    def _start(self) -> None:
+        self._instrument.call(self._names.start)
 
 
 #: A ThermoStream by PyMeasure's class: its air flow is what heats and cools.

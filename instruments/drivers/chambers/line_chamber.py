@@ -140,10 +140,7 @@ class LineChamber(TextChamber):
         return self._ask_c(self._dialect.air)
 
     def _alarms(self) -> tuple[str, ...]:
-        found = self._dialect.alarm_texts(self._ask(self._dialect.alarms))
-        if self._has_controlled and not self._runs():
-            found = (*found, "the chamber does not run")
-        return found
+        return self._dialect.alarm_texts(self._ask(self._dialect.alarms))
 
     def _profile_runs(self) -> bool:
         return self._dialect.runs_program(self._ask(self._dialect.program))
@@ -151,12 +148,11 @@ class LineChamber(TextChamber):
     def _end_profile(self) -> None:
         self._command(self._dialect.end_program, "end the program")
 
-    def _runs(self) -> bool:
-        return self._dialect.is_running(self._ask(self._dialect.running))
+    def _stopped(self) -> str:
+        return "" if self._dialect.is_running(self._ask(self._dialect.running)) else "the chamber does not run"
 
-    def _switch_on(self) -> None:
-        if not self._runs():
-            self._command(self._dialect.start, "start")
+    def _start(self) -> None:
+        self._command(self._dialect.start, "start")
 
     def _switch_off(self) -> None:
         self._command(self._dialect.stop, "stop")

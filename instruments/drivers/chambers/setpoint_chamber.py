@@ -43,6 +43,9 @@ class SetpointChamber(ABC):
         self._given_c: float | None = None  #: the set point that the controller took last from this driver
         self._found_hindrance, self._ask_again_s = "", 0.0
 
+    #: Whether `_switch_on` can switch control on; False where only a person can.
+    switches_on = True
+
     @property
     def limits(self) -> ChamberLimits:
         """Get the narrower limits of controller and bench file; the first use reads the controller and may raise."""
@@ -90,9 +93,21 @@ class SetpointChamber(ABC):
     def _end_profile(self) -> None:
         """Terminate the profile."""
 
+    def _stopped(self) -> str:
+        """Return what shows that heating and cooling are off; an empty text where they are on or nothing shows it."""
+        return ""
+
     @abstractmethod
+    def _start(self) -> None:
+        """Switch control on. Called where `_stopped` says that it is off and `switches_on` that this driver can."""
+
     def _switch_on(self) -> None:
-        """Switch control on; raises RequestRejected where only a person may do that."""
+        """Switch control on where it is off; raises RequestRejected where only a person may do that."""
+        stopped = self._stopped()
+        if stopped and not self.switches_on:
+            raise RequestRejected(self.name, f"{stopped}; switch it on at its panel")
+        if stopped:
+            self._start()
 
     def set_temperature_c(self, temperature_c: float) -> float:
         """Control the set point: limited, rounded, written on change only (EEPROM wear); returns the value read back.
@@ -124,7 +139,10 @@ class SetpointChamber(ABC):
 
     def shortcomings(self) -> tuple[str, ...]:
         """Get why a set point would have no effect, and what to do; raises what a read of the controller raises."""
-        return tuple(filter(None, [self._hindrance()]))
+        found = self._hindrance()
+        if not found and not self.switches_on and (stopped := self._stopped()):
+            found = f"{stopped}, so a set point would have no effect; switch it on at its panel"
+        return tuple(filter(None, [found]))
 
     def close(self) -> None:
         """Control the link: close it. The controller keeps its set point."""
@@ -161,7 +179,9 @@ class SetpointChamber(ABC):
         if (asked_s := self._clock.now_s()) >= self._ask_again_s:
             self._found_hindrance = self._hindrance()
             self._ask_again_s = asked_s + SLOW_SHARE * (self._clock.now_s() - asked_s)
-        found = [self._found_hindrance]
+        # a program has a state of its own: a controller that runs one is not in its manual mode, and yet not off
+        stopped = "" if self._found_hindrance or not self._has_controlled else self._stopped()
+        found = [self._found_hindrance, stopped]
         if abs(setpoint_c - self._given_c) > self.limits.resolution_c / 2 + TINY_C:
             found.append(f"the set point is {setpoint_c:g} deg C, labctl gave {self._given_c:g} deg C")
         return tuple(filter(None, found))

@@ -105,17 +105,23 @@ class WatlowF4(Watlow):
     def _end_profile(self) -> None:
         self._registers.put(f4.TERMINATE, f4.TERMINATE_PROFILE)
 
-    def _switch_on(self) -> None:
-        if self.settings.enable_event is None:
+    def _enabling(self) -> Register | None:
+        number = self.settings.enable_event
+        return None if number is None else f4.EVENT.nth(number, f4.EVENT_STRIDE)
+
+    def _stopped(self) -> str:
+        event = self._enabling()
+        return "" if event is None or self._registers.get_int(event) == f4.EVENT_ON else f"{event} is off"
+
+    def _start(self) -> None:
+        if (event := self._enabling()) is None:
             return
-        event = f4.EVENT.nth(self.settings.enable_event, f4.EVENT_STRIDE)
-        if self._registers.get_int(event) != 1:
-            self._registers.put(event, 1)
-            if self._registers.get_int(event) != 1:
-                raise RequestRejected(
-                    self.name,
-                    f"{event} stays off, so the chamber cannot be switched on; check enable_event in the bench file",
-                )
+        self._registers.put(event, f4.EVENT_ON)
+        if self._stopped():
+            raise RequestRejected(
+                self.name,
+                f"{event} stays off, so the chamber cannot be switched on; check enable_event in the bench file",
+            )
 
     def _write_setpoint(self, temperature_c: float) -> None:
         self._registers.put(f4.SETPOINT, round(temperature_c * self._read_scale()))

@@ -8,7 +8,7 @@ from instruments.clock import Clock
 from instruments.drivers import probes
 from instruments.drivers.chambers.watlow import REPLY_S, Watlow
 from instruments.drivers.driver import ChamberDriver
-from instruments.errors import MalformedReply, RequestRejected
+from instruments.errors import MalformedReply
 from instruments.protocols import watlow_f4t_registers as f4t
 from instruments.protocols.modbus_codes import DEVICE_FAILURE, ILLEGAL_ADDRESS
 from instruments.protocols.modbus_registers import Register
@@ -23,6 +23,8 @@ ALARMS_EVERY_S = 30.0
 
 class WatlowF4T(Watlow):
     """Driver of a chamber on a Watlow F4T. What it has besides control loop 1 follows from its part number."""
+
+    switches_on = False
 
     def __init__(self, settings: WatlowSettings, ports: Ports, clock: Clock) -> None:
         def link() -> Client:
@@ -94,19 +96,21 @@ class WatlowF4T(Watlow):
     def _end_profile(self) -> None:
         self._registers.put(f4t.PROFILE_ACTION, f4t.PROFILE_TERMINATE)
 
-    def _switch_on(self) -> None:
+    def _stopped(self) -> str:
         loop = self._loop()
         if (mode := self._registers.get_int(loop.mode)) != f4t.MODE_AUTO:
             what = "cascade loop 1" if loop is f4t.CASCADE else "control loop 1"
-            raise RequestRejected(
-                self.name, f"{what} is in mode {f4t.MODES.get(mode, mode)}, not auto; switch it on at its panel"
-            )
-        if not self._runs():
-            module, output = self.settings.run_output or (0, 0)
-            raise RequestRejected(
-                self.name,
-                f"the chamber does not run (output {output} of module {module} is off); switch it on at its panel",
-            )
+            return f"{what} is in mode {f4t.MODES.get(mode, mode)}, not auto"
+        if self.settings.run_output is None:
+            return ""
+        module, output = self.settings.run_output
+        register = f4t.OUTPUT.nth(module, f4t.MODULE_STRIDE).nth(output, f4t.OUTPUT_STRIDE)
+        if self._registers.get_int(register) == f4t.ON:
+            return ""
+        return f"the chamber does not run (output {output} of module {module} is off)"
+
+    def _start(self) -> None:
+        """Do nothing: the mode and the run output are switched at the panel."""
 
     def _write_setpoint(self, temperature_c: float) -> None:
         self._registers.put(self._loop().setpoint, temperature_c)
@@ -127,10 +131,6 @@ class WatlowF4T(Watlow):
         alarms = f4t.alarms_of(self._part_number())
         found = [f"alarm {number}" for number in range(1, alarms + 1) if not self._is_quiet(number)]
         found += [f"limit module {number}" for number in self._present_limit_modules() if self._has_tripped(number)]
-        if self._registers.get_int(self._loop().mode) != f4t.MODE_AUTO:
-            found.append("control is not in auto")
-        if not self._runs():
-            found.append("the chamber does not run")
         return tuple(found)
 
     def _is_quiet(self, number: int) -> bool:
@@ -150,14 +150,6 @@ class WatlowF4T(Watlow):
             for register in (f4t.LIMIT_STATE, f4t.LIMIT_STATUS, f4t.LIMIT_ERROR)
         )
         return state == f4t.ERROR or status == f4t.FAIL or error != f4t.NONE
-
-    def _runs(self) -> bool:
-        """Return whether the output that shows that the chamber runs is on; True where the bench file names none."""
-        if self.settings.run_output is None:
-            return True
-        module, output = self.settings.run_output
-        register = f4t.OUTPUT.nth(module, f4t.MODULE_STRIDE).nth(output, f4t.OUTPUT_STRIDE)
-        return self._registers.get_int(register) == f4t.ON
 
     def _read_if_there(self, register: Register) -> int | None:
         """Return the value of a register; None where the controller lacks it."""

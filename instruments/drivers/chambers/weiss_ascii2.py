@@ -16,7 +16,7 @@ class WeissAscii2(TextChamber):
 
     def __init__(self, settings: Ascii2Settings, ports: Ports, clock: Clock) -> None:
         super().__init__(settings, ports, clock, ascii2.SYNTAX)
-        self._start, self._fault = settings.start_channel, settings.alarm_channel
+        self._start_channel, self._fault = settings.start_channel, settings.alarm_channel
         self._unit = f"${settings.unit:02d}"
 
     def identify(self) -> str:
@@ -34,12 +34,12 @@ class WeissAscii2(TextChamber):
         return ascii2.RESOLUTION_C
 
     def _command(self, temperature_c: float, *, on: bool, status: ascii2.Status) -> None:
-        arguments = status.commanded(temperature_c, self._start, on=on)
+        arguments = status.commanded(temperature_c, self._start_channel, on=on)
         self._lines.ask(f"{self._unit}E {arguments}", ascii2.ACKNOWLEDGED, "set the set point")
 
     def _write_setpoint(self, temperature_c: float) -> None:
         status = self._status()
-        self._command(temperature_c, on=status.is_on(self._start), status=status)
+        self._command(temperature_c, on=status.is_on(self._start_channel), status=status)
 
     def _read_setpoint(self) -> float:
         return self._status().nominal[0]
@@ -49,12 +49,7 @@ class WeissAscii2(TextChamber):
 
     def _alarms(self) -> tuple[str, ...]:
         status = self._status()
-        found = (
-            () if self._fault is None or not status.is_on(self._fault) else (f"digital channel {self._fault} is on",)
-        )
-        if self._has_controlled and not status.is_on(self._start):
-            found = (*found, "the chamber does not run")
-        return found
+        return () if self._fault is None or not status.is_on(self._fault) else (f"digital channel {self._fault} is on",)
 
     def _profile_runs(self) -> bool:
         return False  # the protocol does not tell; a set point that a program changes is seen when it is read back
@@ -65,10 +60,13 @@ class WeissAscii2(TextChamber):
             "a program is running, and protocol ASCII-2 has no command to end it; end it at the panel of the chamber",
         )
 
-    def _switch_on(self) -> None:
+    def _stopped(self) -> str:
+        channel = self._start_channel
+        return "" if self._status().is_on(channel) else f"the chamber does not run (digital channel {channel} is off)"
+
+    def _start(self) -> None:
         status = self._status()
-        if not status.is_on(self._start):
-            self._command(status.nominal[0], on=True, status=status)
+        self._command(status.nominal[0], on=True, status=status)
 
     def _switch_off(self) -> None:
         status = self._status()

@@ -24,6 +24,7 @@ class DescribedChamber(TextChamber):
     def __init__(self, settings: DescribedChamberSettings, ports: Ports, clock: Clock) -> None:
         self._described = described = settings.format
         super().__init__(settings, ports, clock, described.line.syntax, described.line.timeout_s)
+        self.switches_on = bool(described.switch_on)
         names = parameters_of(described, settings.parameters)
         self.dialogue = Dialogue(self._lines, described.line, names)
 
@@ -77,10 +78,7 @@ class DescribedChamber(TextChamber):
         return self._ask_c(self._described.air, "read the air temperature")
 
     def _alarms(self) -> tuple[str, ...]:
-        found = () if self._described.alarms is None else self.dialogue.alarms(self._described.alarms)
-        if self._has_controlled and not self._runs():
-            found = (*found, "the chamber does not run")
-        return found
+        return () if self._described.alarms is None else self.dialogue.alarms(self._described.alarms)
 
     def _profile_runs(self) -> bool:
         program = self._described.program
@@ -95,15 +93,12 @@ class DescribedChamber(TextChamber):
             )
         self._command(self._described.end_program, "end the program")
 
-    def _runs(self) -> bool:
+    def _stopped(self) -> str:
         running = self._described.running
-        return running is None or self.dialogue.holds(running, "read whether it runs")
+        runs = running is None or self.dialogue.holds(running, "read whether it runs")
+        return "" if runs else "the chamber does not run"
 
-    def _switch_on(self) -> None:
-        if self._runs():
-            return
-        if not self._described.switch_on:
-            raise RequestRejected(self.name, "the chamber does not run; switch it on at its panel")
+    def _start(self) -> None:
         self._command(self._described.switch_on, "switch on")
 
     def _switch_off(self) -> None:

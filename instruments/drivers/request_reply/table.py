@@ -130,10 +130,26 @@ class DescribedTable:
             )
 
     def stop(self) -> None:
-        """Control the table to rest. The stop is sent before anything is asked; raises LinkError."""
+        """Control the table to rest. The stop is sent before anything is asked; raises LinkError.
+
+        A home search that another process has begun may refuse it: it is ended by what `stop_slow` describes.
+        """
+        described, own_run = self._described, self._rate_dps != 0
         self._rate_dps, self._last = 0.0, None
-        slow = self.dialogue.link.awaits_slow and self._described.stop_slow
-        self.dialogue.stop(slow or self._described.stop)
+        if self.dialogue.link.awaits_slow and described.stop_slow:
+            self.dialogue.stop(described.stop_slow)
+            return
+        self.dialogue.stop(described.stop)
+        if not own_run and self._homes():
+            self.dialogue.stop(described.stop_slow)
+
+    def _homes(self) -> bool:
+        """Return whether the table homes, or does not answer that; False where its description does not ask."""
+        homing = self._described.homing
+        try:
+            return homing is not None and self.dialogue.holds(homing, "say whether it homes")
+        except InstrumentError:
+            return True  # it may home, and a stop that was not needed harms less
 
     def is_moving(self) -> bool:
         """Get whether the table moves; raises RequestRejected, MalformedReply, NoReply, LinkError."""

@@ -49,6 +49,7 @@ class TableDescription(Description):
     negative: str = "-"
     stop: Commands = Field(min_length=1)
     stop_slow: Commands = ()  #: in place of `stop`, over a new link, while a slow command is not answered yet
+    homing: AskState | None = None  #: yes: it homes, by whichever process, and only `stop_slow` ends that
     standing: AskState
     position: AskNumber
     rate: AskNumber | None = None
@@ -67,6 +68,8 @@ class TableDescription(Description):
     @model_validator(mode="after")
     def _is_whole(self) -> TableDescription:
         _ = self.angle, self.turning, self.accelerating
+        if self.homing is not None and not self.stop_slow:
+            raise ValueError("homing is asked in order to end a home search; add stop_slow, the commands that end it")
         if bool(self.run) == bool(self.move):
             raise ValueError(
                 "give either run (commands after which the table turns until it is stopped) or move (commands of a "

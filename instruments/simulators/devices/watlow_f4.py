@@ -33,8 +33,9 @@ class SimulatedF4(ModbusDevice):
         self.events = [1] * f4.EVENTS
         self.profile = 1  #: current one, while the mode says that one runs
         self.alarm_words = [0] * (f4.AIR_COUNTS[0] - 1)  #: from register 101 on
-        if chamber.enable_event is not None:
-            self.events[chamber.enable_event - 1] = 0
+        self._enabling = None if chamber.enable_event is None else chamber.enable_event - 1
+        if self._enabling is not None:
+            self.events[self._enabling] = 0
         super().__init__("rtu", self._make_cells(), setup.faults, chamber.address)
 
     @property
@@ -72,16 +73,28 @@ class SimulatedF4(ModbusDevice):
         self.writes.append(counts)
         if self.on_run_page:
             self.setpoint = counts
-            self._world.heat.set(t_s, counts / self.counts_per_c)
+            self._control(t_s)
         return True
+
+    def _control(self, t_s: float) -> None:
+        """Let the air go to the set point, or to that of the room while the event that lets the chamber run is off."""
+        runs = self._enabling is None or self.events[self._enabling] == f4.EVENT_ON
+        self._world.heat.set(t_s, self.setpoint / self.counts_per_c if runs else AMBIENT_C)
+
+    def switch(self, event: int, t_s: float, *, on: bool) -> None:
+        """Switch an event output, from 1, as a person does at the panel."""
+        changed, self.events[event - 1] = self.events[event - 1] != on, int(on)
+        if changed and event - 1 == self._enabling:
+            self._control(t_s)
 
     def _terminate(self, words: list[int], _t_s: float) -> bool:
         self.mode = f4.MODE_STATIC
         return words == [f4.TERMINATE_PROFILE]
 
     def _event(self, n: int) -> Cell:
-        def put(value: int, _t_s: float) -> bool:
-            self.events[n] = value
-            return value in {0, 1}
+        def put(value: int, t_s: float) -> bool:
+            if allowed := value in {0, 1}:
+                self.switch(n + 1, t_s, on=value == 1)
+            return allowed
 
         return int16(lambda _: self.events[n], put)

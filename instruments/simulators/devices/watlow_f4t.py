@@ -66,6 +66,11 @@ class SimulatedF4T(ModbusDevice):
             self._loop.air.number: float32(order, self._world.heat.air_c),
         }
 
+    def switch(self, t_s: float, *, on: bool) -> None:
+        """Switch control on or off as a person does at the panel: its mode, the output, and the air."""
+        self.control_mode, self.output = (f4t.MODE_AUTO, f4t.ON) if on else (f4t.MODE_OFF, f4t.OFF)
+        self._world.heat.set(t_s, self.setpoint_c if on else AMBIENT_C)
+
     def _limit(self, part: int, _t_s: float) -> int:
         return self.limit_module[part]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Protocol, cast
 
 
 class SimulatedDevice(Protocol):
@@ -23,3 +23,9 @@ class SimulatedDevice(Protocol):
     def next_byte_s(self, t_s: float) -> float | None:
         """Return when the next byte comes if the host stays silent, s; None when none will come."""
         ...
+
+
+def connected(device: SimulatedDevice) -> SimulatedDevice:
+    """Return the link that a new connection has: its own where the instrument answers each by itself (`connect`)."""
+    connect = getattr(device, "connect", None)
+    return device if connect is None else cast("SimulatedDevice", connect())

@@ -141,6 +141,11 @@ class FaultyWire:
         """When the newest byte was sent, s; None where the instrument does not tell, or a fault may hide it."""
         return None if self.faults.armed or self._held else getattr(self._device, "newest_s", None)
 
+    def connect(self) -> FaultyWire:
+        """Return a further link to the instrument: one of its own where each connection has one, else this wire."""
+        own = getattr(self._device, "connect", None)
+        return self if own is None else FaultyWire(own(), self.faults)
+
     @property
     def is_rpc(self) -> bool:
         """Whether the instrument answers calls of gRPC."""

@@ -13,21 +13,63 @@ from datetime import datetime
 import numpy as np
 from numpy.typing import NDArray
 
-from instruments.bench_config import BenchFile, GyroSettings, SimulationSettings
+from instruments.bench_config import USUAL_AIR_TAU_S, BenchFile, GyroSettings, SimulationSettings
 from instruments.clock import VIRTUAL_START
 from instruments.positions import Position
 from instruments.simulators.hidden import HiddenEffect, State, hidden_effects
-from instruments.simulators.physics.ambient import humidity_pct, supply_wander_v
 from instruments.simulators.physics.bench_errors import UPRIGHT, BenchErrors, felt
 from instruments.simulators.physics.earth import BodyFrame, EarthRotation
 from instruments.simulators.physics.hand_motion import HandMotion
 from instruments.simulators.physics.instability import BiasInstability
 from instruments.simulators.physics.motion import TableMotion
-from instruments.simulators.physics.profile_motion import ProfileMotion
 from instruments.simulators.physics.servo_motion import ServoMotion
 from instruments.simulators.physics.thermal import Body, Heat
 from instruments.simulators.physics.tumbling import Tumbling
 from instruments.simulators.physics.unit_profiles import UnitTruth, make_unit, usual_rate_hz
+
+
+class ProfileMotion:
+    """Angle of a table whose rate is given at even times; at rest before and after."""
+
+    def __init__(self, start_s: float, step_s: float, rates_dps: Array) -> None:
+        """Take rates (k,), the first at `start_s`; both ends are 0, and steps are short against any change."""
+        self._start_s, self._step_s, self._rates = start_s, step_s, rates_dps
+        slope = np.gradient(rates_dps, step_s)
+        # trapezoids with the first correction of Euler and Maclaurin
+        parts = step_s * (rates_dps[1:] + rates_dps[:-1]) / 2 - step_s**2 / 12 * (slope[1:] - slope[:-1])
+        self._angles = np.concatenate([[0.0], np.cumsum(parts)])
+        self.end_s = start_s + step_s * (len(rates_dps) - 1)
+
+    def angle_deg(self, t_s: Array) -> Array:
+        """Return the angle at times (n,), degrees, by cubics that have the rates as their slopes."""
+        at = np.clip((t_s - self._start_s) / self._step_s, 0.0, len(self._rates) - 1.0)
+        k = np.minimum(at.astype(np.int64), len(self._rates) - 2)
+        u = at - k
+        first, second = self._step_s * self._rates[k], self._step_s * self._rates[k + 1]
+        rise = self._angles[k + 1] - self._angles[k]
+        bend = u * (1 - u) * ((1 - u) * (first - rise) + u * (rise - second))
+        return np.asarray(self._angles[k] + u * rise + bend)
+
+    def commanded_deg(self, t_s: Array) -> Array:
+        """Return the angle that was asked for, degrees: a servo's is the true one."""
+        return self.angle_deg(t_s)
+
+
+def supply_wander_v(t_s: Array) -> Array:
+    """Return the deviation of the supply voltage from nominal, (n,) V, at times (n,) s."""
+    return _waves(t_s, (0.06, 5.3, 0.0), (0.04, 1.7, 1.0))
+
+
+def humidity_pct(t_s: Array) -> Array:
+    """Return the relative humidity around the bench, (n,) per cent, at times (n,) s."""
+    return 45.0 + _waves(t_s, (4.0, 23.0, 2.0), (3.0, 6.1, 0.5), (1.5, 2.3, 4.0))
+
+
+def _waves(t_s: Array, *waves: tuple[float, float, float]) -> Array:
+    """Return a sum of waves, each of an amplitude, a period in hours and a phase."""
+    hours = np.asarray(t_s) / 3600.0
+    return np.asarray(sum(size * np.sin(2 * np.pi * hours / period + phase) for size, period, phase in waves))
+
 
 Array = NDArray[np.float64]
 
@@ -89,7 +131,7 @@ class World:
         self.heat = Heat(
             start_c,
             USUAL_RAMP_C_PER_MIN if bench.chamber is None else bench.chamber.ramp_c_per_min,
-            number(settings.chamber, "air_tau_s", 180.0),
+            number(settings.chamber, "air_tau_s", USUAL_AIR_TAU_S),
             bodies,
             number(settings.chamber, "noise_c", 0.02),
             settings.seed + 1000 * settings.noise_seed,

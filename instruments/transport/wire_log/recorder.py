@@ -5,20 +5,235 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import Any, TypeVar, cast
 
+import serial
 from pymodbus.client import ModbusSerialClient, ModbusTcpClient
+from pymodbus.exceptions import ConnectionException
 
 from instruments.clock import Clock
 from instruments.interfaces.unit_handler import UnitHandler
 from instruments.protocols.simulator_control import BUSY, IS_TURNING, OK, mount_line, power_line, turn_line
 from instruments.transport.factory import LinkFactory
-from instruments.transport.rpc.channel import RpcChannel
-from instruments.transport.serial import EIGHT_N_1, Line, SerialPort
-from instruments.transport.stream_reader import StreamReader
+from instruments.transport.rpc import RpcChannel
+from instruments.transport.serial import BROKEN, EIGHT_N_1, Line, SerialPort
+from instruments.transport.stream_reader import Received, StreamReader
 from instruments.transport.wire_log.document import Event, Kind
 from instruments.transport.wire_log.log_file import WireLogFile
-from instruments.transport.wire_log.recorded_clients import RecordedChannel, recorded_rtu, recorded_tcp
-from instruments.transport.wire_log.recorded_port import Note, RecordedPort, RecordedReader, noted
+
+#: Adds an event of one port: its kind, its bytes and what else is known.
+Note = Callable[..., None]
+ResultT = TypeVar("ResultT")
+
+
+def noted(
+    note: Note, at: str, operation: Callable[[], ResultT], failures: tuple[type[Exception], ...] = BROKEN
+) -> ResultT:
+    """Return what an operation on a port returns; its failure becomes an event and is raised."""
+    try:
+        return operation()
+    except failures as error:
+        note("failed", at=at, text_of_error=str(error))
+        raise
+
+
+class RecordedPort:
+    """A port of pyserial, real or simulated. `raw` is the port itself, for a reader that is recorded on its own."""
+
+    def __init__(self, raw: SerialPort, note: Note) -> None:
+        self.raw, self._note = raw, note
+        self._kept = bytearray()  #: received to learn how much waits, and not yet read
+        self._is_closed = False
+
+    @property
+    def is_open(self) -> bool:
+        """Whether the port is open."""
+        return bool(getattr(self.raw, "is_open", not self._is_closed))
+
+    @property
+    def timeout(self) -> float | None:
+        """Longest wait of `read`, s; None: without end."""
+        return self.raw.timeout
+
+    @timeout.setter
+    def timeout(self, timeout: float | None) -> None:
+        self.raw.timeout = timeout
+
+    @property
+    def in_waiting(self) -> int:
+        """Number of bytes that can be read without waiting."""
+        if waiting := noted(self._note, "received", lambda: self.raw.in_waiting):
+            data = noted(self._note, "received", lambda: self.raw.read(waiting))
+            self._note("received", data)
+            self._kept += data
+        return len(self._kept)
+
+    def read(self, size: int = 1, /) -> bytes:
+        """Read `size` bytes, or as many as arrive before the time-out."""
+        if (missing := size - len(self._kept)) > 0:
+            data = noted(self._note, "received", lambda: self.raw.read(missing))
+            self._note("received", data, **({} if len(data) == missing else {"timed_out": True}))
+            self._kept += data
+        found = bytes(self._kept[:size])
+        del self._kept[:size]
+        return found
+
+    def write(self, data: bytes, /) -> int | None:
+        """Send bytes."""
+        sent: int | None = noted(self._note, "sent", lambda: self.raw.write(data))
+        self._note("sent", bytes(data))
+        return sent
+
+    def reset_input_buffer(self) -> None:
+        """Drop unread bytes."""
+        self._kept.clear()
+        noted(self._note, "received", self.raw.reset_input_buffer)
+
+    def flush(self) -> None:
+        """Wait until everything is sent, where the port can."""
+        if (flush := getattr(self.raw, "flush", None)) is not None:
+            noted(self._note, "sent", flush)
+
+    def close(self) -> None:
+        """Close the port; safe to call twice."""
+        self.raw.close()
+        if not self._is_closed:
+            self._is_closed = True
+            self._note("closed")
+
+
+class RecordedReader:
+    """The reader of a port; each call of `take` is one event, as the times of readings follow from these calls."""
+
+    def __init__(self, reader: StreamReader, note: Note) -> None:
+        self._reader, self._note = reader, note
+
+    def take(self) -> Received:
+        """Return everything that has come since the last call."""
+        found: Received = noted(self._note, "arrived", self._reader.take)
+        arrived: Kind = "arrived"
+        known = {"now_s": found.now_s, "newest_s": found.newest_s, "width_s": found.width_s}
+        self._note(arrived, found.data, **{key: value for key, value in known.items() if value is not None})
+        return found
+
+    def discard(self) -> None:
+        """Drop everything that was not taken yet."""
+        noted(self._note, "arrived", self._reader.discard)
+
+    def close(self) -> None:
+        """End reading; the port stays open."""
+        self._reader.close()
+
+
+FAILURES: tuple[type[Exception], ...] = (ConnectionException, *BROKEN)
+
+
+def recorded_tcp(client: ModbusTcpClient, note: Note) -> ModbusTcpClient:
+    """Return a client whose methods that reach its socket note what they do; all else stays pymodbus's."""
+    opening: Callable[[], object] = client.connect
+    closing: Callable[[], object] = client.close
+    sending, receiving = client.send, client.recv
+
+    def connect() -> bool:
+        was_open = client.socket is not None
+        is_open = bool(opening())
+        if not was_open:
+            note("opened") if is_open else note("failed", at="opened", text_of_error="no connection")
+        return is_open
+
+    def close() -> None:
+        was_open = client.socket is not None
+        closing()
+        if was_open:
+            note("closed")
+
+    def send(request: bytes, addr: tuple[str, int] | None = None) -> int:
+        sent = int(noted(note, "sent", lambda: sending(request, addr), FAILURES))
+        note("sent", bytes(request))
+        return sent
+
+    def recv(size: int | None) -> bytes:
+        data: bytes = noted(note, "received", lambda: receiving(size), FAILURES)
+        note("received", data, **({} if data else {"timed_out": True}))
+        return data
+
+    vars(client).update(connect=connect, close=close, send=send, recv=recv)
+    client.transaction.low_level_send = send  # pymodbus takes it from the client when that is made
+    return client
+
+
+def recorded_rtu(client: ModbusSerialClient, note: Note) -> ModbusSerialClient:
+    """Return a client whose port notes what it does."""
+    opening = client.connect
+
+    def connect() -> bool:
+        if client.socket is not None:
+            return True
+        if not opening() or client.socket is None:
+            note("failed", at="opened", text_of_error=str(getattr(client, "failure", None) or "no connection"))
+            return False
+        note("opened")
+        client.socket = cast("serial.Serial", RecordedPort(cast(SerialPort, client.socket), note))
+        return True
+
+    vars(client).update(connect=connect)
+    return client
+
+
+class RecordedChannel:
+    """A gRPC channel whose calls, as the bytes of request and reply, are noted."""
+
+    def __init__(self, channel: RpcChannel, note: Note) -> None:
+        self._channel, self._note = channel, note
+        note("opened")
+
+    def unary_unary(
+        self,
+        method: str,
+        request_serializer: Callable[..., bytes],
+        response_deserializer: Callable[[bytes], object],
+        **settings: object,
+    ) -> Callable[..., object]:
+        """Return what calls a method with one request for one reply; it raises `grpc.RpcError`."""
+        called = self._channel.unary_unary(method, _as_it_is, _as_it_is, **settings)
+
+        def call(request: object, **options: object) -> object:
+            data = request_serializer(request)
+            self._note("sent", data, method=method)
+            try:
+                reply = cast(bytes, called(data, **options))
+            except Exception as error:
+                if (failure := _failure_of(error)) is not None:
+                    self._note("failed", at="received", **failure)
+                raise
+            self._note("received", reply)
+            return response_deserializer(reply)
+
+        return call
+
+    def unary_stream(self, method: str, **settings: object) -> Callable[..., object]:
+        """Return what calls a method with one request for a stream of replies, which is not noted."""
+        return self._channel.unary_stream(method, **settings)
+
+    def close(self) -> None:
+        """Close the channel; safe to call twice."""
+        self._channel.close()
+        self._note("closed")
+
+
+def _as_it_is(message: Any) -> Any:
+    return message
+
+
+def _failure_of(error: Exception) -> dict[str, Any] | None:
+    """Return status, text and metadata of a failed call; None for an error that is none of gRPC."""
+    code, details = getattr(error, "code", None), getattr(error, "details", None)
+    if code is None or details is None:
+        return None
+    metadata: Any = getattr(error, "trailing_metadata", tuple)() or ()
+    pairs = [[str(key), value if isinstance(value, str) else bytes(value).hex()] for key, value in metadata]
+    return {"text_of_error": str(details() or ""), "status": int(code().value[0]), "metadata": pairs}
+
 
 #: The port of a log that stands for who turns and switches the units.
 UNIT_HANDLER = "unit handler"

@@ -14,7 +14,7 @@ from pymodbus.exceptions import ConnectionException
 from instruments.interfaces.unit_handler import UnitHandler
 from instruments.protocols.simulator_control import BUSY, IS_TURNING, mount_line, power_line, turn_line
 from instruments.transport.factory import LinkFactory
-from instruments.transport.rpc.channel import RpcChannel
+from instruments.transport.rpc import RpcChannel
 from instruments.transport.serial import EIGHT_N_1, Line, SerialPort
 from instruments.transport.stream_reader import Received, StreamReader
 from instruments.transport.wire_log.document import Event

@@ -6,7 +6,8 @@ from fastapi import APIRouter
 
 from labctl.api.dependencies import ControlPoolDep, ServiceDep, command_route
 from labctl.services.campaigns.bench_status import bench_statuses
-from labctl.services.commands.registry import CHECK_BENCH, CLEAR_BENCH
+from labctl.services.commands.acts.check import CHECK_BENCH
+from labctl.services.commands.registry import CLEAR_BENCH
 from labctl.services.commands.requests import ToBench
 from labctl.services.schemas.benches import (
     BenchCheckResponse,

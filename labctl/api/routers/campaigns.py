@@ -8,25 +8,20 @@ from typing import Annotated
 from fastapi import APIRouter, Header, Response
 from fastapi.concurrency import run_in_threadpool
 
+from labctl.api.act_routes import add_act_route
 from labctl.api.computation import execute
-from labctl.api.dependencies import ControlPoolDep, ServiceDep, command_route
+from labctl.api.dependencies import ServiceDep, command_route
 from labctl.api.event_stream import EventStream
 from labctl.services.campaigns.plan_view import campaign_plan
-from labctl.services.commands.registry import (
-    ABORT_CAMPAIGN,
-    CONFIRM_PROMPT,
-    MAKE_DRAFTS,
-    PAUSE_CAMPAIGN,
-    RESUME_CAMPAIGN,
-    START_CAMPAIGN,
-)
+from labctl.services.commands.acts.catalogue import CAMPAIGN_ACTS
+from labctl.services.commands.acts.resume import RESUME_CAMPAIGN
+from labctl.services.commands.acts.start import START_CAMPAIGN
+from labctl.services.commands.registry import MAKE_DRAFTS
 from labctl.services.commands.requests import CampaignResume, CampaignStart, ToCampaign
 from labctl.services.schemas.campaigns import (
     CampaignRequest,
     CampaignResponse,
-    ConfirmRequest,
     EventResponse,
-    ReasonRequest,
     ResumeRequest,
 )
 from labctl.services.schemas.plans import CampaignPlanResponse
@@ -65,35 +60,14 @@ def plan(campaign: int, service: ServiceDep) -> CampaignPlanResponse:
     return campaign_plan(service.store, campaign)
 
 
-@command_route(router, ABORT_CAMPAIGN, "End a campaign")
-async def abort(
-    campaign: int, request: ReasonRequest, service: ServiceDep, control: ControlPoolDep
-) -> CampaignResponse:
-    """End a running campaign now, in the safe state. The data measured so far are stored.
-
-    Answered within a second; `wish` is `abort` while the safe state is still being reached.
-    """
-    return await control.run(lambda: service.execute(ABORT_CAMPAIGN, ToCampaign(campaign, request)))
-
-
-@command_route(router, PAUSE_CAMPAIGN, "Hold a campaign")
-async def pause(
-    campaign: int, request: ReasonRequest, service: ServiceDep, control: ControlPoolDep
-) -> CampaignResponse:
-    """Hold after the present data set. `wish` says that it was asked; `state` becomes `paused` when it holds."""
-    return await control.run(lambda: service.execute(PAUSE_CAMPAIGN, ToCampaign(campaign, request)))
+for _act in CAMPAIGN_ACTS:
+    add_act_route(router, _act)
 
 
 @command_route(router, RESUME_CAMPAIGN, "Resume a campaign")
 def resume(campaign: int, request: ResumeRequest, service: ServiceDep) -> CampaignResponse:
     """Continue a paused campaign, or resume one that was interrupted, failed or aborted; safe state first."""
     return service.execute(RESUME_CAMPAIGN, CampaignResume(campaign, request))
-
-
-@command_route(router, CONFIRM_PROMPT, "Answer a campaign's question")
-def confirm(campaign: int, request: ConfirmRequest, service: ServiceDep) -> CampaignResponse:
-    """Answer the question with this id; an answer to an older one is refused."""
-    return service.execute(CONFIRM_PROMPT, ToCampaign(campaign, request))
 
 
 @command_route(router, MAKE_DRAFTS, "Make its drafts")

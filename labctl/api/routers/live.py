@@ -9,7 +9,7 @@ from fastapi.concurrency import run_in_threadpool
 
 from labctl.api.dependencies import ServiceDep, command_route
 from labctl.api.event_stream import EventStream
-from labctl.services.commands.registry import END_LIVE, START_LIVE
+from labctl.services.commands.acts.live import END_LIVE, START_LIVE
 from labctl.services.schemas.live import LiveEndRequest, LiveHistoryResponse, LiveRequest, LiveStateResponse
 
 router = APIRouter(prefix="/api/live", tags=["live"])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, Form, Query, Request, UploadFile
+from fastapi import APIRouter, File, Form, Query, Request, UploadFile
 from fastapi import Path as PathParameter
 from fastapi.responses import PlainTextResponse, StreamingResponse
 
@@ -68,13 +68,23 @@ LeaveOutField = Annotated[
 ModifiedField = Annotated[
     float | None, Form(ge=0, le=4e12, description="When the file was last written, ms since 1970-01-01 UTC.")
 ]
+RecordingFiles = Annotated[
+    list[UploadFile],
+    File(
+        description="The files of the recording: `recording.toml`, its data file and, if there is one, the environment "
+        "file."
+    ),
+]
+LogUpload = Annotated[
+    UploadFile, File(description="The file in another format, such as CSV, Parquet, ULog or a ROS bag.")
+]
 
 router = APIRouter(prefix="/api/recordings", tags=["recordings"])
 
 
 @command_route(router, IMPORT_RECORDING, "Import a recording")
 async def import_recording(
-    request: Request, files: list[UploadFile], service: ServiceDep, leave_out: LeaveOutField = None
+    request: Request, files: RecordingFiles, service: ServiceDep, leave_out: LeaveOutField = None
 ) -> ImportResponse:
     """Import a recording in the interchange format: `recording.toml`, its data file and, if there is one, the
     environment file, as parts of one multipart form. Either the whole recording is stored or nothing; an error
@@ -90,7 +100,7 @@ async def import_recording(
 @command_route(router, IMPORT_LOG, "Import a log")
 async def import_log(
     request: Request,
-    file: UploadFile,
+    file: LogUpload,
     service: ServiceDep,
     column_map: MapField = "",
     importer: ImporterField = "",
@@ -114,7 +124,7 @@ async def import_log(
 @router.post("/logs/preview", summary="Preview a log")
 async def preview(
     request: Request,
-    file: UploadFile,
+    file: LogUpload,
     service: ServiceDep,
     column_map: MapField = "",
     importer: ImporterField = "",

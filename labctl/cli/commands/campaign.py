@@ -150,8 +150,8 @@ def start(
     that is not simulated a person has to confirm first that the bench is clear, or will be at that time.
     """
     from labctl.cli.campaign_terminal import campaign_terminal
+    from labctl.services.commands.acts.start import START_CAMPAIGN
     from labctl.services.commands.open import open_commands
-    from labctl.services.commands.registry import START_CAMPAIGN
     from labctl.services.commands.requests import CampaignStart
     from labctl.services.planning.loading import own_text
     from labctl.services.schemas.campaigns import BENCH_CHECKS, CampaignRequest

@@ -69,8 +69,8 @@ def pause(
     database: Database = None,
 ) -> None:
     """Pause a running campaign after the present data set; the bench is still monitored."""
+    from labctl.services.commands.acts.pause import PAUSE_CAMPAIGN
     from labctl.services.commands.open import execute
-    from labctl.services.commands.registry import PAUSE_CAMPAIGN
     from labctl.services.commands.requests import ToCampaign
     from labctl.services.schemas.campaigns import ReasonRequest
 
@@ -108,8 +108,8 @@ def resume(
 ) -> None:
     """Continue a paused campaign, or resume one that was interrupted, failed or aborted; safe state first."""
     from labctl.cli.campaign_terminal import campaign_terminal
+    from labctl.services.commands.acts.resume import RESUME_CAMPAIGN
     from labctl.services.commands.open import campaign_to_resume, open_commands
-    from labctl.services.commands.registry import RESUME_CAMPAIGN
     from labctl.services.commands.requests import CampaignResume
     from labctl.services.schemas.campaigns import ResumeRequest
 
@@ -152,8 +152,8 @@ def _recorded(database: str | None, campaign: int, reason: str, was_stopped: boo
     """Have an abort recorded; where the campaign has ended by the stop already, its own process has recorded it."""
     from labctl.errors import Conflict
     from labctl.service_connection import ServiceRefused
+    from labctl.services.commands.acts.abort import ABORT_CAMPAIGN
     from labctl.services.commands.open import current_status, execute
-    from labctl.services.commands.registry import ABORT_CAMPAIGN
     from labctl.services.commands.requests import ToCampaign
     from labctl.services.schemas.campaigns import ReasonRequest
 
@@ -207,8 +207,8 @@ def confirm(
 ) -> None:
     """Answer a campaign's question: done, or cannot be done. An answer to an older question is refused."""
     from labctl.errors import BadInput
+    from labctl.services.commands.acts.confirm import CONFIRM_PROMPT
     from labctl.services.commands.open import current_status, execute
-    from labctl.services.commands.registry import CONFIRM_PROMPT
     from labctl.services.commands.requests import ToCampaign
     from labctl.services.schemas.campaigns import ConfirmRequest
 

@@ -12,9 +12,18 @@ from labctl.cli.options import By, Database, DeviceId, Json, Out, SensorExport, 
 from labctl.cli.output import print_json
 from labctl.cli.printing.sensors import print_kept, print_sensor
 
+Readings = Annotated[
+    Path,
+    typer.Argument(
+        metavar="FILE",
+        help="CSV or Parquet file of readings, in order of time, or the folder of a recording in poses, which gives "
+        "the alignment too.",
+    ),
+]
+
 
 def magnetometer(
-    path: Annotated[Path, typer.Argument(metavar="FILE", help="CSV or Parquet file of readings, in order of time.")],
+    path: Readings,
     columns: Annotated[
         str, typer.Option("--columns", metavar="X,Y,Z", help="Names of the three columns.")
     ] = "mag_x,mag_y,mag_z",
@@ -51,7 +60,7 @@ def magnetometer(
     with one_clear_line():
         check_export(export, out)
         source = Source([name.strip() for name in columns.split(",")], unit, field_ut)
-        answer = magnetometer_of_file(path, source)
+        answer = magnetometer_of_file(path, source, serial)
         write_export(answer, export, out, instance, device_id)
         if serial is not None:
             request = MagnetometerRequest(data=measured_data([path], source.text), result=answer, by=who(by))

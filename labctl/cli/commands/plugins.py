@@ -17,7 +17,8 @@ TriedWireLog = Annotated[
     typer.Option(
         "--wire-log",
         metavar="FILE",
-        help="With a FILE and its instrument: file for every byte between labctl and the instrument, compressed.",
+        help="With a FILE and its instrument: file for every byte between labctl and the instrument, compressed; "
+        "default: one in the folder for temporary files, kept if a request failed.",
     ),
 ]
 
@@ -88,7 +89,8 @@ def driver_checks(
     elif port is not None or host is not None or move or wire_log is not None:
         raise typer.BadParameter(
             "a driver of a package is tried on its simulator; --port, --host, --move and --wire-log belong to the "
-            "description of an instrument, a .toml file"
+            "description of an instrument, a .toml file; for a wire log of a driver use `labctl bench check FILE "
+            "--wire-log FILE`"
         )
     else:
         _try_driver(name, bench, as_json=as_json)
@@ -119,6 +121,9 @@ def _try_description(
         said = f"{failed} of {len(answer.checks)} failed" if failed else f"all {len(answer.checks)} passed"
         left = "" if move or answer.kind == "reference" else "; its commands were not tried (--move)"
         console.print(f"{answer.name}, a {answer.kind} at {answer.address}: {said}{left}", soft_wrap=True)
+        if failed and answer.wire_log is not None:
+            text = f"every byte is in {answer.wire_log}: add this file to a report of a fault (zcat shows it)"
+            console.print(text, soft_wrap=True, markup=False, highlight=False)
     if not answer.ok:
         raise typer.Exit(1)
 
@@ -142,5 +147,10 @@ def _try_driver(name: str, bench: str | None, *, as_json: bool) -> None:
             f"{failed} of {len(answer.checks)} checks failed" if failed else f"all {len(answer.checks)} checks passed"
         )
         console.print(f"{name} of {answer.distribution} {answer.version}: {said}")
+        if failed:
+            console.print(
+                "this was its simulator; `labctl bench check FILE --wire-log FILE` records every byte of an instrument",
+                soft_wrap=True,
+            )
     if not answer.ok:
         raise typer.Exit(1)

@@ -19,10 +19,16 @@ if TYPE_CHECKING:
     from labctl.services.schemas.schedule import ScheduledResponse
 
 
+def _print_guesses(guessed: Sequence[str]) -> None:
+    for guess in guessed:
+        console.print(f"  a guess: {guess}", soft_wrap=True, markup=False)
+
+
 def print_plan(answer: PlanResponse) -> None:
     """Print a plan's figures for a person."""
     print_heading(answer.recipe, f" on {answer.bench}")
     console.print(f"  {answer.datasets} data sets in {answer.steps} steps, about {hours(answer.expected_s)}")
+    _print_guesses(answer.guessed)
     if answer.verification_datasets:
         share = 100.0 * answer.verification_s / max(answer.expected_s, 1e-9)
         console.print(

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from labctl.errors import BadInput
 from labctl.exports.comments import commented, plain
 from labctl.exports.options import check_instance
@@ -25,6 +27,14 @@ FLOAT, INTEGER = 9, 6
 OFF_DIAGONAL = ((0, 1), (0, 2), (1, 2))
 
 
+def _lost(result: FieldParameters, place: str) -> list[str]:
+    """Return the line that says what a format without a rotation loses."""
+    if result.turned_rad is None:
+        return []
+    angle = float(np.degrees(np.linalg.norm(result.turned_rad)))
+    return [f"LOST alignment: turned by {angle:.2g} deg from the accelerometer; {place}"]
+
+
 def px4(result: FieldParameters, head: Sequence[str], instance: int, device_id: int | None) -> str:
     """Return a file of parameters that QGroundControl loads; raises BadInput for an instance that PX4 has not."""
     check_instance("px4", instance, 0, 3)
@@ -39,6 +49,7 @@ def px4(result: FieldParameters, head: Sequence[str], instance: int, device_id: 
         "Axes are the sensor's own, as in its raw output, before the rotations of sensor and board.",
         "Vehicle, component, parameter, value, type (6: integer, 9: float):",
     ]
+    notes = _lost(result, f"{name}ROT and the angles beside it are not in this file.") + notes
     if device_id is None:
         notes.insert(0, f"{name}ID is not in this file and must be the sensor's device id (--device-id).")
     body = "".join(f"1\t1\t{row}\t{value}\t{kind}\n" for row, value, kind in rows)
@@ -69,4 +80,5 @@ def ardupilot(result: FieldParameters, head: Sequence[str], instance: int, devic
     notes = [
         "ArduPilot corrects after the rotation of sensor and board: the readings must be in these axes, as in its log."
     ]
+    notes += _lost(result, "COMPASS_ORIENT takes steps of 45 deg only.")
     return commented([*map(plain, head), *notes]) + "".join(f"{row},{value}\n" for row, value in rows)

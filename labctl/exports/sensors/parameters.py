@@ -32,6 +32,8 @@ class FieldParameters(Protocol):
     def hard_iron_ut(self) -> Array: ...
     @property
     def soft_iron(self) -> NDArray[np.float64]: ...
+    @property
+    def turned_rad(self) -> Array | None: ...
 
 
 @dataclass(frozen=True)
@@ -107,6 +109,7 @@ class MagnetometerParameters:
     hard_iron_ut: Array
     soft_iron: NDArray[np.float64]
     covariance: NDArray[np.float64]  #: (10, 10) of the parameters in the order of `labels`
+    turned_rad: Array | None = None  #: (3,) rotation vector of its axes from the accelerometer's; None: unknown
 
     sensor = "magnetometer"
     unit = "uT"
@@ -122,6 +125,15 @@ class MagnetometerParameters:
     def matrix(self) -> NDArray[np.float64]:
         """What corrects a reading without its offset, (3, 3)."""
         return self.soft_iron
+
+    @property
+    def alignment(self) -> NDArray[np.float64] | None:
+        """What turns a corrected field into the accelerometer's axes, (3, 3); None: unknown."""
+        if self.turned_rad is None:
+            return None
+        from scipy.spatial.transform import Rotation
+
+        return np.asarray(Rotation.from_rotvec(self.turned_rad).as_matrix(), dtype=np.float64)
 
 
 Parameters = AccelerometerParameters | MagnetometerParameters

@@ -5,11 +5,15 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 
+import numpy as np
+from numpy.typing import NDArray
+
 from labctl.exports.comments import commented, plain
-from labctl.exports.sensors.parameters import AccelerometerParameters, Parameters
+from labctl.exports.sensors.parameters import AccelerometerParameters, MagnetometerParameters, Parameters
 from labctl.fitting.poses.at_rest.gravity import STANDARD_GRAVITY
 
 SCHEMA = "labctl-sensor/1"
+ALIGNED = "alignment turns what is corrected into the axes of the accelerometer that was calibrated with it"
 FORMULA = "corrected = matrix (reading - offset), along x, y, z of the sensor"
 
 
@@ -27,7 +31,14 @@ def json_text(found: Parameters, head: Sequence[str]) -> str:
             "reference_c": warm.reference_c, "range_c": list(warm.range_c),
             "offset_per_k": (warm.bias_g * STANDARD_GRAVITY).tolist(), "scale_factor_per_k": warm.scale_factor.tolist(),
         }  # fmt: skip
+    turn = _alignment(found)
+    if turn is not None:
+        document["alignment"] = {"formula": ALIGNED, "matrix": turn.tolist()}
     return json.dumps(document, indent=2) + "\n"
+
+
+def _alignment(found: Parameters) -> NDArray[np.float64] | None:
+    return found.alignment if isinstance(found, MagnetometerParameters) else None
 
 
 def _lost(found: Parameters) -> list[str]:
@@ -39,29 +50,48 @@ def _lost(found: Parameters) -> list[str]:
 def python_text(found: Parameters, head: Sequence[str]) -> str:
     """Return a module that needs nothing but Python."""
     lines = [*map(plain, head), f"{FORMULA}; offset, readings and results in {found.unit}.", *_lost(found)]
+    turn = _alignment(found)
+    lines += [] if turn is None else [f"{ALIGNED.upper()[:9]}{ALIGNED[9:]}."]
     return commented(lines) + (
         f"OFFSET = {found.offset.tolist()!r}\n"
-        f"MATRIX = {found.matrix.tolist()!r}\n\n\n"
+        f"MATRIX = {found.matrix.tolist()!r}\n" + ("" if turn is None else f"ALIGNMENT = {turn.tolist()!r}\n") + "\n\n"
         "def correct(reading):\n"
         f'    """Return the corrected {found.sensor} reading (x, y, z), {found.unit}, as a list."""\n'
         "    away = [float(value) - offset for value, offset in zip(reading, OFFSET, strict=True)]\n"
         "    return [sum(factor * value for factor, value in zip(row, away)) for row in MATRIX]\n"
+        + (
+            ""
+            if turn is None
+            else (
+                "\n\ndef aligned(reading):\n"
+                '    """Return the corrected reading in the axes of the accelerometer, as a list."""\n'
+                "    field = correct(reading)\n"
+                "    return [sum(factor * value for factor, value in zip(row, field)) for row in ALIGNMENT]\n"
+            )
+        )
     )
+
+
+def _rows(matrix: NDArray[np.float64]) -> str:
+    return ", ".join("{" + ", ".join(f"{value:.17g}" for value in row) + "}" for row in matrix)
 
 
 def c_text(found: Parameters, head: Sequence[str]) -> str:
     """Return a C99 header with one function; `#define LABCTL_REAL float` before it for single precision."""
     name = found.sensor
     lines = [*map(plain, head), f"{FORMULA}; offset, readings and results in {found.unit}.", *_lost(found)]
+    turn = _alignment(found)
+    lines += [] if turn is None else [f"{name}_{ALIGNED}."]
     comment = "\n * ".join(line.replace("*/", "* /") for line in lines)
-    rows = ", ".join("{" + ", ".join(f"{value:.17g}" for value in row) + "}" for row in found.matrix)
     offset = ", ".join(f"{value:.17g}" for value in found.offset)
     return (
         f"/* {comment} */\n"
         f"#ifndef LABCTL_{name.upper()}_H\n#define LABCTL_{name.upper()}_H\n\n"
         "#ifndef LABCTL_REAL\n#define LABCTL_REAL double\n#endif\n\n"
         f"static const double {name}_offset[3] = {{{offset}}};\n"
-        f"static const double {name}_matrix[3][3] = {{{rows}}};\n\n"
+        f"static const double {name}_matrix[3][3] = {{{_rows(found.matrix)}}};\n"
+        + ("" if turn is None else f"static const double {name}_alignment[3][3] = {{{_rows(turn)}}};\n")
+        + "\n"
         f"static inline void {name}_correct(const LABCTL_REAL *reading, LABCTL_REAL *corrected)\n"
         "{\n"
         "    LABCTL_REAL away[3];\n"

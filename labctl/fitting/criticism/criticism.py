@@ -10,7 +10,6 @@ from operator import attrgetter
 import numpy as np
 
 from labctl.fitting.criticism.advice import advice_for, is_carried
-from labctl.fitting.criticism.beneath_steps import NO_CORRECTION, QUANTIZATION, with_quantization
 from labctl.fitting.criticism.candidates import beside_held
 from labctl.fitting.criticism.diagnostics import views_of
 from labctl.fitting.criticism.model_comparison import Comparison, compare_models, with_noise_of
@@ -43,6 +42,30 @@ from labctl.json_types.views import Views
 from labctl.progress import report_stage
 from labctl.recording import Recording
 from labctl.recording.verification import fitted_part
+
+#: A residual up to this many times what the steps leave in a mean (or of another axis its noise) is theirs.
+STEPS_LEAVE = 1.5
+QUANTIZATION = "quantization"
+NO_CORRECTION = Advice(
+    effect=QUANTIZATION, add=False, why="no calibration corrects what the steps of an output leave out",
+    before_dps=None, after_dps=None,
+)  # fmt: skip
+
+
+def with_quantization(verdict: Verdict, data: ReducedRecording, left: Mapping[str, Residuals]) -> Verdict:
+    """Return the verdict, or quantization in place of another cause where no axis leaves more than its steps do.
+
+    The catalogue's effect of that name is a law of raw codes, and competes where these are logged.
+    """
+    if verdict.form not in {"unexplained", "missing", "ambiguous"} or not data.steps or not left:
+        return verdict
+    for axis, residuals in left.items():
+        step = data.steps.get(axis)
+        most = STEPS_LEAVE * (step["left_dps"] if step else float(np.sqrt(np.mean(residuals.floor_dps**2))))
+        if float(np.sqrt(np.mean(residuals.means**2))) > most:
+            return verdict
+    return Verdict("missing", ((QUANTIZATION,),), axes={QUANTIZATION: tuple(data.steps)})
+
 
 #: Data sets beyond the base's coefficients that a verdict needs.
 LEAST_SPARE = 6

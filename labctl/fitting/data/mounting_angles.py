@@ -21,7 +21,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -199,8 +199,13 @@ def angle_gains(shares: Mapping[str, float], axis: str, *, separates: bool = Tru
 
     Where nothing `separates` the angles, the slope is that of a line through all mountings.
     """
+    return _angle_gains(tuple(shares.items()), axis, separates)
+
+
+@lru_cache(maxsize=256)
+def _angle_gains(shares: tuple[tuple[str, float], ...], axis: str, separates: bool) -> AngleGains:
     known: dict[str, float] = {}
-    for text, share in shares.items():
+    for text, share in shares:
         known[str(Position.of(text))] = known.get(str(Position.of(text)), 0.0) + share
     scheme = _scheme(tuple(sorted(known)), axis)
     if scheme is None:

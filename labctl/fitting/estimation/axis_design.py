@@ -16,7 +16,7 @@ from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.data.mounting_angles import AngleColumns
 from labctl.fitting.data.shifts import Shift, shifts_of
 from labctl.fitting.effects import Column
-from labctl.fitting.estimation.held.propagation import HeldColumns, HeldPart
+from labctl.fitting.estimation.held import HeldColumns, HeldPart
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.numeric.arrays import Array
 

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
+from labctl.errors import LabctlError, NotEnoughData
+from labctl.fitting.data.channels import BODY_AXES, Channels
 from labctl.fitting.data.covered import Covered
 from labctl.fitting.data.earth import turning_size_dps, up_rate_dps
 from labctl.fitting.data.fit_data import FitData, fit_data_of
@@ -13,28 +17,175 @@ from labctl.fitting.data.mounting_angles import mountings_of
 from labctl.fitting.data.noise_floor import AxisNoise
 from labctl.fitting.data.temperature.channel import is_chambers
 from labctl.fitting.data.temperature.history import TemperatureHistory
+from labctl.fitting.data.temperature.legs import legs_of
 from labctl.fitting.effects import Term, kind_of
+from labctl.fitting.estimation.axis_design import TOLD_APART
 from labctl.fitting.estimation.axis_solutions import leaning, residuals, solve_axes
 from labctl.fitting.estimation.error_metrics import ErrorFigures, rms
-from labctl.fitting.estimation.held.resolution import Fixed, refuse_fixed, with_held
-from labctl.fitting.estimation.held_out import held_out_errors
-from labctl.fitting.estimation.held_out_legs import errors_by_leg
-from labctl.fitting.estimation.joint.findings import joint_findings
+from labctl.fitting.estimation.held import Fixed, refuse_fixed, with_held
+from labctl.fitting.estimation.joint import joint_findings
 from labctl.fitting.estimation.of_poses import of_poses
+from labctl.fitting.estimation.published.common import full_range_dps
 from labctl.fitting.estimation.published.tables import from_coefficients
 from labctl.fitting.estimation.requirements import require_enough_data
 from labctl.fitting.estimation.result import FitResult
 from labctl.fitting.estimation.shape_uncertainty import shapes_of
 from labctl.fitting.estimation.shapes import with_shapes
-from labctl.fitting.estimation.validity import valid_rates_dps
 from labctl.fitting.models.error_model import ErrorModel, is_exported
 from labctl.fitting.models.fitted_model import AxisFit, FittedModel, without
+from labctl.fitting.models.inversion import NotConverged
 from labctl.fitting.models.presets import POSES, Preset, preset_for
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.blas_threads import single_threaded
 from labctl.fitting.numeric.least_squares import Solution
-from labctl.json_types.models import AxisNoiseJson, FitEnvironment
+from labctl.json_types.models import AxisNoiseJson, FitEnvironment, LegErrorJson
 from labctl.recording import Recording
+
+# Held-out errors by leg: fitted while the unit warms up and tested while it cools, and the other way round.
+#
+# The temperatures of a loop come twice. Leaving out a temperature leaves out both of its passages; leaving out a leg
+# asks what a law of temperature alone can never answer: whether the way back is like the way there.
+
+#: Data sets that a leg needs, and legs up to which each is left out in turn.
+LEAST_SETS, MOST_LEGS = 4, 12
+#: A leg is tested within the temperatures that the others were fitted at, and so far beyond, K.
+BEYOND_K = 1.0
+
+
+def errors_by_leg(data: FitData, preset: Preset, solutions: Mapping[str, Solution]) -> list[LegErrorJson]:
+    """Return the error of legs by fits to others; none where the temperature goes one way only.
+
+    The drift of each axis stays that of `solutions`, the fit to all data sets.
+    """
+    if not data.channels.history.thermometer or "t_s" not in data.channels:
+        return []
+    run = np.asarray(data.channels["run"], dtype=np.int64) if "run" in data.channels else np.ones(len(data), dtype=int)
+    legs = legs_of(data.temperature_c, run)
+    up, down = legs > 0, legs < 0
+    if min(int(up.sum()), int(down.sum())) < LEAST_SETS:
+        return []
+    found = [
+        _tested(data, preset, solutions, [(up, down)], ("heating", "cooling")),
+        _tested(data, preset, solutions, [(down, up)], ("cooling", "heating")),
+    ]
+    numbers, counts = np.unique(legs[legs != 0], return_counts=True)
+    if 2 < len(numbers) <= MOST_LEGS and counts.min() >= LEAST_SETS:
+        pairs = [((legs != 0) & (legs != number), legs == number) for number in numbers]
+        found.append(_tested(data, preset, solutions, pairs, ("all legs but one", "each leg in turn")))
+    return found
+
+
+def _tested(
+    data: FitData, preset: Preset, solutions: Mapping[str, Solution],
+    pairs: list[tuple[NDArray[np.bool_], NDArray[np.bool_]]], names: tuple[str, str],
+) -> LegErrorJson:  # fmt: skip
+    """Return the error of each second part of the data sets by a fit to the first, pooled."""
+    errors: dict[str, list[Array]] = {axis: [] for axis in data.outputs}
+    tested = 0
+    for fitted_to, left_out in pairs:
+        seen = data.take(fitted_to)
+        low, high = float(seen.temperature_c.min()) - BEYOND_K, float(seen.temperature_c.max()) + BEYOND_K
+        rest = data.take(left_out & (data.temperature_c >= low) & (data.temperature_c <= high))
+        if len(rest) == 0:
+            return _answer(names, None, 0, f"no data set of the {names[1]} is at a temperature of the {names[0]}")
+        lost = [a for a in BODY_AXES if seen.distinct_rates(a) < TOLD_APART <= data.distinct_rates(a)]
+        if lost:
+            return _answer(names, None, 0, f"the {names[0]} do not turn the unit about {' and '.join(lost)}")
+        try:
+            model, rows = preset.build(seen)
+            used = seen.take(rows)
+            require_enough_data(used, model)
+            solved = solve_axes(used, model, solutions)
+            left = residuals(FittedModel(model, solved.fits), rest, solved.nuisance)
+        except LabctlError as error:
+            return _answer(names, None, 0, f"the {names[0]} alone does not determine the model: {error}")
+        tested += len(rest)
+        for axis, values in left.items():
+            errors[axis].append(values)
+    return _answer(names, rms({axis: np.concatenate(parts) for axis, parts in errors.items()}), tested, "")
+
+
+def _answer(names: tuple[str, str], rms_dps: float | None, datasets: int, why: str) -> LegErrorJson:
+    return {"fitted": names[0], "tested": names[1], "rms_dps": rms_dps, "datasets": datasets, "why": why}
+
+
+#: Data sets at which regressors are compared, and rates, as shares of the fastest measured one.
+MOST_ROWS, SHARES = 64, (-1.0, -0.5, 0.0, 0.5, 1.0)
+#: A pair of rates in JSON: null means that there is no limit.
+RateLimits = tuple[float | None, float | None]
+
+
+def valid_rates_dps(fitted: FittedModel, data: FitData) -> RateLimits:
+    """Return the range of true rates over all recorded axes, deg/s; (None, None) for a model without a rate in it.
+
+    Only what is exported counts: the rest of the model is not applied where the unit is used. Where all that depends on
+    the rate is held, it is valid at the rates of the unit, as published coefficients are.
+    """
+    exported, _ = fitted.exported()
+    if not depends_on_rate(exported.model, data):
+        return None, None
+    ranges = [data.covered.rate_dps[axis] for axis in data.outputs]
+    if exported.model.held.axes and not depends_on_rate(exported.model, data, held=False):
+        ranges.append(full_range_dps(data.info))
+    return min(low for low, _ in ranges), max(high for _, high in ranges)
+
+
+def depends_on_rate(model: ErrorModel, data: FitData, *, held: bool = True) -> bool:
+    """Return whether a regressor of a model changes with the rate, on any recorded axis.
+
+    Without `held`, the regressors of held coefficients do not count.
+    """
+    rows = np.unique(np.linspace(0, len(data) - 1, min(len(data), MOST_ROWS)).astype(np.int64))
+    channels = data.channels.take(rows)
+    fastest = max(1.0, *(abs(end) for axis in data.outputs for end in data.covered.rate_dps[axis]))
+    seen = [_at_rate(channels, share * fastest) for share in SHARES]
+    for axis in data.outputs:
+        first, *others = [
+            [c.values for owner, c in model.columns(each, axis) if held or model.held.of(axis, owner, c.name) is None]
+            for each in seen
+        ]
+        for other in others:
+            if len(other) != len(first) or not all(map(np.array_equal, first, other)):
+                return True
+    return False
+
+
+def _at_rate(channels: Channels, rate_dps: float) -> Channels:
+    """Return channels in which the table and every body axis turn at one rate."""
+    rate = np.full(len(channels), rate_dps)
+    columns = {**channels.columns, "table_rate_dps": rate}
+    return replace(channels, columns=columns, rates=dict.fromkeys(BODY_AXES, rate))
+
+
+def held_out_errors(data: FitData, preset: Preset, solutions: Mapping[str, Solution]) -> dict[str, Array]:
+    """Return axis -> (m,) deg/s, corrected minus true rate of each part left out in turn (`held_out_pairs`).
+
+    The drift of each axis stays that of `solutions`, the fit to all data sets. Empty where a fold leaves too little.
+    """
+    pairs = data.held_out_pairs
+    if preset.inner_only:
+        pairs = pairs[1:-1]
+    errors: dict[str, list[Array]] = {axis: [] for axis in data.outputs}
+    for seen, left_out in pairs:
+        if len(seen) == 0:
+            return {}
+        try:
+            model, rows = preset.build(seen)
+            require_enough_data(seen.take(rows), model)
+            found = solve_axes(seen.take(rows), model, solutions)
+        except NotEnoughData:
+            return {}
+        try:
+            left = residuals(FittedModel(model, found.fits), left_out, found.nuisance)
+        except NotConverged as error:
+            at_c = float(left_out.temperature_c.mean())
+            raise NotConverged(
+                f"{error}; this fit left out the data sets near {at_c:.1f} deg C, to test the "
+                "model at a temperature that it was not fitted to"
+            ) from None
+        for axis, values in left.items():
+            errors[axis].append(values)
+    return {axis: np.concatenate(parts) for axis, parts in errors.items() if parts}
 
 
 def fit(

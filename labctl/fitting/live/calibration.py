@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +16,7 @@ from numpy.typing import NDArray
 from labctl.errors import BadInput, LabctlError, NotEnoughData
 from labctl.fitting.estimation.fit import fit
 from labctl.fitting.estimation.result import FitResult
-from labctl.fitting.live.buffer import ReadingBuffer
-from labctl.fitting.live.directions import DIRECTIONS, Direction, covered
-from labctl.fitting.live.guidance import needs_of_turns, next_pose
+from labctl.fitting.live.directions import DIRECTIONS, Direction, covered, turn_between
 from labctl.fitting.live.state import (
     LiveCoefficient,
     LiveState,
@@ -29,10 +28,116 @@ from labctl.fitting.live.state import (
 )
 from labctl.fitting.live.target import Target
 from labctl.fitting.models.presets import POSES
+from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.poses.at_rest.rests import LEAST_IN_WINDOW, MARGIN, WINDOW_S, find_rests
 from labctl.fitting.poses.readings import GAP, PoseReadings, readings_of
 from labctl.fitting.poses.triad import unit
 from labctl.recording import Recording, RecordingInfo
+from labctl.recording.columns import holds_flags, needed
+
+#: Readings that the arrays begin with.
+FIRST = 4096
+
+
+class ReadingBuffer:
+    """The columns of a recording that begins."""
+
+    def __init__(self, info: RecordingInfo) -> None:
+        self._info = info
+        self._columns: dict[str, NDArray[np.generic]] = {}
+        self._n = 0
+
+    def __len__(self) -> int:
+        return self._n
+
+    def add(self, columns: Mapping[str, NDArray[np.generic]]) -> None:
+        """Append a block, (n,) each. Raises BadInput for columns that are missing or differ, and for times that fall.
+
+        Data set 1 is all of it.
+        """
+        n = len(columns["t_s"]) if "t_s" in columns else 0
+        given = {"dataset": np.ones(n, dtype=np.int64), **columns}
+        serial = self._info.serial
+        if not self._columns:
+            if absent := [name for name in needed(self._info) if name not in given]:
+                raise BadInput(
+                    f"{serial}: the stream has no {', '.join(absent)}; add rates and specific forces of all three axes"
+                )
+            self._columns = {name: np.zeros(FIRST, dtype=_type(name)) for name in given}
+        if set(given) != set(self._columns) or any(len(values) != n for values in given.values()):
+            raise BadInput(f"{serial}: a block has other columns than those before it; send the same columns each time")
+        if n == 0:
+            return
+        times = np.asarray(given["t_s"], dtype=np.float64)
+        last = float(np.asarray(self._columns["t_s"])[self._n - 1]) if self._n else -np.inf
+        if not np.all(np.diff(np.concatenate([[last], times])) > 0):
+            raise BadInput(f"{serial}: t_s does not rise after {max(last, 0.0):.6f} s; send readings in order of time")
+        self._grow(self._n + n)
+        for name, values in given.items():
+            self._columns[name][self._n : self._n + n] = values
+        self._n += n
+
+    def recording(self) -> Recording:
+        """Return all readings so far; later ones do not change it."""
+        n = self._n
+        return Recording(self._info, {name: values[:n] for name, values in self._columns.items()} or _none(self._info))
+
+    def _grow(self, n: int) -> None:
+        room = len(self._columns["t_s"])
+        if n > room:
+            size = max(2 * room, n)
+            self._columns = {
+                name: np.concatenate([values[: self._n], np.zeros(size - self._n, dtype=values.dtype)])
+                for name, values in self._columns.items()
+            }
+
+
+def _type(name: str) -> type[np.generic]:
+    return np.int64 if name == "dataset" or holds_flags(name) else np.float64
+
+
+def _none(info: RecordingInfo) -> dict[str, NDArray[np.generic]]:
+    return {name: np.zeros(0, dtype=_type(name)) for name in needed(info)}
+
+
+#: A turn from 60 to 150 deg changes gravity's direction most surely; further, the path of a hand is any.
+GOOD_TURN_DEG = (60.0, 150.0)
+#: What a turn outside of that range is worth beside one inside.
+OTHER_TURN = 0.3
+
+
+def next_pose(covered: tuple[bool, ...], wanted: int, here: Array | None, needs: Array) -> Direction:
+    """Return the pose to ask for; `covered` says of each of DIRECTIONS whether a rest covers it.
+
+    `here` (3,) is gravity's direction in the last rest, None before the first; `needs` (3,) how much a turn about each
+    body axis would add. While some of the first `wanted` poses are missing it is one of them, else any.
+    """
+    missing = [place for place in range(wanted) if not covered[place]]
+    places = missing or list(range(len(DIRECTIONS)))
+    if here is None:
+        return DIRECTIONS[places[0]]
+    worth = [_worth(here, np.array(DIRECTIONS[place].up), needs) for place in places]
+    return DIRECTIONS[places[int(np.argmax(worth))]]
+
+
+def _worth(here: Array, there: Array, needs: Array) -> float:
+    axis, angle_deg = turn_between(here, there)
+    shared = float(np.sum(axis**2 * needs))
+    low, high = GOOD_TURN_DEG
+    return shared * (1.0 if low <= angle_deg <= high else OTHER_TURN) * min(angle_deg, 90.0)
+
+
+def needs_of_turns(up: NDArray[np.float64]) -> Array:
+    """Return how much a turn about each axis would add, (3,), before any fit: by the turns between rests (k, 3) so far.
+
+    An axis about which the unit has not turned yet comes first.
+    """
+    turned = np.zeros(3)
+    for before, after in pairwise(up):
+        axis, angle_deg = turn_between(before, after)
+        turned += axis**2 * angle_deg
+    return np.asarray(1.0 / (turned + 90.0))
+
 
 #: Poses that are named in one message.
 MOST_NAMED = 6

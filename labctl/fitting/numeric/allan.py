@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtri
+from scipy.special import chdtri, fdtrc
 
 from labctl.fitting.numeric.allan_bounds import is_filtered_white, largest_coefficients
 from labctl.fitting.numeric.allan_terms import (
@@ -31,8 +31,83 @@ from labctl.fitting.numeric.allan_terms import (
     likeliest_correlation,
 )
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.numeric.coarse_output import hiding_step
-from labctl.fitting.numeric.slow_trend import slow_trend
+
+# Slow trend of a record at rest: a warm-up or a drift that the beginning of a record holds and noise does not.
+#
+# Means of equal pieces of a record differ from one to the next. Of a random walk those differences are alike and
+# without order throughout; of a warm-up they are large at first and die away, of a ramp they have one sign. So
+# straight lines, parabolas and exponentials are fitted to the differences, and the best is believed when an F-test
+# asks for it.
+
+#: Pieces into which a record is divided.
+PIECES = 32
+#: Time constants of a warm-up that are tried, as shares of the record.
+SHARES = (0.03, 0.06, 0.12, 0.25, 0.5, 1.0)
+#: Probability at which noise without any trend is taken for one.
+FALSE_ALARM = 0.01
+
+
+def slow_trend(rate_dps: Array) -> Array | None:
+    """Return the trend of evenly spaced rates (n,), (n,) deg/s about 0; None where the record has none."""
+    size = len(rate_dps) // PIECES
+    if size < 2:
+        return None
+    steps = np.diff(rate_dps[: size * PIECES].reshape(PIECES, size).mean(axis=1))
+    if not np.any(steps):
+        return None
+    where = (np.arange(PIECES) + 0.5) * size / len(rate_dps)
+    laws = [np.column_stack([where, where**2, where**3])]
+    laws += [np.column_stack([where, np.exp(-where / share)]) for share in SHARES]
+    chances, fits = zip(*(_fit(np.diff(law, axis=0), steps) for law in laws), strict=True)
+    best = int(np.argmin(chances))
+    if chances[best] * len(laws) > FALSE_ALARM:
+        return None
+    at = np.arange(len(rate_dps)) / len(rate_dps)
+    columns = [at, at**2, at**3] if best == 0 else [at, np.exp(-at / SHARES[best - 1])]
+    trend = np.column_stack(columns) @ fits[best]
+    return np.asarray(trend - trend.mean())
+
+
+def _fit(design: NDArray[np.float64], steps: Array) -> tuple[float, Array]:
+    """Return the probability that random steps fit a design as well by chance, and its coefficients."""
+    coefficients, *_ = np.linalg.lstsq(design, steps)
+    left = float(np.sum((steps - design @ coefficients) ** 2))
+    k, freedom = design.shape[1], len(steps) - design.shape[1]
+    gained = max(float(steps @ steps) - left, 0.0)
+    return float(fdtrc(k, freedom, gained / k / max(left / freedom, 1e-300))), np.asarray(
+        coefficients, dtype=np.float64
+    )
+
+
+# Whether the steps of an output are larger than its noise, so that a record shows the steps and hides the noise.
+#
+# With a standard deviation of half a step or more in front of the converter, rounding adds step^2 / 12 and nothing else
+# (Widrow and Kollar, Quantization Noise, 2008). With less, the readings stay in one code or jump between two: they then
+# scatter by less or by more than the noise does, as the mean lies within a code or between two.
+
+#: A record is read in this many blocks of this many readings.
+BLOCKS, BLOCK = 200, 256
+#: Readings outside the two commonest codes of a block: Gaussian noise of 0.3 steps about a code has this share.
+OUTSIDE_SHARE = 0.05
+
+
+def hiding_step(readings: Array) -> float | None:
+    """Return the step of readings (n,), in their unit, where it hides their noise; None where it does not."""
+    size = min(BLOCK, len(readings))
+    starts = np.unique(np.linspace(0, len(readings) - size, BLOCKS).astype(np.int64))
+    outside, step = [], np.inf
+    for start in starts:
+        codes, counts = np.unique(readings[start : start + size], return_counts=True)
+        outside.append(1.0 - float(np.sort(counts)[-2:].sum()) / size)
+        if len(codes) > 1:
+            step = min(step, float(np.diff(codes).min()))
+    if not np.mean(outside) < OUTSIDE_SHARE:
+        return None
+    if np.isfinite(step):
+        return step
+    codes = np.unique(readings)  # no block has two codes
+    return float(np.diff(codes).min()) if len(codes) > 1 else None
+
 
 #: Fewer readings than this say nothing about noise.
 LEAST_READINGS = 300

@@ -25,7 +25,9 @@ def move_covariance(
     """
     m, rests = len(moves), len(accelerometer.up)
     before, after = moves.before, moves.before + 1
-    tilt = _by_reading(moves, accelerometer, equations)
+    level = level_by_reading(accelerometer)
+    by_level = _by_levels(equations)
+    tilt = by_level[0] @ level[before], by_level[1] @ level[after]
     by_rest = np.zeros((m, 2, rests, 6))
     rows = np.arange(m)
     by_rest[rows, :, before, :3] = tilt[0] * accelerometer.u_rest_g[before][:, None, None]
@@ -38,48 +40,50 @@ def move_covariance(
     by_rest[rows, :, before, 3:] += turned[0] * u_bias[before][:, None, :]
     by_rest[rows, :, after, 3:] += turned[1] * u_bias[after][:, None, :]
     shared = by_rest.reshape(2 * m, -1)
-    common = _by_parameters(moves, accelerometer, tilt)
+    common = by_accelerometer(moves, accelerometer, equations)
     total = shared @ shared.T + common @ accelerometer.covariance @ common.T
-    own = _of_each_move(moves, equations, readings_u)
+    own = of_each_move(moves, equations.rotations.white, equations.by_turn, readings_u)
     for k in range(m):
         total[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] += own[k]
     return np.asarray(total)
 
 
-def _by_reading(
-    moves: Moves, accelerometer: Accelerometer, equations: Equations
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the derivative (m, 2, 3) of the equations by the accelerometer's mean in the rest before and after."""
+def level_by_reading(accelerometer: Accelerometer) -> NDArray[np.float64]:
+    """Return the derivative (k, 3, 3) of the directions of gravity in k rests by the accelerometer's means."""
     inverse = np.linalg.inv(np.eye(3) + accelerometer.errors) / accelerometer.gravity_g
     up = accelerometer.up
-    level = np.eye(3) - up[:, :, None] * up[:, None, :]  # only what is square to gravity changes its direction
-    back = equations.rotations.matrix.transpose(0, 2, 1)
-    before = equations.across @ back @ level[moves.before] @ inverse
-    after = -equations.across @ level[moves.before + 1] @ inverse
-    return before, after
+    # only what is square to gravity changes its direction
+    return np.asarray((np.eye(3) - up[:, :, None] * up[:, None, :]) @ inverse)
 
 
-def _by_parameters(
-    moves: Moves, accelerometer: Accelerometer, tilt: tuple[NDArray[np.float64], NDArray[np.float64]]
-) -> NDArray[np.float64]:
-    """Return the derivative (2m, 9) of the equations by the accelerometer's bias and errors."""
-    found = []
-    for by_reading, rest in zip(tilt, (moves.before, moves.before + 1), strict=True):
-        force = accelerometer.up[rest] * accelerometer.gravity_g
-        parts = [-by_reading, *(-by_reading[:, :, i, None] * force[:, None, j, None] for i, j in UPPER)]
-        found.append(np.concatenate(parts, axis=2))
-    return np.asarray(found[0] + found[1]).reshape(-1, 9)
+def level_by_parameters(accelerometer: Accelerometer) -> NDArray[np.float64]:
+    """Return the derivative (k, 3, 9) of the directions of gravity in k rests by the nine parameters."""
+    by_reading = level_by_reading(accelerometer)
+    force = accelerometer.up * accelerometer.gravity_g
+    parts = [-by_reading, *(-by_reading[:, :, i, None] * force[:, None, j, None] for i, j in UPPER)]
+    return np.concatenate(parts, axis=2)
+
+
+def _by_levels(equations: Equations) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the derivative (m, 2, 3) of the equations by the direction of gravity in the rest before and after."""
+    return equations.across @ equations.rotations.matrix.transpose(0, 2, 1), -equations.across
 
 
 def by_accelerometer(moves: Moves, accelerometer: Accelerometer, equations: Equations) -> NDArray[np.float64]:
     """Return the derivative (2m, 9) of the equations of m moves by the accelerometer's bias and errors."""
-    return _by_parameters(moves, accelerometer, _by_reading(moves, accelerometer, equations))
+    level, (before, after) = level_by_parameters(accelerometer), _by_levels(equations)
+    return np.asarray(before @ level[moves.before] + after @ level[moves.before + 1]).reshape(-1, 9)
 
 
-def _of_each_move(moves: Moves, equations: Equations, readings_u: Array) -> NDArray[np.float64]:
-    """Return the covariance (m, 2, 2) of what no two moves share."""
-    white = np.einsum("mab,mca,mdb->mcd", equations.rotations.white, equations.by_turn, equations.by_turn)
-    noise = white * float(np.mean(moves.density)) * np.radians(1.0) ** 2
+def of_each_move(
+    moves: Moves, white: NDArray[np.float64], by_turn: NDArray[np.float64], readings_u: Array
+) -> NDArray[np.float64]:
+    """Return the covariance (m, 2, 2) of what no two of m moves share.
+
+    `white` (m, 3, 3) is that of `Rotations`, `by_turn` (m, 2, 3) the derivative of their equations by a small rotation.
+    """
+    noise = np.einsum("mab,mca,mdb->mcd", white, by_turn, by_turn)
+    noise = noise * float(np.mean(moves.density)) * np.radians(1.0) ** 2
     return np.asarray(noise + readings_u[:, None, None] ** 2 * np.eye(2))
 
 

@@ -79,7 +79,7 @@ def solve(readings: PoseReadings) -> Solved:
     readings_u = of_readings(moves, bias)
     noise = move_covariance(moves, accelerometer, bias, start, readings_u)
     require_determined(readings.info.serial, moves, start, noise)
-    gyro = fit_gyroscope(moves, accelerometer, bias, readings_u)
+    gyro = fit_gyroscope(moves, accelerometer, bias, readings_u, rests.accel_white_var.mean(axis=1))
     require_determined(readings.info.serial, moves.take(gyro.used), gyro.equations.take(gyro.used), gyro.total_of_used)
     return Solved(rests, accelerometer, bias, every, moves, gyro)
 

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.poses.at_rest.accelerometer import Accelerometer
+from labctl.fitting.poses.at_rest.accelerometer import PARAMETERS, Accelerometer
 from labctl.fitting.poses.at_rest.bias import Bias
-from labctl.fitting.poses.between import between_variance, gls
+from labctl.fitting.poses.between import components, gls
 from labctl.fitting.poses.covariance import move_covariance
 from labctl.fitting.poses.determination import LEAST_MOVES
 from labctl.fitting.poses.equations import Equations, equations_of
@@ -20,6 +20,8 @@ from labctl.fitting.poses.moves import Moves
 
 #: Steps of the search, and the change of a coefficient at which it ends.
 STEPS, SMALL = 30, 1e-10
+#: Below this change the variances of the noise are kept: the search ends at the solution with them.
+SETTLED = 1e-5
 #: A good move is taken for a wrong one with this probability.
 FALSE_ALARM = 1e-4
 #: Median of chi squared with two degrees of freedom.
@@ -36,7 +38,7 @@ class Gyroscope:
     covariance: NDArray[np.float64]  #: (9, 9) of E, row after row
     equations: Equations  #: of all m moves at the solution
     noise: NDArray[np.float64]  #: (2m, 2m) covariance of the residuals by what is known, rad^2
-    extra_rad: float  #: standard deviation of a component beyond that, Mandel and Paule
+    extra_rad: float  #: standard deviation of a component beyond that
     used: NDArray[np.bool_]  #: (m,) moves that agree with the others
     held_out: HeldOut  #: of all m moves, each by the used ones without it
 
@@ -47,16 +49,20 @@ class Gyroscope:
         return np.asarray((self.noise + self.extra_rad**2 * np.eye(len(self.noise)))[np.ix_(rows, rows)])
 
 
-def fit_gyroscope(moves: Moves, accelerometer: Accelerometer, bias: Bias, readings_u: Array) -> Gyroscope:
+def fit_gyroscope(
+    moves: Moves, accelerometer: Accelerometer, bias: Bias, readings_u: Array, white_g2: Array
+) -> Gyroscope:
     """Fit the nine errors by generalised least squares, without the moves that do not agree with the others.
 
-    The moves must determine them (`determination`). `readings_u` (m,) is what `of_readings` gives, rad.
+    The moves must determine them (`determination`). `readings_u` (m,) is what `of_readings` gives, rad; `white_g2`
+    (k,) the variance of a component of each rest's mean by the noise of its readings.
     """
+    noises = _Noises(moves, accelerometer, bias, readings_u, white_g2)
     errors = _robust_start(moves, accelerometer, bias)
     used = np.ones(len(moves), dtype=np.bool_)
     seen: list[bytes] = []
     for turn in range(ROUNDS):
-        equations, noise, extra, errors = _solved(moves, accelerometer, bias, readings_u, errors, used, first=turn == 0)
+        equations, noise, extra, errors = _solved(noises, errors, used, first=turn == 0)
         held_out = held_out_moves(equations, noise + extra * np.eye(len(noise)), used)
         agrees = held_out.chi2 <= chdtri(2, FALSE_ALARM)
         if turn > 0 and (np.array_equal(agrees, used) or agrees.tobytes() in seen):
@@ -68,31 +74,81 @@ def fit_gyroscope(moves: Moves, accelerometer: Accelerometer, bias: Bias, readin
     _, covariance = gls(
         equations.jacobian[rows], equations.residual[rows], (noise + extra * np.eye(len(noise)))[np.ix_(rows, rows)]
     )
+    # the scale of the noise is itself estimated: u of a t distribution (JCGM 101:2008, 6.4.9.4)
+    freedom = np.count_nonzero(accelerometer.used) - PARAMETERS + np.count_nonzero(rows) - equations.jacobian.shape[1]
+    covariance *= freedom / (freedom - 2)
     return Gyroscope(errors, covariance, equations, noise, float(np.sqrt(extra)), used, held_out)
 
 
+@dataclass(frozen=True)
+class _Noises:
+    """What the noise of the equations of m moves depends on."""
+
+    moves: Moves
+    accelerometer: Accelerometer
+    bias: Bias
+    readings_u: Array  #: (m,) rad
+    white_g2: Array  #: (k,)
+
+    def equations(self, errors: NDArray[np.float64]) -> Equations:
+        return equations_of(self.moves, self.accelerometer, self.bias, errors)
+
+    def total(self, equations: Equations, pose_g2: float | None = None) -> NDArray[np.float64]:
+        """Return the covariance (2m, 2m) with a variance of each pose beyond the noise; None: that of the sizes."""
+        accelerometer = self.accelerometer
+        if pose_g2 is not None:
+            accelerometer = replace(accelerometer, u_rest_g=np.sqrt(self.white_g2 + pose_g2))
+        return move_covariance(self.moves, accelerometer, self.bias, equations, self.readings_u)
+
+    def variances(self, equations: Equations, rows: NDArray[np.bool_]) -> tuple[float, float]:
+        """Return the variance of a pose beyond the noise, g^2, and that of an equation beyond all, rad^2.
+
+        The scatter of the rests' sizes tells the first, with k - 9 degrees of freedom; what it makes of the directions
+        of gravity the moves tell too, with 2m - 9. By the sizes alone an estimate that came out large stays in every
+        equation while one that came out small is made up for by the second variance: on average that is too much.
+        """
+        found = self.accelerometer
+        k = int(np.count_nonzero(found.used))
+        freedom = k - PARAMETERS
+        white, scatter = float(self.white_g2[found.used].mean()), found.residual_g**2 * k
+        typical = float(self.white_g2.mean())
+
+        def sizes(pose_g2: float) -> float:
+            variance = white + pose_g2
+            return (freedom * np.log(variance) + scatter / variance) / 2
+
+        known = self.total(equations, 0.0)
+        by_pose = (self.total(equations, typical) - known) / typical
+        both = np.ix_(rows, rows)
+        start = max(scatter / max(freedom, 1) - white, white)
+        return components(equations.jacobian[rows], equations.residual[rows], known[both], by_pose[both], sizes, start)
+
+
 def _solved(
-    moves: Moves, accelerometer: Accelerometer, bias: Bias, readings_u: Array, errors: NDArray[np.float64],
-    used: NDArray[np.bool_], *, first: bool,
-) -> tuple[Equations, NDArray[np.float64], float, NDArray[np.float64]]:  # fmt: skip
+    noises: _Noises, errors: NDArray[np.float64], used: NDArray[np.bool_], *, first: bool
+) -> tuple[Equations, NDArray[np.float64], float, NDArray[np.float64]]:
     """Return equations, known noise, variance beyond it and errors (3, 3) at the solution over the used moves.
 
     At first that variance is a robust one: wrong moves are still among the used.
     """
     rows = np.repeat(used, 2)
+    change, pose_g2, extra = np.inf, 0.0, 0.0
     for _ in range(STEPS):
-        equations = equations_of(moves, accelerometer, bias, errors)
-        noise = move_covariance(moves, accelerometer, bias, equations, readings_u)
-        here = noise[np.ix_(rows, rows)]
+        equations = noises.equations(errors)
         if first:
+            noise = noises.total(equations)
             extra = _robust_variance(equations, noise)
         else:
-            extra = between_variance(equations.jacobian[rows], equations.residual[rows], here)
+            if change > SETTLED:
+                pose_g2, extra = noises.variances(equations, rows)
+            noise = noises.total(equations, pose_g2)
+        here = noise[np.ix_(rows, rows)]
         step, _ = gls(equations.jacobian[rows], equations.residual[rows], here + extra * np.eye(len(here)))
         if first:
             break
         errors = errors - step.reshape(3, 3)
-        if float(np.abs(step).max()) < SMALL:
+        change = float(np.abs(step).max())
+        if change < SMALL:
             break
     return equations, noise, extra, errors
 

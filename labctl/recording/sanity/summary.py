@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,9 +20,127 @@ from labctl.recording.points import dataset_starts, temperature_of
 from labctl.recording.positions import Position
 from labctl.recording.quantisation import codes_of
 from labctl.recording.recording import Columns, Recording
-from labctl.recording.sanity.blocks import NO_CHANGE, level_change, noise_of_reading, wander
-from labctl.recording.sanity.profile import lag_of, stretches
 from labctl.recording.verification import is_marked
+
+#: Blocks of a data set between which its level is compared, and readings that one block needs.
+LEVEL_BLOCKS, LEAST_PER_BLOCK, LEAST_BLOCKS = 16, 2, 8
+#: A change of level is sudden where the blocks on either side scatter by less than this many noises of a block's
+#: mean, or than this share of the change: a creeping output does not.
+STILL_NOISES, STILL_SHARE = 3.0, 0.01
+#: A change of level is this many times the scatter on either side.
+CHANGE_RATIO = 8.0
+#: Blocks over which an output at rest may wander, and the decays, in blocks, that count as start-up.
+WANDER_BLOCKS, DECAYS = 32, (1.0, 4.0)
+
+
+class Change(NamedTuple):
+    """A sudden change of level within a data set: how large, deg/s, and at which of its readings."""
+
+    size: float
+    row: int
+
+
+NO_CHANGE = Change(0.0, -1)
+
+
+def noise_of_reading(values: NDArray[np.float64]) -> float:
+    """Return the standard deviation of one reading of (n,) from successive differences; level changes do not count."""
+    if len(values) < 2:
+        return 0.0
+    steps = np.abs(np.diff(values))
+    robust = 1.4826 * float(np.median(steps))
+    return (robust if robust > 0 else float(np.sqrt(np.mean(np.minimum(steps, _usual_step(steps)) ** 2)))) / np.sqrt(2)
+
+
+def _usual_step(steps: NDArray[np.float64]) -> float:
+    return float(np.median(steps[steps > 0])) if np.any(steps > 0) else 0.0
+
+
+def block_means(values: NDArray[np.float64], blocks: int) -> NDArray[np.float64]:
+    """Return the means of (n,) values in `blocks` pieces of nearly equal length, (blocks,)."""
+    edges = np.linspace(0, len(values), blocks + 1).astype(np.int64)
+    return np.asarray(np.add.reduceat(values, edges[:-1]) / np.diff(edges))
+
+
+def level_change(values: NDArray[np.float64], noise: float) -> Change:
+    """Return the largest sudden change of level of readings (n,); none where they creep, wander or stay.
+
+    The block in which the change falls is left out. The first block alone is no level: a unit may creep to its rate.
+    """
+    blocks = min(LEVEL_BLOCKS, len(values) // LEAST_PER_BLOCK)
+    if blocks < LEAST_BLOCKS:
+        return NO_CHANGE
+    means = block_means(values, blocks)
+    noise_of_block = noise / np.sqrt(len(values) / blocks)
+    at = np.arange(2, blocks)
+    left, right = np.concatenate([at, at[:-1]]), np.concatenate([at, at[:-1] + 1])  # with and without a block between
+    sums, squares = (np.concatenate([[0.0], np.cumsum((means - means[0]) ** power)]) for power in (1, 2))
+    after = blocks - right
+    low, high = sums[left] / left, (sums[-1] - sums[right]) / after
+    scatter = squares[left] - left * low**2 + squares[-1] - squares[right] - after * high**2
+    rests = np.sqrt(np.maximum(scatter, 0.0) / (left + after - 2))
+    k = int(np.argmin(rests))
+    best_rest = float(rests[k])
+    best = Change(float(high[k] - low[k]), int((left[k] + right[k]) / 2 * len(values) / blocks))
+    still = best_rest <= max(STILL_NOISES * noise_of_block, STILL_SHARE * abs(best.size))
+    large = abs(best.size) > CHANGE_RATIO * max(best_rest, noise_of_block)
+    return best if still and large else NO_CHANGE
+
+
+def wander(values: NDArray[np.float64], temperature_c: NDArray[np.float64] | None, noise: float) -> float:
+    """Return the root mean square by which block means of readings (n,) move, beyond what noise explains.
+
+    A cubic in time and in temperature, and decays after the start, do not count: those are drift.
+    """
+    blocks = min(WANDER_BLOCKS, len(values) // LEAST_PER_BLOCK)
+    if blocks < WANDER_BLOCKS // 2:
+        return 0.0
+    means = block_means(values, blocks)
+    at = np.linspace(-1.0, 1.0, blocks)
+    columns = [at**power for power in range(4)] + [np.exp(-np.arange(blocks) / decay) for decay in DECAYS]
+    if temperature_c is not None:
+        warm = block_means(temperature_c, blocks)
+        span = float(np.ptp(warm))
+        if span > 0.1:
+            columns += [((warm - warm.mean()) / span) ** power for power in (1, 2, 3)]
+    design = np.column_stack(columns)
+    q, _ = np.linalg.qr(design)
+    left = means - q @ (q.T @ means)
+    square = float(np.sum(left**2)) / (blocks - design.shape[1])
+    return float(np.sqrt(max(square - noise**2 * blocks / len(values), 0.0)))
+
+
+#: Stretches of a data set that are inspected, and readings of each.
+STRETCHES, READINGS = 500, 4
+#: An output may be late by this long, s, and this many readings early.
+LATEST_S, EARLIEST = 0.25, 10
+#: The shortest lag is taken at which output and rate agree to this share of their best agreement.
+NEARLY = 0.95
+
+
+def stretches(n: int) -> list[slice]:
+    """Return evenly spread stretches of n readings, all of them where they are few."""
+    number = max(min(STRETCHES, n // READINGS), 1)
+    begins = np.linspace(0, max(n - READINGS, 0), number).astype(np.int64)
+    return [slice(int(begin), int(min(begin + READINGS, n))) for begin in begins]
+
+
+def lag_of(rate_dps: NDArray[np.float64], output: NDArray[np.float64], step_s: float) -> int:
+    """Return by how many readings an output (n,) is late against the rate (n,); it may have the other sign.
+
+    A delay must not look like a wrong sign or scale: at 10 Hz 50 ms are half a period.
+    """
+    n = len(rate_dps)
+    rate, values = rate_dps - rate_dps.mean(), output - output.mean()
+    if n < 4 * READINGS or not np.any(rate) or not np.any(values):
+        return 0
+    latest = int(min(LATEST_S / max(step_s, 1e-9), n // 4))
+    lags = np.arange(-min(EARLIEST, n // 4), latest + 1)
+    spectrum = np.fft.rfft(values, 2 * n) * np.fft.rfft(rate, 2 * n).conj()
+    agree = np.abs(np.fft.irfft(spectrum, 2 * n)[lags])  # by lag: a negative one counts from the end
+    good = lags[agree >= NEARLY * agree.max()]
+    return int(good[np.argmin(np.abs(good))])
+
 
 #: Time steps longer than this many usual ones, and than so many seconds, are a gap.
 GAP_STEPS, GAP_S = 5.0, 0.5

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import tempfile
 import tomllib
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -64,7 +66,8 @@ def check_description(
     """Check a description, and try it on a serial port or on a host (HOST:PORT); `done` is called after each request.
 
     Without an address nothing is sent, and the answer lists the requests. `move` also sends the commands;
-    `wire_log` is the file that gets every byte. Raises BadInput for a description or an address that is none.
+    `wire_log` is the file that gets every byte; without it, a file in the folder for temporary files is kept where a
+    request failed. Raises BadInput for a description or an address that is none.
     """
     description = read_description(source)
     address = _address(port, host)
@@ -73,17 +76,35 @@ def check_description(
         raise BadInput("--move needs an instrument to move; add --port or --host")
     if address is None and wire_log is not None:
         raise BadInput(f"--wire-log {wire_log}: nothing is sent without an instrument; add --port or --host")
+    is_own = address is not None and wire_log is None
+    file = _temporary_log() if is_own else wire_log
+    keep = False
     try:
-        for each in _found(description, address, clock or SystemClock(), move=move, wire_log=wire_log):
+        for each in _found(description, address, clock or SystemClock(), move=move, wire_log=file):
             checks.append(each)
             if done is not None:
                 done(each)
+        keep = any(each.problem for each in checks)
     except ValidationError as error:
         raise BadInput(f"description {source}: {error.errors()[0]['msg']}; correct the address or the file") from error
+    finally:
+        if is_own and file is not None and not keep:
+            file.unlink(missing_ok=True)
+            file = None
     return DescriptionTestResponse(
         file=source, name=description.name, kind=description.kind, address=port or host,
-        ok=not any(each.problem for each in checks), checks=checks,
+        ok=not any(each.problem for each in checks), checks=checks, wire_log=None if file is None else str(file),
     )  # fmt: skip
+
+
+def _temporary_log() -> Path | None:
+    """Return a new file for a wire log; None where there is no place for one, which is no reason to try nothing."""
+    try:
+        handle, name = tempfile.mkstemp(prefix="labctl-driver-test-", suffix=".jsonl.gz")
+    except OSError:
+        return None
+    os.close(handle)
+    return Path(name)
 
 
 def _found(

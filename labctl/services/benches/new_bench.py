@@ -12,8 +12,7 @@ from pydantic import ValidationError
 
 from instruments.bench_config import BenchFile, shipped_benches
 from instruments.clock import Clock, SystemClock, WallClock
-from instruments.discovery.find import Found, ask_itself, find_on_host, find_on_port
-from instruments.discovery.ports import PortInfo, port_info, serial_ports
+from instruments.discovery import Found, PortInfo, ask_itself, find_on_host, find_on_port, port_info, serial_ports
 from instruments.drivers.resolution import resolve
 from labctl.errors import BadInput
 from labctl.services.schemas.benches import FoundResponse, NewBenchRequest, NewBenchResponse

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict
 
-from instruments.discovery.ports import serial_ports
+from instruments.discovery import serial_ports
 from labctl.services.schemas.benches import PortResponse
 
 

@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from datetime import date, datetime
 
-from labctl.calibration import build_calibration, read_calibration
+from labctl.calibration import Calibration, build_calibration, read_calibration
 from labctl.fitting import fit
 from labctl.fitting.effects.response import IDS
+from labctl.fitting.models.memory import split_memory
 from labctl.fitting.uncertainty import evidence_of
 from labctl.json_types.kept_answers import KeptFit
 from labctl.recording.info import REFERENCES, RecordingInfo
 from labctl.services.calibrations.certification import certification_response, version_in_force
 from labctl.services.calibrations.comparison import worse_than_raw
 from labctl.services.calibrations.next_version import keep_next_version
-from labctl.services.calibrations.remembered import remembered_by
 from labctl.services.criticism.measurements import measurements_of
 from labctl.services.fixed_coefficients import fixed_of
 from labctl.services.recordings.inspection import refuse_wrong
@@ -23,11 +23,27 @@ from labctl.services.schemas.calibrations import (
     CalibrationRow,
     FitRequest,
     FitResponse,
+    Follower,
     ImprovedVersionResponse,
     VersionResponse,
 )
 from labctl.services.standards.usage import Notices
 from labctl.store import NewCalibration, RecordingRow, Store
+
+
+def remembered_by(calibration: Calibration) -> list[Follower]:
+    """Return the elements that follow the temperature in the use of a version; none of one without memory."""
+    _, memory = split_memory(calibration.fitted, calibration.axes)
+    return [
+        Follower(
+            kind=each.kind, parameter=each.parameter, unit="s" if each.kind == "lag" else "K",
+            cooling_s=each.cooling_s, is_curved=each.part == "curved",
+            reference_c=each.reference_c if each.part == "curved" else None,
+            size=dict(zip(calibration.axes, each.size.tolist(), strict=True)),
+            scale=None if each.scale is None else dict(zip(calibration.axes, each.scale.tolist(), strict=True)),
+        )
+        for each in (memory.followers if memory is not None else ())
+    ]  # fmt: skip
 
 
 def fit_unit(store: Store, serial: str, request: FitRequest, at: datetime, *, is_draft: bool = False) -> FitResponse:

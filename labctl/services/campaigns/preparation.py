@@ -165,7 +165,7 @@ def prepare(
     try:
         with attending(clock):
             identities = _identities(bench, clock)
-        plan = make_plan(recipe, BenchLimits.of(bench, needs_person=bench_file.needs_person), clip=clip)
+        plan = make_plan(recipe, _limits(bench, bench_file), clip=clip)
         bench_file = _with_reported(store, bench_file, identities)
         standards = as_used(store, standards_of(bench_file), today)
         units = _units(bench, identities, bench_file, clock, recipe, standards)
@@ -187,6 +187,10 @@ def prepare(
     except BaseException:
         bench.close()
         raise
+
+
+def _limits(bench: Bench, file: BenchFile) -> BenchLimits:
+    return BenchLimits.of(bench, needs_person=file.needs_person, air_tau_s=file.air_tau_s)
 
 
 def _log_planned(number: int, bench: BenchFile, plan: Plan, units: tuple[NewUnit, ...]) -> None:

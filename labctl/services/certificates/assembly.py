@@ -31,10 +31,28 @@ from labctl.services.certificates.facts import Facts
 from labctl.services.certificates.found import Found
 from labctl.services.certificates.missing import MissingFacts
 from labctl.services.certificates.stability import stability_until, until
-from labctl.services.certificates.statements import statements
 from labctl.services.criticism.measurements import Measurements
 from labctl.services.schemas.documents.certificates import CertificateRequest
 from labctl.store import CertificateRow, CertificationRow, Store
+
+ITEM_ONLY = "The results relate only to the item that is identified here, in the condition in which it was received."
+WHOLE = "This certificate may be reproduced only in full, unless the laboratory has agreed otherwise in writing."
+BY_CUSTOMER = "Customer, order number and the customer's own number of the item were stated by the customer."
+TRACEABLE = (
+    "The results are metrologically traceable to the SI through the reference standards that are listed, whose "
+    "uncertainties enter the uncertainty that is stated."
+)
+NOISE = "The noise of a single reading is not contained in the uncertainty."
+SIMULATED = (
+    "SPECIMEN: instruments of the bench are simulated. This document has no metrological value and is no certificate."
+)
+
+
+def statements(facts: Facts) -> tuple[str, ...]:
+    """Return the statements in order; of a simulated bench that it is simulated first, and none on traceability."""
+    found = [ITEM_ONLY, TRACEABLE, NOISE, BY_CUSTOMER, WHOLE]
+    return (SIMULATED, *found[:1], *found[2:]) if facts.simulated else tuple(found)
+
 
 NONE = "None."
 

@@ -3,18 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from datetime import datetime
 from functools import cached_property
-from typing import Protocol
+from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
 from instruments.bench_config import BenchFile
 from instruments.clock import Clock
-from labctl.services.commands.requests import CampaignResume, CampaignStart, ToBench, ToCampaign
-from labctl.services.schemas.benches import BenchCheckResponse, CheckRequest
-from labctl.services.schemas.campaigns import CampaignResponse, ConfirmRequest, ReasonRequest
+from labctl.services.commands.requests import CampaignResume, CampaignStart
+from labctl.services.schemas.base import ResponseModel
+from labctl.services.schemas.benches import BenchCheckResponse
+from labctl.services.schemas.campaigns import CampaignResponse
 from labctl.services.schemas.live import LiveEndRequest, LiveRequest, LiveStateResponse
 from labctl.services.schemas.schedule import ScheduledResponse
 from labctl.store import Store
+
+if TYPE_CHECKING:
+    from labctl.services.campaigns.bench_runner import BenchRunner
+
+#: How long a web process waits for an act that only writes, s: the engine may have the writing connection for a moment.
+WRITES_S = 30.0
+#: The same for one that opens a bench: every instrument is asked.
+OPENS_BENCH_S = 180.0
+
+RequestT = TypeVar("RequestT")
+ResponseT = TypeVar("ResponseT", bound=ResponseModel)
 
 
 class CommandContext:
@@ -36,46 +49,14 @@ class CommandContext:
 
 
 class CampaignControl(Protocol):
-    """Control over campaigns, by the process that executes the command."""
+    """Control over benches and their campaigns, by the process that executes the command."""
 
     def bench_of(self, asked: CampaignStart, /) -> BenchFile:
         """Return the bench that a start is for. Raises Conflict where the service has none."""
         ...
 
-    def start(self, context: CommandContext, asked: CampaignStart, /) -> CampaignResponse:
-        """Start a campaign now."""
-        ...
-
-    def schedule(self, context: CommandContext, asked: CampaignStart, /) -> ScheduledResponse:
-        """Enter a campaign into the schedule."""
-        ...
-
-    def resume(self, context: CommandContext, asked: CampaignResume, /) -> CampaignResponse:
-        """Continue a paused campaign, or resume an interrupted one."""
-        ...
-
-    def pause(self, context: CommandContext, asked: ToCampaign[ReasonRequest], /) -> CampaignResponse:
-        """Ask a running campaign to hold after the present data set."""
-        ...
-
-    def abort(self, context: CommandContext, asked: ToCampaign[ReasonRequest], /) -> CampaignResponse:
-        """End a campaign now, in the safe state."""
-        ...
-
-    def confirm(self, context: CommandContext, asked: ToCampaign[ConfirmRequest], /) -> CampaignResponse:
-        """Answer the question that a campaign waits for. Raises StalePrompt for another one."""
-        ...
-
-    def check(self, context: CommandContext, asked: ToBench[CheckRequest], /) -> BenchCheckResponse:
-        """Ask every instrument of a bench what it is and how it does; nothing moves."""
-        ...
-
-    def start_live(self, context: CommandContext, asked: LiveRequest, /) -> LiveStateResponse:
-        """Begin a live calibration."""
-        ...
-
-    def end_live(self, context: CommandContext, asked: LiveEndRequest, /) -> LiveStateResponse:
-        """End the live calibration that runs."""
+    def perform(self, act: BenchAct[RequestT, ResponseT], context: CommandContext, asked: RequestT, /) -> ResponseT:
+        """Have an act carried out by the process that has the bench. Raises LabctlError."""
         ...
 
 
@@ -89,3 +70,58 @@ class LiveControl(Protocol):
     def end(self, request: LiveEndRequest) -> LiveStateResponse:
         """End the one that runs."""
         ...
+
+
+class ServiceBench(Protocol):
+    """What an act may use in a service: the runner of its bench, where it has one, and its live calibrations."""
+
+    @property
+    def runner(self) -> BenchRunner | None:
+        """The runner; None: this service has no bench."""
+        ...
+
+    def bench_runner(self) -> BenchRunner:
+        """Return the runner. Raises Conflict without one."""
+        ...
+
+    def live_control(self) -> LiveControl:
+        """Return the control over live calibrations. Raises Conflict in a process that does not drive the bench."""
+        ...
+
+    def record(self, context: CommandContext, action: str, campaign: int, reason: str) -> None:
+        """Write an act on a campaign into the log and the audit trail."""
+        ...
+
+
+class Foreground(Protocol):
+    """What an act may use in a process without a service: a campaign runs here and now, until it is over."""
+
+    def run(self, asked: CampaignStart) -> CampaignResponse:
+        """Run a campaign."""
+        ...
+
+    def run_on(self, asked: CampaignResume) -> CampaignResponse:
+        """Resume a campaign and run it."""
+        ...
+
+    def schedule(self, context: CommandContext, asked: CampaignStart) -> ScheduledResponse:
+        """Enter a campaign into the schedule of a bench."""
+        ...
+
+    def check(self, bench: str) -> BenchCheckResponse:
+        """Check a bench by its file or its shipped name."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class BenchAct(Generic[RequestT, ResponseT]):
+    """Something that a person has a bench do."""
+
+    name: str  #: in calls between processes and in the audit trail
+    in_service: Callable[[ServiceBench, CommandContext, RequestT], ResponseT]  #: in the process that has the bench
+    in_foreground: Callable[[Foreground, CommandContext, RequestT], ResponseT]  #: where no service runs
+    wait_s: float = WRITES_S  #: how long another process of the service waits for it
+
+    def execute(self, context: CommandContext, asked: RequestT) -> ResponseT:
+        """Have it carried out by whoever controls the bench. Raises LabctlError."""
+        return context.control.perform(self, context, asked)

@@ -8,19 +8,17 @@ from dataclasses import dataclass
 
 from instruments.bench_config import BenchFile
 from instruments.clock import SystemClock
-from labctl.errors import BadInput, Conflict
+from labctl.errors import BadInput
 from labctl.services.benches.check import check_bench
 from labctl.services.campaigns.execution import AskClear, Attend, Observe, run_here
 from labctl.services.campaigns.resume import resume_here
-from labctl.services.campaigns.unattended import abort_abandoned, not_running
-from labctl.services.commands.context import CommandContext
-from labctl.services.commands.requests import CampaignResume, CampaignStart, ToBench, ToCampaign
+from labctl.services.commands.context import BenchAct, CommandContext, RequestT, ResponseT
+from labctl.services.commands.requests import CampaignResume, CampaignStart
 from labctl.services.drafts.answers import with_drafts
 from labctl.services.planning.loading import bench_for, load_bench, load_recipe
 from labctl.services.schedule import queue
-from labctl.services.schemas.benches import BenchCheckResponse, CheckRequest
-from labctl.services.schemas.campaigns import CampaignResponse, ConfirmRequest, ReasonRequest, StartRequest
-from labctl.services.schemas.live import LiveEndRequest, LiveRequest, LiveStateResponse
+from labctl.services.schemas.benches import BenchCheckResponse
+from labctl.services.schemas.campaigns import CampaignResponse, StartRequest
 from labctl.services.schemas.reports.drafts import DraftsRequest
 from labctl.services.schemas.schedule import ScheduledResponse
 from labctl.store import open_store
@@ -58,7 +56,11 @@ class ForegroundControl:
         """Return the bench that a start names, or the shipped one that fits its recipe."""
         return load_bench(asked.bench or bench_for(load_recipe(asked.body.recipe)))
 
-    def start(self, _: CommandContext, asked: CampaignStart) -> CampaignResponse:
+    def perform(self, act: BenchAct[RequestT, ResponseT], context: CommandContext, asked: RequestT) -> ResponseT:
+        """Carry out an act in this process."""
+        return act.in_foreground(self, context, asked)
+
+    def run(self, asked: CampaignStart) -> CampaignResponse:
         """Run a campaign in this process until it is over."""
         request = StartRequest(
             recipe=asked.body.recipe, bench=asked.bench, clip=asked.body.clip, hide=asked.body.hide, fit=asked.body.fit,
@@ -103,7 +105,7 @@ class ForegroundControl:
         note = "; ".join(filter(None, (queue.NO_SERVICE.format(bench=bench.name), answer.note)))
         return answer.model_copy(update={"note": note})
 
-    def resume(self, _: CommandContext, asked: CampaignResume) -> CampaignResponse:
+    def run_on(self, asked: CampaignResume) -> CampaignResponse:
         """Resume a campaign in this process and run it until it is over."""
         with self._open_terminal() as terminal:
             answer = resume_here(
@@ -112,26 +114,6 @@ class ForegroundControl:
             )  # fmt: skip
         return self._with_drafts(answer)
 
-    def pause(self, context: CommandContext, asked: ToCampaign[ReasonRequest]) -> CampaignResponse:
-        """Raise Conflict: a campaign that this process could pause would hold the database."""
-        raise not_running(context.store, asked.campaign, f"pause it ({asked.body.reason})")
-
-    def abort(self, context: CommandContext, asked: ToCampaign[ReasonRequest]) -> CampaignResponse:
-        """Close a campaign that no process runs any more; one that runs would hold the database."""
-        return abort_abandoned(context.store, asked.campaign, asked.body.text, context.now())
-
-    def confirm(self, context: CommandContext, asked: ToCampaign[ConfirmRequest]) -> CampaignResponse:
-        """Raise Conflict: no campaign asks anything here."""
-        raise not_running(context.store, asked.campaign, f"answer question {asked.body.prompt}")
-
-    def check(self, _: CommandContext, asked: ToBench[CheckRequest]) -> BenchCheckResponse:
+    def check(self, bench: str) -> BenchCheckResponse:
         """Check a bench by its file or its shipped name, in this process."""
-        return check_bench(asked.bench)
-
-    def start_live(self, _: CommandContext, asked: LiveRequest) -> LiveStateResponse:
-        """Raise Conflict: `labctl live` calibrates in its own process."""
-        raise Conflict(f"no service runs on this database; calibrate {asked.serial or 'the unit'} with `labctl live`")
-
-    def end_live(self, _: CommandContext, __: LiveEndRequest) -> LiveStateResponse:
-        """Raise Conflict: one that runs in a terminal is ended there."""
-        raise Conflict("no service runs on this database; end `labctl live` with Ctrl-C in its terminal")
+        return check_bench(bench)

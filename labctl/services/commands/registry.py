@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 from labctl.services.admin import api_keys
 from labctl.services.calibrations import certification, fitting, revision
 from labctl.services.campaigns.bench_status import clear_bench
 from labctl.services.certificates import issue as certificates
+from labctl.services.commands.acts.catalogue import CAMPAIGN_ACTS
+from labctl.services.commands.acts.check import CHECK_BENCH
+from labctl.services.commands.acts.live import END_LIVE, START_LIVE
+from labctl.services.commands.acts.resume import RESUME_CAMPAIGN
+from labctl.services.commands.acts.start import START_CAMPAIGN
 from labctl.services.commands.command import Command, Newest, NoContent
 from labctl.services.commands.context import CommandContext
 from labctl.services.commands.encoding import log_file, recording_files
 from labctl.services.commands.requests import (
-    CampaignResume,
-    CampaignStart,
     LogFile,
     RecordingFolder,
     ToBench,
@@ -36,14 +38,12 @@ from labctl.services.commands.standards import (
     WITHDRAW_FINDING,
 )
 from labctl.services.drafts.make import make_drafts
-from labctl.services.planning.fit_rules import check_fit
-from labctl.services.planning.loading import load_recipe
 from labctl.services.recordings import examples, importers, transfer
 from labctl.services.schedule import queue
 from labctl.services.schemas.admin import BackupNote, KeyRequest, KeyResponse, NewKeyResponse
-from labctl.services.schemas.benches import BenchCheckResponse, BenchStatus, CheckRequest, ClearRequest
+from labctl.services.schemas.benches import BenchStatus, ClearRequest
 from labctl.services.schemas.calibrations import FitRequest, FitResponse, ImproveRequest, ImproveResponse
-from labctl.services.schemas.campaigns import CampaignResponse, ConfirmRequest, ReasonRequest
+from labctl.services.schemas.campaigns import ReasonRequest
 from labctl.services.schemas.certification import (
     CertificationResponse,
     CertifyRequest,
@@ -52,7 +52,6 @@ from labctl.services.schemas.certification import (
     RevokeRequest,
 )
 from labctl.services.schemas.documents.certificates import CertificateRequest, CertificateResponse, WithdrawRequest
-from labctl.services.schemas.live import LiveEndRequest, LiveRequest, LiveStateResponse
 from labctl.services.schemas.recordings import (
     ExampleRequest,
     ImportResponse,
@@ -61,7 +60,6 @@ from labctl.services.schemas.recordings import (
 )
 from labctl.services.schemas.reports.drafts import DraftsRequest, DraftsResponse
 from labctl.services.schemas.schedule import ScheduledResponse
-from labctl.services.simulation.effect_sizes import with_sizes
 
 
 def _import_recording(context: CommandContext, asked: RecordingFolder) -> ImportResponse:
@@ -115,33 +113,6 @@ def _withdraw_certificate(context: CommandContext, asked: WithdrawRequest) -> Ce
     return certificates.withdraw(context.store, asked, context.now())
 
 
-def _start_campaign(context: CommandContext, asked: CampaignStart) -> CampaignResponse | ScheduledResponse:
-    """Start a campaign now, or enter it into the schedule: the only place where that is decided."""
-    if asked.body.fit:
-        check_fit(load_recipe(asked.body.recipe))
-    if asked.body.hide:
-        asked = replace(asked, body=with_sizes(asked.body, context.control.bench_of(asked)))
-    if queue.is_scheduled(asked.body):
-        return context.control.schedule(context, asked)
-    return context.control.start(context, asked)
-
-
-def _resume_campaign(context: CommandContext, asked: CampaignResume) -> CampaignResponse:
-    return context.control.resume(context, asked)
-
-
-def _pause_campaign(context: CommandContext, asked: ToCampaign[ReasonRequest]) -> CampaignResponse:
-    return context.control.pause(context, asked)
-
-
-def _abort_campaign(context: CommandContext, asked: ToCampaign[ReasonRequest]) -> CampaignResponse:
-    return context.control.abort(context, asked)
-
-
-def _confirm_prompt(context: CommandContext, asked: ToCampaign[ConfirmRequest]) -> CampaignResponse:
-    return context.control.confirm(context, asked)
-
-
 def _cancel_start(context: CommandContext, asked: ToStart) -> ScheduledResponse:
     return queue.cancel_start(context.store, asked.start, context.now())
 
@@ -152,18 +123,6 @@ def _make_drafts(context: CommandContext, asked: ToCampaign[DraftsRequest]) -> D
 
 def _clear_bench(context: CommandContext, asked: ToBench[ClearRequest]) -> BenchStatus:
     return clear_bench(context.store, asked.bench, asked.body, context.now())
-
-
-def _check_bench(context: CommandContext, asked: ToBench[CheckRequest]) -> BenchCheckResponse:
-    return context.control.check(context, asked)
-
-
-def _start_live(context: CommandContext, asked: LiveRequest) -> LiveStateResponse:
-    return context.control.start_live(context, asked)
-
-
-def _end_live(context: CommandContext, asked: LiveEndRequest) -> LiveStateResponse:
-    return context.control.end_live(context, asked)
 
 
 def _create_key(context: CommandContext, asked: KeyRequest) -> NewKeyResponse:
@@ -252,21 +211,6 @@ WITHDRAW_CERTIFICATE = Command(
     handler=_withdraw_certificate,
     responses={200: CertificateResponse},
 )
-START_CAMPAIGN: Command[CampaignStart, CampaignResponse | ScheduledResponse] = Command(
-    method="POST",
-    path="/api/campaigns",
-    handler=_start_campaign,
-    responses={201: CampaignResponse, 202: ScheduledResponse},
-)
-RESUME_CAMPAIGN = Command(
-    method="POST", path=_CAMPAIGN + "/resume", handler=_resume_campaign, responses={200: CampaignResponse}
-)
-PAUSE_CAMPAIGN = Command(
-    method="POST", path=_CAMPAIGN + "/pause", handler=_pause_campaign, responses={200: CampaignResponse}
-)
-ABORT_CAMPAIGN = Command(
-    method="POST", path=_CAMPAIGN + "/abort", handler=_abort_campaign, responses={200: CampaignResponse}
-)
 MAKE_DRAFTS = Command(
     method="POST",
     path=_CAMPAIGN + "/drafts",
@@ -274,25 +218,18 @@ MAKE_DRAFTS = Command(
     responses={200: DraftsResponse},
     computes=True,
 )
-CONFIRM_PROMPT = Command(
-    method="POST", path=_CAMPAIGN + "/confirm", handler=_confirm_prompt, responses={200: CampaignResponse}
-)
 CANCEL_START = Command(
     method="DELETE", path="/api/schedule/{start}", handler=_cancel_start, responses={200: ScheduledResponse}
 )
 CLEAR_BENCH = Command(
     method="POST", path="/api/benches/{bench}/clear", handler=_clear_bench, responses={200: BenchStatus}
 )
-CHECK_BENCH = Command(
-    method="POST", path="/api/benches/{bench}/check", handler=_check_bench, responses={200: BenchCheckResponse}
-)
-START_LIVE = Command(method="POST", path="/api/live/start", handler=_start_live, responses={201: LiveStateResponse})
-END_LIVE = Command(method="POST", path="/api/live/end", handler=_end_live, responses={200: LiveStateResponse})
 CREATE_KEY = Command(method="POST", path="/api/keys", handler=_create_key, responses={201: NewKeyResponse})
 REVOKE_KEY = Command(method="POST", path="/api/keys/{name}/revoke", handler=_revoke_key, responses={200: KeyResponse})
 NOTE_BACKUP = Command(method="POST", path="/api/backups", handler=_note_backup, responses={204: NoContent})
 
 _ELSEWHERE: tuple[Command[Any, Any], ...] = (
+    START_CAMPAIGN, RESUME_CAMPAIGN, *(act.command for act in CAMPAIGN_ACTS), CHECK_BENCH, START_LIVE, END_LIVE,
     ADD_STANDARD, ADD_STANDARD_CERTIFICATE, ADD_STANDARD_CHECK, MARK_STANDARD_BAD, WITHDRAW_FINDING, SET_CHECK_GYRO,
     ADD_ENVIRONMENT, KEEP_ACCELEROMETER, KEEP_MAGNETOMETER,
 )  # fmt: skip

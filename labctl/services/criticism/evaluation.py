@@ -15,7 +15,6 @@ from labctl.fitting.models.inversion import NotConverged
 from labctl.json_types.criticism import Experiment
 from labctl.progress import report_stage
 from labctl.services.criticism.decimated_readings import Decimated
-from labctl.services.criticism.held_text import held_sentences
 from labctl.services.criticism.measurements import Measurements, refuse_unmeasured
 from labctl.services.criticism.report_text import answer_of, with_warnings
 from labctl.services.criticism.residuals import residual_columns
@@ -24,6 +23,25 @@ from labctl.services.effects import catalogue_with
 from labctl.services.recordings.inspection import refuse_wrong
 from labctl.services.schemas.criticism import CriticismResponse, ResidualsResponse, VerificationResponse
 from labctl.store import CalibrationRecord, RecordingRow, Store
+
+
+def held_sentences(model: ErrorModel) -> list[str]:
+    """Return how the comparison treats the held coefficients of a version's model; nothing where none are held."""
+    if not model.held.axes:
+        return []
+    listed = "; ".join(f"axis {axis}: {', '.join(names)}" for axis, names in model.held.axes.items())
+    source = f" ({model.held.source})" if model.held.source else ""
+    if model.forward().held.axes:
+        said = (
+            f"These coefficients are held at their values{source}, within their stated uncertainties, and are not "
+            f"fitted: {listed}."
+        )
+    else:
+        said = (
+            f"The version holds these coefficients at their values{source}: {listed}. They belong to a law of the "
+            "output; this comparison fits a law of the true rate, in which they are estimated."
+        )
+    return [said]
 
 
 def evaluate(

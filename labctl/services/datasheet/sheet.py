@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -14,13 +16,79 @@ from labctl.json_types.noise import NoiseFigure
 from labctl.progress import report_stage
 from labctl.recording import RecordingInfo
 from labctl.services.cache import UNNAMED, compute
-from labctl.services.datasheet.catalogue import LINES, OF_THREE_AXES, Line
-from labctl.services.datasheet.decision import RULE, decided
 from labctl.services.datasheet.measured import Figure, figures_of
 from labctl.services.recordings.allan import MOST_RECORDINGS, noise_of_recordings
 from labctl.services.recordings.loading import points_of
 from labctl.services.schemas.reports.datasheet import Characteristic, DatasheetResponse, MeasuredUnder
 from labctl.store import RecordingRow, Store, Unit
+
+RATES = "a recipe of several rates of both signs, such as ojeda2000 or table1-x-table2"
+THREE = "a recipe that turns the unit about x, y and z, such as table1-x-table2 or quick-triaxial"
+TEMPERATURES = "a recipe of several temperatures, such as ojeda2000 or table1-x-table2"
+
+
+@dataclass(frozen=True)
+class Line:
+    """One characteristic. `key` names its specification in `[datasheet]` of a recording or a bench file."""
+
+    id: str
+    title: str
+    unit: str
+    key: str | None
+    measured_by: str
+    specified_as: Literal["at most", "at least"] = "at most"
+    per_axis: bool = True
+
+
+LINES = (
+    Line("scale_factor", "Scale factor, output over rate", "1", None, RATES),
+    Line("scale_factor_nonlinearity", "Scale factor nonlinearity, of full scale", "ppm",
+         "scale_factor_nonlinearity_ppm", RATES),
+    Line("scale_factor_asymmetry", "Scale factor asymmetry", "ppm", "scale_factor_asymmetry_ppm", RATES),
+    Line("scale_factor_repeatability", "Scale factor repeatability, turn-on to turn-on", "ppm",
+         "scale_factor_repeatability_ppm", "recipe turn-on-20"),
+    Line("scale_factor_temperature", "Scale factor temperature sensitivity", "ppm/deg C",
+         "scale_factor_temperature_ppm_c", TEMPERATURES),
+    Line("bias", "Bias", "deg/s", "bias_dps", RATES),
+    Line("bias_temperature", "Bias temperature sensitivity", "deg/s/deg C", "bias_temperature_dps_c", TEMPERATURES),
+    Line("bias_repeatability", "Bias repeatability, turn-on to turn-on", "deg/s", "bias_repeatability_dps",
+         "recipe turn-on-20"),
+    Line("g_sensitivity", "Bias sensitivity to specific force", "deg/s/g", "g_sensitivity_dps_g",
+         "recipe six-face-tumble"),
+    Line("angle_random_walk", "Angle random walk N", "deg/s/rtHz", "angle_random_walk_dps_rthz",
+         "recipe static-night"),
+    Line("bias_instability", "Bias instability B", "deg/s", "bias_stability_dps", "recipe static-night"),
+    Line("rate_random_walk", "Rate random walk K", "deg/s/sqrt(s)", "rate_random_walk_dps_rts",
+         "recipe static-night"),
+    Line("bandwidth", "Bandwidth, -3 dB", "Hz", "bandwidth_hz",
+         "recipe sine-dwell or sweeps, simulated or imported, and a fit with the effect bandwidth", "at least"),
+    Line("misalignment", "Misalignment of the triad, rotation about the axis", "deg", "misalignment_deg", THREE),
+    Line("orthogonality", "Orthogonality error between two axes", "deg", "orthogonality_deg", THREE),
+)  # fmt: skip
+#: Lines of a unit with three axes only.
+OF_THREE_AXES = frozenset({"misalignment", "orthogonality"})
+
+
+RULE = (
+    "Simple acceptance (ILAC-G8:09/2019, 4.2.1): a measured value inside the specified one passes, whatever its "
+    "uncertainty; where the specified value is less than 2 u away, the risk of a wrong decision is up to 50 %."
+)
+#: A specified value less than so many standard uncertainties away is near.
+NEAR = 2.0
+
+
+def decided(line: Line, found: Characteristic, specified: float | None) -> Characteristic:
+    """Return a characteristic with the specified value and the decision on it."""
+    if specified is None:
+        return found
+    if found.value is None:  # a bound below the specified value passes; one above it decides nothing
+        bounded = line.specified_as == "at most" and found.at_most is not None and found.at_most <= specified
+        return found.model_copy(update={"specified": specified, "passed": True if bounded else None})
+    value = abs(found.value) if line.specified_as == "at most" else found.value
+    passed = value <= specified if line.specified_as == "at most" else value >= specified
+    near = found.u is not None and abs(value - specified) < NEAR * found.u
+    return found.model_copy(update={"specified": specified, "passed": passed, "near_limit": near})
+
 
 #: Figure of the Allan deviation, and its unit there over that of the data sheet.
 NOISE = {"angle_random_walk": ("N", 60.0), "bias_instability": ("B", 3600.0), "rate_random_walk": ("K", 216_000.0)}

@@ -2,24 +2,180 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from collections.abc import Callable
 from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO, Self
 
-from labctl.errors import LabctlError
-from labctl.fitting.live import Target
+import numpy as np
+
+from instruments.errors import InstrumentError
+from labctl.errors import BadInput, LabctlError
+from labctl.fitting.live import LiveCalibration, LiveState, Target
 from labctl.fitting.models.presets import POSES
+from labctl.recording import RecordingInfo
+from labctl.recording.files import HEAD, head_of
 from labctl.services.commands.command import CommandExecutor
 from labctl.services.commands.registry import FIT, IMPORT_RECORDING
 from labctl.services.commands.requests import RecordingFolder, ToUnit
 from labctl.services.live.assessor import Assessor
 from labctl.services.live.figures import figures_of
-from labctl.services.live.session import Ending, Show, run_live
-from labctl.services.live.source import LiveSource
-from labctl.services.live.spool import Spool
+from labctl.services.live.source import Block, LiveSource, Reason, StreamEnded
+from labctl.services.recordings.live_folders import SAMPLES, lock, unlock
 from labctl.services.schemas.calibrations import FitRequest, FitResponse
 from labctl.services.schemas.live import LiveResponse
+
+# The recording of a live calibration on disk, from its first reading on.
+#
+# It is a recording in the interchange format at every moment: what a process that was killed leaves is read by
+# `labctl import FOLDER`. Its folder is locked while it is in use.
+
+
+class Spool:
+    """A folder that is made with the first block, and is in use from then until the end of the context.
+
+    Raises BadInput where it exists already and is not empty.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+            raise BadInput(f"{folder}: exists already and is not empty; name a new folder with --out")
+        self.folder = folder
+        self.readings = self.damaged = 0
+        self._example = ""
+        self._info: RecordingInfo | None = None
+        self._names: tuple[str, ...] = ()
+        self._file: BinaryIO | None = None
+        self._handle: int | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+        if self._handle is not None:
+            unlock(self._handle)
+            self._handle = None
+
+    def add(self, info: RecordingInfo, block: Block) -> None:
+        """Write a block down; it is on the disk when this returns. Raises OSError."""
+        self.damaged += block.damaged
+        self._example = self._example or block.example
+        if not len(block):
+            return
+        if self._file is None:
+            self._open(info, block)
+        assert self._file is not None
+        columns = [np.asarray(block.columns[name]).tolist() for name in self._names]
+        rows = "".join("1," + ",".join(map(repr, row)) + "\n" for row in zip(*columns, strict=True))
+        self._file.write(rows.encode())
+        self._file.flush()
+        os.fsync(self._file.fileno())
+        self.readings += len(block)
+
+    def close(self) -> None:
+        """Close the file, and state in the head what of the stream could not be read. Safe to call twice."""
+        if self._file is None or self._info is None:
+            return
+        self._file.close()
+        self._file = None
+        if self.damaged:
+            share = self.damaged / (self.damaged + self.readings)
+            text = f"{self.damaged} lines or frames of the stream could not be read"
+            unread = f"{text}; the first: {self._example}" if self._example else text
+            info = self._info.model_copy(update={"unread": unread, "unread_share": share})
+            whole = self.folder / f".{HEAD}"
+            whole.write_bytes(head_of(info))
+            whole.replace(self.folder / HEAD)
+
+    def _open(self, info: RecordingInfo, block: Block) -> None:
+        self.folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        self._handle = lock(self.folder)
+        self._info, self._names = info, tuple(block.columns)
+        (self.folder / HEAD).write_bytes(head_of(info))
+        self._file = (self.folder / SAMPLES).open("wb")
+        self._file.write((",".join(["dataset", *self._names]) + "\n").encode())
+
+
+#: Readings are taken, and what is shown changes, this often, s.
+BLOCK_S = 0.25
+Show = Callable[[LiveState], None]
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How a live calibration ended."""
+
+    reason: Reason
+    text: str  #: why, in words
+    state: LiveState  #: by a fit to all readings
+
+
+def run_live(
+    source: LiveSource, target: Target, spool: Spool, assessor: Assessor, show: Show, say: Callable[[str], None]
+) -> Ending:
+    """Calibrate while the unit is turned; every reading is on the disk before it is assessed.
+
+    `say` is called with the first line of the stream that cannot be read. Raises LabctlError, InstrumentError or
+    KeyboardInterrupt where no reading was taken; later a failure, the end of the stream and an interrupt end the
+    calibration, and what was read is assessed.
+    """
+    reason: Reason = "stream"
+    try:
+        calibration = LiveCalibration(source.start(), target)
+        _run(source, calibration, spool, assessor, show, say)
+        reason, text = "complete", "the target is reached"
+    except StreamEnded as error:
+        if not spool.readings:
+            raise BadInput(str(error)) from error
+        reason, text = error.reason, str(error)
+    except (BadInput, InstrumentError, OSError) as error:
+        if not spool.readings:
+            raise
+        text = str(error)
+    except KeyboardInterrupt:
+        if not spool.readings:
+            raise
+        reason, text = "interrupted", "the person at the terminal ended it"
+    finally:
+        source.stop()
+        spool.close()
+    last = assessor.last(calibration)
+    show(last)
+    return Ending(reason, text, last)
+
+
+def _run(
+    source: LiveSource, calibration: LiveCalibration, spool: Spool, assessor: Assessor, show: Show,
+    say: Callable[[str], None],
+) -> None:  # fmt: skip
+    """Run until the target is reached; raises StreamEnded, and what stream, disk and person raise."""
+    damaged = False
+    while True:
+        block = source.read(BLOCK_S)
+        if block.example and not damaged:
+            damaged = True
+            say(f"a line of the stream is left out: {block.example}")
+        _take(calibration, spool, block)
+        if not len(calibration) or (state := assessor.state(calibration)) is None:
+            continue
+        show(state)
+        source.ask(state.request)
+        # the state may be older than the readings: what counts is the fit to all of them, as they are stored
+        if state.done and assessor.last(calibration).done:
+            return
+
+
+def _take(calibration: LiveCalibration, spool: Spool, block: Block) -> None:
+    spool.add(calibration.info, block)
+    if len(block):
+        calibration.add(block.columns, lost=block.lost, damaged=block.damaged)
+    else:
+        calibration.add_unread(lost=block.lost, damaged=block.damaged)
+
 
 #: Says one sentence to the person at the terminal.
 Say = Callable[[str], None]

@@ -16,8 +16,9 @@ from instruments.clock import Clock, SystemClock
 from instruments.errors import InstrumentError
 from labctl.acting_user import actor
 from labctl.errors import BadInput, Conflict, LabctlError
-from labctl.fitting.live import Target
+from labctl.fitting.live import PoseRequest, Target
 from labctl.log import get_logger
+from labctl.recording import RecordingInfo
 from labctl.recording.line_stream import LineDecoder
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.listeners import ChangeListeners
@@ -30,8 +31,7 @@ from labctl.services.live.feeds import network_feed
 from labctl.services.live.gyro_source import GyroSource
 from labctl.services.live.line_source import LineSource, info_of
 from labctl.services.live.session_record import SessionRecord
-from labctl.services.live.source import LiveSource
-from labctl.services.live.watched_source import EndingSource
+from labctl.services.live.source import Block, LiveSource, StreamEnded
 from labctl.services.planning.loading import with_drivers
 from labctl.services.recordings.live_folders import folders_of, kept_readings, usual_folder
 from labctl.services.schemas.live import (
@@ -42,6 +42,48 @@ from labctl.services.schemas.live import (
     LiveStateResponse,
 )
 from labctl.store import Store
+
+
+class EndingSource:
+    """A source that ends before its next block once it was asked to, or was not watched for too long."""
+
+    def __init__(self, source: LiveSource, clock: Clock, unwatched_s: float | None) -> None:
+        """`clock` is that of the service; `unwatched_s`: it ends without a watcher for so long; None: it does not."""
+        self._source, self._watch_clock, self._unwatched_s = source, clock, unwatched_s
+        self._why = ""
+        self._watched_s = clock.now_s()
+        self.name, self.serial, self.is_simulated = source.name, source.serial, source.is_simulated
+        self.clock = source.clock
+
+    def end(self, why: str) -> None:
+        """End it before its next block; the first reason counts. Returns at once."""
+        self._why = self._why or why
+
+    def watched(self) -> None:
+        """Note that a page follows it now."""
+        self._watched_s = self._watch_clock.now_s()
+
+    def start(self) -> RecordingInfo:
+        """Open the stream."""
+        return self._source.start()
+
+    def read(self, duration_s: float) -> Block:
+        """Return the next block. Raises StreamEnded where it is to end, and what the source raises."""
+        unwatched_s = self._watch_clock.now_s() - self._watched_s
+        if self._unwatched_s is not None and unwatched_s > self._unwatched_s:
+            self.end(f"no page had followed it for {self._unwatched_s:.0f} s, and it was to end then")
+        if self._why:
+            raise StreamEnded(self._why, "interrupted")
+        return self._source.read(duration_s)
+
+    def ask(self, request: PoseRequest | None) -> None:
+        """Pass on what the person is asked for."""
+        self._source.ask(request)
+
+    def stop(self) -> None:
+        """Close the stream."""
+        self._source.stop()
+
 
 log = get_logger()
 

@@ -109,6 +109,7 @@ def limits_of(bench: BenchFile, *, driven: bool = False) -> BenchLimits:
         {gyro.name: GyroLimits(gyro.max_rate_dps, gyro.min_c, gyro.max_c) for gyro in bench.gyros},
         needs_person=bench.needs_person,
         is_driven=driven,
+        air_tau_s=bench.air_tau_s,
     )
 
 

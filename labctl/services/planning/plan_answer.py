@@ -3,17 +3,130 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from datetime import datetime
+from collections.abc import Callable, Iterator
+from datetime import date, datetime
+from typing import Any
 from zoneinfo import ZoneInfo
 
-from instruments.bench_config import BenchFile
+from instruments.bench_config import USUAL_AIR_TAU_S, BenchFile
+from instruments.positions import Position
+from labctl.fitting.data.channels import BODY_AXES
+from labctl.fitting.data.mounting_angles import ANGLE_QUANTITIES, angle_gains, shares_of
+from labctl.fitting.uncertainty.conditions import BenchConditions
+from labctl.fitting.uncertainty.standard_lines import Sensitivities, standards_u
 from labctl.services.planning.attendance import attendance, visits_s
 from labctl.services.planning.loading import limits_of, plan_for
-from labctl.services.planning.mountings import misalignment_outlook
-from labctl.services.schemas.plans import PlanResponse, Visibility
-from procedures.contracts.steps import Acquire
-from procedures.planning.plan import Plan
+from labctl.services.schemas.plans import FurtherMountings, MisalignmentOutlook, PlanResponse, Visibility
+from procedures.contracts.errors import PlanRefused
+from procedures.contracts.steps import Acquire, Mount, MoveChamber
+from procedures.planning.limits import BenchLimits
+from procedures.planning.plan import Plan, make_plan
+from procedures.recipe.recipe import Recipe
+from procedures.recipe.rules import Indexing, Inverted
+
+#: Coverage factor of the figures.
+K = 2.0
+#: Whether a standard is overdue does not matter here.
+ANY_DAY = date(1970, 1, 1)
+#: Mountings that leave more than this share of U are not offered.
+WORTH_SHARE = 0.98
+#: What can be turned once more, in words, by which key of `[indexing]`, and by how much, deg.
+TURNS = (
+    ("each unit turned by 180 deg on its face", "unit_deg", 180),
+    ("the fixture turned by 180 deg on the table", "fixture_deg", 180),
+    ("the fixture turned by 90 deg on the table", "fixture_deg", 90),
+)
+
+
+def misalignment_outlook(plan: Plan, bench: BenchFile, limits: BenchLimits) -> MisalignmentOutlook | None:
+    """Return U of a misalignment by fixture and table, of the plan and with further mountings added.
+
+    None where no unit turns about an axis across one of its outputs, or where the bench states no such standard.
+    """
+    shares = _shares(plan, bench)
+    stated = sorted({each.quantity for each in bench.standards} & set(ANGLE_QUANTITIES))
+    if not shares or not stated:
+        return None
+    now = _expanded(bench, shares)
+    found = []
+    for what, table, wider in _wider(plan.recipe):
+        try:
+            other = make_plan(wider, limits)
+        except PlanRefused:
+            continue
+        then = _shares(other, bench)
+        if (expanded := _expanded(bench, then)) > WORTH_SHARE * now:
+            continue
+        more = FurtherMountings(
+            turned=what, expanded=expanded, mountings=len(then) - len(shares),
+            more_s=other.expected_s - plan.expected_s, recipe_toml=table,
+        )  # fmt: skip
+        found.append(more)
+    return MisalignmentOutlook(
+        expanded=now, further=sorted(found, key=lambda each: (each.expanded, each.more_s)),
+        not_stated=[each for each in ANGLE_QUANTITIES if each not in stated],
+    )  # fmt: skip
+
+
+def _shares(plan: Plan, bench: BenchFile) -> dict[str, float]:
+    """Return position -> its share in what is known of misalignments: where a unit has an output across the axis."""
+    across = {axis for axis in BODY_AXES for gyro in bench.gyros if set(gyro.axes) - {axis}}
+    weights: dict[str, float] = {}
+    for step in plan.steps:
+        if isinstance(step, Acquire) and not step.verification and Position.of(step.position).axis in across:
+            weights[step.position] = weights.get(step.position, 0.0) + step.rate_dps**2
+    return shares_of(weights) if any(weights.values()) else {}
+
+
+def _expanded(bench: BenchFile, shares: dict[str, float]) -> float:
+    """Return U of the misalignment towards the axis whose mountings separate least."""
+    stated = tuple(each for each in bench.standards if each.quantity in ANGLE_QUANTITIES)
+    conditions = BenchConditions(ANY_DAY, standards=stated, mountings=shares)
+    return max(
+        K * standards_u(conditions, Sensitivities.of_one(angle=1.0, gains=angle_gains(shares, axis)))
+        for axis in {Position.of(position).axis for position in shares}
+    )
+
+
+def _wider(recipe: Recipe) -> Iterator[tuple[str, str, Recipe]]:
+    """Yield what is turned, the table that the recipe then has, and the recipe with each position once more turned so.
+
+    A recipe that turns something already keeps its table, with one angle more.
+    """
+    fastest = max(recipe.rates_dps, key=abs)
+    if fastest == 0:
+        return
+    points = {"temperatures_c": (_temperature_c(recipe),), "rates_dps": (fastest, -fastest)}
+    table: dict[str, Any] = {**points, "hold_s": 0.0}
+    if recipe.indexing is not None:
+        table = recipe.indexing.model_dump(exclude_defaults=True)
+    for what, key, angle in TURNS:
+        there = table.get(key, ())
+        if angle not in there:
+            turned = Indexing.model_validate({**table, key: (*there, angle)})
+            yield what, _toml("indexing", turned), recipe.model_copy(update={"indexing": turned})
+    listed = set(recipe.positions)
+    if recipe.inverted is None and not all(str(Position.of(each).upside_down) in listed for each in listed):
+        inverted = Inverted.model_validate(points)
+        yield "each unit upside down", _toml("inverted", inverted), recipe.model_copy(update={"inverted": inverted})
+
+
+def _toml(name: str, table: Indexing | Inverted) -> str:
+    """Return a table of a recipe as TOML, a line for each key."""
+    given = table.model_dump(exclude_defaults=True)
+    lines = [
+        f"{key} = [{', '.join(f'{each:g}' for each in value)}]" if isinstance(value, tuple) else f"{key} = {value:g}"
+        for key, value in given.items()
+    ]
+    return "\n".join([f"[{name}]", *lines])
+
+
+def _temperature_c(recipe: Recipe) -> float:
+    """Return where the chamber is when a unit is turned, or the end of the recipe's range that is next to it."""
+    low, high = min(recipe.temperatures_c), max(recipe.temperatures_c)
+    handling_c = recipe.mounting.handling_c
+    return low if handling_c is None else min(max(handling_c, low), high)
+
 
 Look = Callable[[Plan, BenchFile], list[Visibility]]
 #: When a plan would begin, and the time zone of the people at the bench.
@@ -38,6 +151,7 @@ def plan_answer(
         steps=len(plan.steps),
         datasets=plan.datasets,
         expected_s=plan.expected_s,
+        guessed=_guessed(plan, bench_file),
         verification_datasets=sum(isinstance(step, Acquire) for step in plan.verification_steps),
         verification_s=math.fsum(step.expected_s for step in plan.verification_steps),
         clipped=list(plan.clipped),
@@ -46,3 +160,17 @@ def plan_answer(
         visibility=look(plan, bench_file) if look else None,
         attendance=attendance(visits_s(plan, bench_file), *start) if start else None,
     )
+
+
+def _guessed(plan: Plan, bench: BenchFile) -> list[str]:
+    """Return the figures of the expected time that no file states, in words."""
+    found: list[str] = []
+    if bench.air_tau_s is None and any(isinstance(step, MoveChamber) and step.expected_s for step in plan.steps):
+        found.append(
+            f"the air of the chamber follows a ramp with a time constant of {USUAL_AIR_TAU_S:g} s; state air_tau_s in "
+            "[chamber] of the bench file"
+        )
+    mounts = [step.expected_s for step in plan.steps if isinstance(step, Mount) and step.expected_s]
+    if mounts:
+        found.append(f"a person takes {mounts[0] / 60:g} min to mount the units")
+    return found

@@ -25,6 +25,20 @@ from labctl.json_types.models import (
 from labctl.json_types.poses import PosesJson
 from labctl.services.schemas.base import Request, ResponseModel
 from labctl.services.schemas.certification import CertificationResponse
+from labctl.services.schemas.common_fields import (
+    CalibrationHash,
+    EffectIds,
+    FittedRms,
+    HeldoutRms,
+    InForce,
+    ModelName,
+    NoiseFloor,
+    ParentVersion,
+    RawRms,
+    Serial,
+    VersionNumber,
+    VersionTime,
+)
 from labctl.services.schemas.criticism import ResidualColumns
 from labctl.services.schemas.documents.fixed import FixedCoefficients
 from labctl.services.schemas.warnings import WARNINGS, DataWarning
@@ -85,8 +99,8 @@ class ImproveRequest(Request):
 class ModelResponse(ResponseModel):
     """Which effects a calibration is made of; null: made by an older version of labctl, which did not say."""
 
-    name: str
-    effects: list[str]
+    name: ModelName
+    effects: EffectIds
     argument: Literal["rate", "output"] = Field(
         description="What the regressors are computed from: `rate`, the true rate (forward law), or `output`, the "
         "gyro's output (direct law)."
@@ -114,17 +128,17 @@ class LegError(ResponseModel):
         "heating, or each leg in turn."
     )
     rms_dps: float | None = Field(description="RMS prediction error of the data sets tested, deg/s; null: see `why`.")
-    datasets: int
+    datasets: int = Field(description="Number of data sets that were predicted.")
     why: str = Field(default="", description="Why `rms_dps` is null; else empty.")
 
 
 class ErrorFigures(ResponseModel):
     """Input-referred errors in deg/s, one value per data set and axis, root mean square over all."""
 
-    raw_rms_dps: float | None = Field(description="Error before any compensation, deg/s.")
-    rms_dps: float | None = Field(description="Error after compensation, on the data that were fitted, deg/s.")
-    heldout_rms_dps: float | None = Field(description="Error at temperatures that were left out of the fit, deg/s.")
-    noise_floor_dps: float | None = Field(description="Error of data-set means due to noise and drift alone, deg/s.")
+    raw_rms_dps: RawRms
+    rms_dps: FittedRms
+    heldout_rms_dps: HeldoutRms
+    noise_floor_dps: NoiseFloor
     noise_floor_source: str = Field(default="none", description="How the noise floor was estimated.")
     heldout_by_leg: list[LegError] = Field(
         default_factory=list,
@@ -147,13 +161,13 @@ class Validity(ResponseModel):
 class FittedResponse(ResponseModel):
     """What a fit says of its model, whether it is kept as a version or not."""
 
-    serial: str
-    model: ModelResponse
+    serial: Serial
+    model: ModelResponse = Field(description="The effects of the fitted model.")
     axes: dict[str, AxisCoefficients] = Field(
         description="For each axis: the coefficients with value, standard uncertainty u, and unit."
     )
-    error: ErrorFigures
-    validity: Validity
+    error: ErrorFigures = Field(description="Errors of the model before and after compensation, deg/s.")
+    validity: Validity = Field(description="Rates and temperatures over which the model was calibrated.")
     warnings: list[DataWarning] = Field(default_factory=list, description=WARNINGS)
     noise: dict[str, AxisNoiseJson] = Field(
         default_factory=dict,
@@ -187,11 +201,16 @@ class FittedResponse(ResponseModel):
 class FitResponse(FittedResponse):
     """A calibration version, as `labctl fit --json` and `POST .../calibrations` give it."""
 
-    version: int
+    version: VersionNumber
     campaign: int | None = Field(default=None, description="Campaign that made the recording; null: imported.")
-    recipe: str | None = None
-    bench: str | None = None
-    hash: str = Field(description="SHA-256 of the calibration file.")
+    recipe: str | None = Field(
+        default=None,
+        description="Name of the recipe of the campaign that made the recording; null: the recording was imported.",
+    )
+    bench: str | None = Field(
+        default=None, description="Name of the bench of that campaign; null: the recording was imported."
+    )
+    hash: CalibrationHash
 
 
 class ChangedModel(FittedResponse):
@@ -212,9 +231,9 @@ class ChangedModel(FittedResponse):
 class ImproveResponse(ChangedModel):
     """The version that a change of effects made, as `labctl improve --json` and `POST .../improve` give it."""
 
-    version: int
-    parent: int
-    hash: str = Field(description="SHA-256 of the calibration file.")
+    version: VersionNumber
+    parent: int = Field(description="Version that was changed, as `improved_from`.")
+    hash: CalibrationHash
 
 
 class PreviewResponse(ChangedModel):
@@ -226,24 +245,27 @@ class PreviewResponse(ChangedModel):
 class CalibrationRow(ResponseModel):
     """One line of a unit's list of calibrations."""
 
-    serial: str
-    version: int
-    parent: int | None
-    model: str
-    created_at: datetime
-    hash: str
-    certified: bool
-    rms_dps: float | None = None
-    heldout_rms_dps: float | None = None
+    serial: Serial
+    version: VersionNumber
+    parent: ParentVersion
+    model: ModelName
+    created_at: VersionTime
+    hash: CalibrationHash
+    certified: InForce
+    rms_dps: FittedRms = None
+    heldout_rms_dps: HeldoutRms = None
     notices: list[str] = Field(default_factory=list, description=NOTICES)
 
 
 class Follower(ResponseModel):
     """An element that lags behind the temperature, or that is dragged along by it, and the error that it makes."""
 
-    kind: Literal["lag", "play"]
+    kind: Literal["lag", "play"] = Field(
+        description="lag: the element follows the temperature with a time constant; play: it follows with a "
+        "hysteresis of constant width."
+    )
     parameter: float = Field(description="Time constant of a thermal lag, s, or width of a hysteresis (play), K.")
-    unit: Literal["s", "K"]
+    unit: Literal["s", "K"] = Field(description="Unit of `parameter`: s for a lag, K for a play.")
     cooling_s: float | None = Field(
         default=None, description="Of a lag: time constant while the element is warmer than the thermometer, s; null: "
         "the same.",
@@ -267,8 +289,8 @@ class Follower(ResponseModel):
 class VersionFacts(ResponseModel):
     """When a version was made, from what, and whether it is in force."""
 
-    created_at: datetime
-    in_force: bool
+    created_at: VersionTime
+    in_force: InForce
     notices: list[str] = Field(default_factory=list, description=NOTICES)
     due: datetime | None = Field(
         default=None, description="Date until which the certification is valid; null: no date."
@@ -294,7 +316,7 @@ class VersionFacts(ResponseModel):
 class VersionResponse(VersionFacts, FitResponse):
     """A calibration version that a fit made, as it was made, and whether it is in force."""
 
-    parent: int | None = None
+    parent: ParentVersion = None
 
 
 class ImprovedVersionResponse(VersionFacts, ImproveResponse):
@@ -304,5 +326,5 @@ class ImprovedVersionResponse(VersionFacts, ImproveResponse):
 class CatalogueResponse(ResponseModel):
     """Every effect that a model can be made of, and every model that a fit can be asked for by name."""
 
-    effects: list[CataloguedEffect]
-    models: list[PresetJson]
+    effects: list[CataloguedEffect] = Field(description="Every effect that a model can be made of.")
+    models: list[PresetJson] = Field(description="Every model that a fit can be asked for by name.")

@@ -8,6 +8,7 @@ from typing import Literal, get_args
 from pydantic import AwareDatetime, Field
 
 from labctl.services.schemas.base import LongText, Request, ResponseModel
+from labctl.services.schemas.common_fields import BenchName, CampaignNumber, Clip, Person, Reason, RecipeName, StepCount
 from labctl.services.schemas.plans import RecipeSource
 from labctl.services.schemas.reports.campaign_parts import (
     AdviceResponse,
@@ -28,9 +29,7 @@ class CampaignRequest(Request):
     """Which recipe to run on the service's bench."""
 
     recipe: RecipeSource
-    clip: bool = Field(
-        default=False, description="Leave out points that are beyond the limits of the bench or of a unit."
-    )
+    clip: Clip = False
     hide: list[str] = Field(
         default_factory=list,
         max_length=20,
@@ -90,9 +89,13 @@ class CampaignRequest(Request):
 class StartRequest(Request):
     """Which recipe to run on which bench, here and now."""
 
-    recipe: LongText
-    bench: str | None = None
-    clip: bool = False
+    recipe: LongText = Field(description="Name of a shipped recipe, or the recipe itself as TOML text.")
+    bench: str | None = Field(
+        default=None,
+        description="Path of a bench file, or the name of a shipped bench; default: the simulated bench that fits "
+        "the recipe best.",
+    )
+    clip: Clip = False
     hide: list[str] = Field(
         default_factory=list, max_length=20, description="Has the same meaning as in `POST /api/campaigns`."
     )
@@ -119,8 +122,8 @@ class ReasonRequest(Request):
     """Why something is done to a campaign, or to a key, and by whom."""
 
     cleans_texts = True  # no abort is refused for the words that describe it
-    reason: str = Field(min_length=1)
-    by: str = Field(default="", max_length=200)
+    reason: Reason = Field(min_length=1)
+    by: Person = Field(default="", max_length=200)
 
     @property
     def text(self) -> str:
@@ -132,8 +135,8 @@ class ConfirmRequest(Request):
     """An answer to the question with this id; an answer to an older question is refused."""
 
     cleans_texts = True  # as above
-    prompt: str = Field(min_length=1)
-    by: str = Field(min_length=1, max_length=200)
+    prompt: str = Field(min_length=1, description="Id of the question that is answered.")
+    by: Person = Field(min_length=1, max_length=200)
     confirmed: bool = Field(
         default=True,
         description="true: the requested action is done; false: the action cannot be done, and the campaign ends.",
@@ -141,15 +144,15 @@ class ConfirmRequest(Request):
     again: bool = Field(
         default=False, description="Only for a turn by hand: true if the turn went wrong and is to be requested again."
     )
-    reason: str = ""
+    reason: Reason = ""
 
 
 class ResumeRequest(Request):
     """How a campaign that is paused or was interrupted goes on."""
 
     cleans_texts = True  # as above
-    by: str = Field(default="a person", min_length=1, max_length=200)
-    reason: str = ""
+    by: Person = Field(default="a person", min_length=1, max_length=200)
+    reason: Reason = ""
     power: Literal["lost", "kept"] | None = Field(
         default=None,
         description="Whether the units lost power during the interruption; default: `lost` if the "
@@ -160,33 +163,47 @@ class ResumeRequest(Request):
 class CampaignResponse(ResponseModel):
     """Where a campaign is."""
 
-    id: int
-    recipe: str
-    bench: str
-    state: CampaignState
-    reason: str = ""
+    id: CampaignNumber
+    recipe: RecipeName
+    bench: BenchName
+    state: CampaignState = Field(description="State of the campaign.")
+    reason: str = Field(
+        default="",
+        description="Why the campaign is in this state, such as the cause of a failure; empty: no reason is needed.",
+    )
     step: int | None = Field(default=None, description="Number of the step, from 1.")
-    steps: int
-    step_text: str = ""
-    progress: float = Field(ge=0, le=1)
-    expected_end: datetime | None = None
+    steps: StepCount
+    step_text: str = Field(default="", description="The present step in words; empty: none has begun.")
+    progress: float = Field(ge=0, le=1, description="Share of the expected time that is over, 0 to 1.")
+    expected_end: datetime | None = Field(
+        default=None, description="Expected time of the end; null: the campaign has ended, or no step has begun."
+    )
     t_s: float | None = Field(
         default=None, description="Campaign time: seconds since the campaign began, by the campaign's own clock."
     )
-    chamber_c: float | None = None
-    setpoint_c: float | None = None
-    gyro_c: float | None = None
+    chamber_c: float | None = Field(
+        default=None,
+        description="Temperature of the chamber, deg C; null: there is no chamber, or it was not read yet.",
+    )
+    setpoint_c: float | None = Field(
+        default=None, description="Set point of the chamber, deg C; null: none was set, or not known."
+    )
+    gyro_c: float | None = Field(
+        default=None,
+        description="Temperature of the first unit that reports one, by its own thermometer, deg C; null: none was "
+        "read.",
+    )
     references: dict[str, float] = Field(
         default_factory=dict,
         description="Present values of the reference instruments, by column; empty if this process does not run "
         "the campaign.",
     )
-    rate_dps: float | None = None
+    rate_dps: float | None = Field(default=None, description="Rate of the table, deg/s; null: no step has begun.")
     outputs: list[OutputResponse] = Field(
         default_factory=list,
         description="Present outputs of the units; empty if this process does not run the campaign.",
     )
-    last_error: str | None = None
+    last_error: str | None = Field(default=None, description="Newest error event in words; null: there was none.")
     repeated: int = Field(default=0, ge=0, description="Data sets that were taken again.")
     stalled_s: float = Field(
         default=0.0, ge=0, description="How long the computer of the bench did not run labctl, s of real time."
@@ -209,8 +226,10 @@ class CampaignResponse(ResponseModel):
         default=False,
         description="The process that ran the campaign is gone, and the campaign was neither resumed nor ended.",
     )
-    started_at: datetime | None = None
-    ended_at: datetime | None = None
+    started_at: datetime | None = Field(
+        default=None, description="Time of the start; null: the campaign has not begun."
+    )
+    ended_at: datetime | None = Field(default=None, description="Time of the end; null: the campaign has not ended.")
     recordings: dict[str, int] = Field(default_factory=dict, description="serial -> recording")
     drafts: list[DraftResponse] = Field(
         default_factory=list,
@@ -258,13 +277,15 @@ class CampaignResponse(ResponseModel):
 class EventResponse(ResponseModel):
     """Something that happened in a campaign."""
 
-    id: int
-    at: datetime
-    t_s: float
-    kind: str
-    level: Literal["info", "warning", "error"]
-    message: str
+    id: int = Field(description="Number of the event.")
+    at: datetime = Field(description="Time of the event.")
+    t_s: float = Field(
+        description="Campaign time of the event: seconds since the campaign began, by the campaign's own clock."
+    )
+    kind: str = Field(description="Kind of event, as a fixed word for programs.")
+    level: Literal["info", "warning", "error"] = Field(description="Importance of the event.")
+    message: str = Field(description="The event in words.")
     device: str | None = Field(default=None, description="The instrument or unit that the event concerns.")
     value: float | None = Field(default=None, description="Measured value, in `unit`.")
     limit: float | None = Field(default=None, description="Limit that `value` was compared with, in `unit`.")
-    unit: str | None = None
+    unit: str | None = Field(default=None, description="Unit of `value` and `limit`; null: the event has no value.")

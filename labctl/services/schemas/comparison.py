@@ -7,6 +7,16 @@ from pydantic import Field
 from labctl.json_types.models import LeftOut
 from labctl.recording.info import Motion
 from labctl.services.schemas.base import ResponseModel
+from labctl.services.schemas.common_fields import (
+    MOTION,
+    POSITION,
+    DatasetNumbers,
+    OutputAxis,
+    RecordingNumber,
+    Serial,
+    TableRates,
+    VersionNumber,
+)
 
 AXIS = "The gyro axis whose output is compared."
 CORRECTED = "null: no version is applied."
@@ -18,8 +28,8 @@ class ModelLines(ResponseModel):
     A row for each level, a number for each `at` in it.
     """
 
-    axis: str
-    position: str
+    axis: OutputAxis
+    position: str = Field(description=POSITION)
     level: list[float] = Field(
         description="Temperature, deg C, of each line over the rate; table rate, deg/s, of "
         "each line over the temperature."
@@ -32,19 +42,24 @@ class ModelLines(ResponseModel):
         description="Points of the lines: table rate, deg/s, of lines over the rate; "
         "temperature, deg C, of lines over the temperature."
     )
-    error_dps: list[list[float]]
+    error_dps: list[list[float]] = Field(
+        description="Error (output minus true rate), deg/s: one row for each `level`, one value for each `at` in "
+        "each row."
+    )
 
 
 class ComparisonColumns(ResponseModel):
     """One row per data set (or piece of a long one) and output axis, as lists of equal length."""
 
     recording: list[int] = Field(default_factory=list, description="Number of the recording.")
-    dataset: list[int] = Field(default_factory=list, description="Number of the data set in its recording.")
+    dataset: DatasetNumbers = Field(default_factory=list)
     axis: list[str] = Field(default_factory=list, description="The output axis.")
     position: list[str] = Field(default_factory=list, description="The body axis that pointed along the table axis.")
-    table_rate_dps: list[float] = Field(default_factory=list)
+    table_rate_dps: TableRates = Field(default_factory=list)
     own_rate_dps: list[float] = Field(default_factory=list, description="True rate along the output axis, deg/s.")
-    temperature_c: list[float] = Field(default_factory=list)
+    temperature_c: list[float] = Field(
+        default_factory=list, description="Mean temperature of the unit during the data set, deg C."
+    )
     temperature_level_c: list[float] = Field(
         default_factory=list, description="Centre of the temperature level that the data set belongs to, deg C."
     )
@@ -75,9 +90,9 @@ class ComparisonColumns(ResponseModel):
 class ComparisonResponse(ResponseModel):
     """A version applied without refitting, and a recording."""
 
-    serial: str
-    version: int
-    recording: int
+    serial: Serial
+    version: VersionNumber
+    recording: RecordingNumber
     recordings: list[int] = Field(
         default_factory=list, description="All recordings that the version is compared with; `recording` is the newest."
     )
@@ -95,7 +110,7 @@ class ComparisonResponse(ResponseModel):
     at_rest_dps: float = Field(
         description="A data set counts as at rest if the magnitude of its table rate is below this, deg/s."
     )
-    columns: ComparisonColumns
+    columns: ComparisonColumns = Field(description="Measured and modelled error of each data set and output axis.")
     over_rate: list[ModelLines] = Field(description="A line over the table rate for each temperature level.")
     over_temperature: list[ModelLines] = Field(description="A line over temperature for each level of the table rate.")
 
@@ -104,7 +119,7 @@ class RestColumns(ResponseModel):
     """At rest: one row per data set, or piece of a long one, and output axis, as lists of equal length."""
 
     axis: list[str] = Field(default_factory=list, description=AXIS)
-    dataset: list[int] = Field(default_factory=list)
+    dataset: DatasetNumbers = Field(default_factory=list)
     t_s: list[float | None] = Field(
         default_factory=list, description="Time since the recording began, s; null: not known."
     )
@@ -136,7 +151,7 @@ class TurnColumns(ResponseModel):
     """Turns by known angles: one row per turn and output axis, as lists of equal length."""
 
     axis: list[str] = Field(default_factory=list, description=AXIS)
-    dataset: list[int] = Field(default_factory=list)
+    dataset: DatasetNumbers = Field(default_factory=list)
     about: list[str] = Field(default_factory=list, description="Body axis that pointed up, with its sign.")
     asked_deg: list[float] = Field(default_factory=list, description="True angle that the output axis turned by, deg.")
     output_deg: list[float] = Field(default_factory=list, description="Integral of the uncorrected output, deg.")
@@ -157,12 +172,16 @@ class ProfileColumns(ResponseModel):
     """A rate that changes: one row per window of readings and output axis, as lists of equal length."""
 
     axis: list[str] = Field(default_factory=list, description=AXIS)
-    dataset: list[int] = Field(default_factory=list)
-    t_s: list[float] = Field(default_factory=list)
+    dataset: DatasetNumbers = Field(default_factory=list)
+    t_s: list[float] = Field(
+        default_factory=list, description="Mean time of the readings of the window, s since the recording began."
+    )
     true_dps: list[float] = Field(
         default_factory=list, description="Component of the table's rate along the axis, deg/s."
     )
-    output_dps: list[float] = Field(default_factory=list)
+    output_dps: list[float] = Field(
+        default_factory=list, description="Mean of the uncorrected output in the window, deg/s."
+    )
     residual_dps: list[float | None] = Field(
         default_factory=list,
         description=f"Corrected rate minus true rate, as a user of the calibration obtains it, deg/s; {CORRECTED}",
@@ -175,14 +194,19 @@ class ProfileColumns(ResponseModel):
 
 
 class AxisResponse(ResponseModel):
-    """Delay and bandwidth of one axis, as a version has them; null: not part of its model, or not known."""
+    """Delay and bandwidth of one axis, as a version has them."""
 
-    delay_s: float | None = None
-    u_delay_s: float | None = None
+    delay_s: float | None = Field(default=None, description="Delay of the output, s; null: not part of the model.")
+    u_delay_s: float | None = Field(
+        default=None, description="Standard uncertainty of the delay, s; null: not part of the model, or not known."
+    )
     bandwidth_hz: float | None = Field(
         default=None, description="Frequency at which the power is halved, 1/(2 pi time constant), Hz."
     )
-    u_bandwidth_hz: float | None = None
+    u_bandwidth_hz: float | None = Field(
+        default=None,
+        description="Standard uncertainty of the bandwidth, Hz; null: not part of the model, or not known.",
+    )
     expanded_delay_s: float | None = Field(
         default=None, description="Expanded uncertainty of the delay by its budget, s; it covers with 95.45 %."
     )
@@ -194,8 +218,8 @@ class AxisResponse(ResponseModel):
 class PoseColumns(ResponseModel):
     """Turns by hand between rests: one row per move, as lists of equal length."""
 
-    from_s: list[float] = Field(default_factory=list)
-    until_s: list[float] = Field(default_factory=list)
+    from_s: list[float] = Field(default_factory=list, description="Start of the move, s since the recording began.")
+    until_s: list[float] = Field(default_factory=list, description="End of the move, s since the recording began.")
     accelerometer_deg: list[float] = Field(
         default_factory=list,
         description="Angle between gravity before and after the move, from the accelerometer, deg.",
@@ -213,12 +237,12 @@ class PoseColumns(ResponseModel):
 class MotionResponse(ResponseModel):
     """A recording by what moved the unit; exactly one of `rest`, `turns`, `profile` and `poses` is present."""
 
-    serial: str
-    recording: int
+    serial: Serial
+    recording: RecordingNumber
     version: int | None = Field(
         description="Version that is applied without refitting; null: none, the outputs are not corrected."
     )
-    motion: Motion
+    motion: Motion = Field(description=MOTION)
     source: str = Field(
         description="A sentence that names the version and the recording from which the numbers were computed."
     )
@@ -227,10 +251,18 @@ class MotionResponse(ResponseModel):
         description="Number of rows of each axis in the recording; if larger than `rows`, evenly spaced "
         "rows were chosen."
     )
-    rest: RestColumns | None = None
-    turns: TurnColumns | None = None
-    profile: ProfileColumns | None = None
-    poses: PoseColumns | None = None
+    rest: RestColumns | None = Field(
+        default=None, description="Data sets at rest; null: the unit was moved in another way."
+    )
+    turns: TurnColumns | None = Field(
+        default=None, description="Turns by known angles; null: the unit was moved in another way."
+    )
+    profile: ProfileColumns | None = Field(
+        default=None, description="Windows of a rate profile; null: the unit was moved in another way."
+    )
+    poses: PoseColumns | None = Field(
+        default=None, description="Turns by hand between rests; null: the unit was moved in another way."
+    )
     responses: dict[str, AxisResponse] = Field(
         default_factory=dict, description="Delay and bandwidth of each axis; only for a rate profile."
     )

@@ -25,15 +25,26 @@ from labctl.json_types.joint import JointJson
 from labctl.json_types.models import ThermalFamilyJson, ThermalHintJson
 from labctl.json_types.views import Views
 from labctl.services.schemas.base import ResponseModel
+from labctl.services.schemas.common_fields import (
+    POSITION,
+    DatasetNumbers,
+    MaxError,
+    MeanError,
+    RecordingNumber,
+    RmsError,
+    Serial,
+    TableRates,
+    VersionNumber,
+)
 from labctl.services.schemas.warnings import WARNINGS, DataWarning
 
 
 class AxisVerification(ResponseModel):
     """Corrected minus true rate of one axis over the data sets, deg/s."""
 
-    rms_dps: float
-    max_dps: float
-    bias_dps: float
+    rms_dps: RmsError
+    max_dps: MaxError
+    bias_dps: MeanError
     expected_dps: float | None = Field(
         default=None,
         description="RMS error that is expected of the version on this axis, deg/s: that over all axes times the share "
@@ -52,20 +63,22 @@ class VerificationResponse(ResponseModel):
     """A calibration version applied without refitting to a recording, nothing fitted. Errors: corrected minus true
     rate."""
 
-    serial: str
-    version: int
-    recording: int
+    serial: Serial
+    version: VersionNumber
+    recording: RecordingNumber
     recorded_unit: str = Field(description="Serial number of the unit that was recorded.")
     seen: bool = Field(description="Whether the version was fitted to these data sets.")
     part: Literal["verification", "all"] = Field(
         description="verification: the data sets of the recording that were measured to verify, and are never fitted; "
         "all: the recording has none, so every data set."
     )
-    datasets: int
-    rms_dps: float = Field(description="Root mean square of the error over data sets and axes, deg/s.")
-    max_dps: float
-    bias_dps: float = Field(description="Mean of the error over data sets and axes, deg/s.")
-    axes: dict[str, AxisVerification]
+    datasets: int = Field(description="Number of data sets to which the version was applied.")
+    rms_dps: RmsError
+    max_dps: MaxError
+    bias_dps: MeanError
+    axes: dict[str, AxisVerification] = Field(
+        description="For each axis: its error, what is expected of it, and its limit."
+    )
     axes_off: list[str] = Field(
         default_factory=list, description="Axes whose RMS error is beyond the limit of the axis."
     )
@@ -82,9 +95,9 @@ class VerificationResponse(ResponseModel):
 class CriticismResponse(ResponseModel):
     """A model compared with a recording: the verdict in one of five forms, and its evidence."""
 
-    serial: str
-    version: int
-    recording: int
+    serial: Serial
+    version: VersionNumber
+    recording: RecordingNumber
     recordings: list[int] = Field(
         default_factory=list, description="All recordings that the model is compared with; `recording` is the newest."
     )
@@ -93,13 +106,22 @@ class CriticismResponse(ResponseModel):
         description="Only for several recordings: repeatability, agreement between the recordings, and the error "
         "when each recording is predicted by a fit to the others.",
     )
-    verdict: Literal["adequate", "missing", "ambiguous", "unexplained", "insufficient_data"]
+    verdict: Literal["adequate", "missing", "ambiguous", "unexplained", "insufficient_data"] = Field(
+        description="adequate: the residual is explained by noise; missing: the named effects are missing in the "
+        "model; ambiguous: one of the named effects is missing, and the data do not distinguish them; unexplained: "
+        "no effect of the catalogue explains the residual; insufficient_data: too little was measured for a "
+        "verdict."
+    )
     text: list[str] = Field(description="The verdict in sentences, the conclusion first.")
-    error: CriticisedErrors
-    noise: CriticisedNoise
-    lack_of_fit: LackOfFit
+    error: CriticisedErrors = Field(
+        description="Errors of the model as refitted for this comparison, and the noise floor, deg/s."
+    )
+    noise: CriticisedNoise = Field(description="The noise by which the residual is judged.")
+    lack_of_fit: LackOfFit = Field(description="Test of whether the residual is larger than the noise explains.")
     where: list[FailingRange] = Field(description="Ranges of channels in which the residual is far from 0.")
-    suspects: list[Suspect]
+    suspects: list[Suspect] = Field(
+        description="Effects that may be missing in the model, each with its evidence and size."
+    )
     named: list[str] = Field(description="The effects that the verdict is based on.")
     depends_on: list[str] = Field(description="Channels that the residual depends on, strongest first.")
     confounded_with: list[str] = Field(
@@ -143,8 +165,11 @@ class CriticismResponse(ResponseModel):
         default_factory=list,
         description="For each effect that the verdict is based on: whether to add it, by what would be exported.",
     )
-    not_testable: list[NotTestable]
-    experiments: list[Experiment]
+    not_testable: list[NotTestable] = Field(description="Effects that this recording cannot show, and why.")
+    experiments: list[Experiment] = Field(
+        description="Measurements that would distinguish the effects in question, or show effects that cannot be "
+        "seen here."
+    )
     worst: list[WorstDataSet] = Field(default_factory=list, description="Data sets furthest from the model.")
     maps: list[ResidualMap] = Field(
         default_factory=list, description="Maps of the residual divided by the noise floor, over rate and temperature."
@@ -166,29 +191,35 @@ class CriticismResponse(ResponseModel):
 class StageResponse(ResponseModel):
     """The stage of a followed criticism that begins now."""
 
-    stage: str
+    stage: str = Field(description="The stage in words, such as `inspecting the recording`.")
 
 
 class ResidualColumns(ResponseModel):
     """One row per data set and axis, as lists of equal length. A data set far longer than the others is in pieces."""
 
     recording: list[int] = Field(default_factory=list, description="Number of the recording.")
-    dataset: list[int] = Field(default_factory=list)
-    axis: list[str] = Field(default_factory=list)
-    position: list[str] = Field(default_factory=list)
-    run: list[int] = Field(default_factory=list)
-    table_rate_dps: list[float] = Field(default_factory=list)
+    dataset: DatasetNumbers = Field(default_factory=list)
+    axis: list[str] = Field(default_factory=list, description="Output axis: x, y or z.")
+    position: list[str] = Field(default_factory=list, description=POSITION)
+    run: list[int] = Field(default_factory=list, description="Number of the run, a powered session of the unit.")
+    table_rate_dps: TableRates = Field(default_factory=list)
     own_rate_dps: list[float] = Field(
         default_factory=list,
         description="True rate along the output axis, deg/s; it includes the Earth's rate where that is known.",
     )
-    temperature_c: list[float] = Field(default_factory=list)
-    t_s: list[float | None] = Field(default_factory=list)
+    temperature_c: list[float] = Field(
+        default_factory=list, description="Mean temperature of the unit during the data set, deg C."
+    )
+    t_s: list[float | None] = Field(
+        default_factory=list, description="Mean time of the data set, s since the recording began; null: not known."
+    )
     n: list[int | None] = Field(default_factory=list, description="Number of readings in the data set; null: unknown.")
     measured_error_dps: list[float] = Field(
         default_factory=list, description="Error of the output: output minus true rate along the axis, deg/s."
     )
-    modelled_error_dps: list[float] = Field(default_factory=list)
+    modelled_error_dps: list[float] = Field(
+        default_factory=list, description="Error that the model states: output minus true rate along the axis, deg/s."
+    )
     residual_dps: list[float] = Field(default_factory=list, description="Measured error minus modelled error, deg/s.")
     floor_dps: list[float | None] = Field(
         default_factory=list, description="Standard deviation of the data set's mean due to noise alone, deg/s."
@@ -201,21 +232,21 @@ class ResidualColumns(ResponseModel):
 class ResidualsResponse(ResponseModel):
     """The residual of a version on a recording."""
 
-    serial: str
-    version: int
-    recording: int
+    serial: Serial
+    version: VersionNumber
+    recording: RecordingNumber
     recordings: list[int] = Field(
         default_factory=list, description="All recordings that the model is compared with; `recording` is the newest."
     )
-    columns: ResidualColumns
+    columns: ResidualColumns = Field(description="Residual of each data set and axis.")
 
 
 class PictureResponse(ResponseModel):
     """One picture."""
 
-    id: str
-    title: str
-    how_to_read: str
+    id: str = Field(description="Identifier of the picture, for programs.")
+    title: str = Field(description="Title of the picture.")
+    how_to_read: str = Field(description="What the picture shows and how it is read, in words.")
     effects: list[str] = Field(description="Effects that would be visible in this picture.")
     figure: dict[str, JsonValue] = Field(description="A figure as Plotly describes it: data and layout.")
 
@@ -223,4 +254,4 @@ class PictureResponse(ResponseModel):
 class PicturesResponse(ResponseModel):
     """All pictures, cached: drawing them takes a second."""
 
-    pictures: list[PictureResponse]
+    pictures: list[PictureResponse] = Field(description="All pictures of a criticism.")

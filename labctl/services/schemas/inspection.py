@@ -7,6 +7,7 @@ from pydantic import Field
 from labctl.json_types.inspection import CourseJson, MarkJson
 from labctl.recording.info import LeftOut, Motion
 from labctl.services.schemas.base import ResponseModel
+from labctl.services.schemas.common_fields import KIND, MOTION, Serial
 from labctl.services.schemas.criticism import PictureResponse
 from labctl.services.schemas.warnings import WARNINGS, DataWarning
 
@@ -14,9 +15,9 @@ from labctl.services.schemas.warnings import WARNINGS, DataWarning
 class ReadingsExamined(ResponseModel):
     """What an examination of single readings found, as it is cached."""
 
-    warnings: list[DataWarning]
-    courses: list[CourseJson]
-    marks: list[MarkJson]
+    warnings: list[DataWarning] = Field(description="What is wrong with single readings; empty: nothing.")
+    courses: list[CourseJson] = Field(description="Each channel in bins: least and largest reading.")
+    marks: list[MarkJson] = Field(description="Where each finding about single readings is.")
 
 
 class InspectionResponse(ResponseModel):
@@ -24,9 +25,9 @@ class InspectionResponse(ResponseModel):
 
     source: str = Field(description="The file, or `recording N`.")
     recording: int | None = Field(description="Number of the recording; null: a file that is not imported.")
-    serial: str
-    kind: str
-    motion: Motion
+    serial: Serial
+    kind: str = Field(description=KIND)
+    motion: Motion = Field(description=MOTION)
     readings: int = Field(description="Readings that were examined, also those that are marked as bad.")
     warnings: list[DataWarning] = Field(description=WARNINGS)
     left_out: list[LeftOut] = Field(description="Readings that were left out by choice when it was imported.")

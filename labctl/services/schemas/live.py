@@ -9,6 +9,7 @@ from pydantic import Field
 
 from labctl.services.schemas.base import Request, ResponseModel
 from labctl.services.schemas.calibrations import FitResponse
+from labctl.services.schemas.common_fields import CoefficientName, CoefficientUnit, OutputAxis, Serial
 
 #: A serial number, as a recording takes it.
 SERIAL = r"^[A-Za-z0-9][A-Za-z0-9._+# -]{0,63}$"
@@ -74,24 +75,24 @@ class LiveEndRequest(Request):
 class LiveCoefficientResponse(ResponseModel):
     """One coefficient of a live calibration."""
 
-    axis: str
-    name: str
-    value: float
+    axis: OutputAxis
+    name: CoefficientName
+    value: float = Field(description="Value of the coefficient, in `unit`.")
     expanded: float = Field(description="Expanded uncertainty U with k = 2, in `unit`.")
-    unit: str
+    unit: CoefficientUnit
     limit: float | None = Field(description="Limit of U by the target; null: the target states none.")
 
 
 class LiveFigures(ResponseModel):
     """What the readings of a live calibration determine."""
 
-    readings: int
+    readings: int = Field(description="Number of readings so far.")
     lost: int = Field(description="Readings that are missing by the instrument's counter or by the clock.")
     damaged: int = Field(description="Lines or frames of the stream that could not be read.")
-    duration_s: float
-    rests: int
+    duration_s: float = Field(description="Time from the first to the last reading, s.")
+    rests: int = Field(description="Number of rests that were recognised.")
     poses: list[str] = Field(description="Asked poses that rests cover, by the body axes that point up.")
-    poses_asked: int
+    poses_asked: int = Field(description="Number of poses that the target asks for.")
     coefficients: list[LiveCoefficientResponse] = Field(
         description="By the fit to all readings; empty where they do not allow one."
     )
@@ -102,7 +103,7 @@ class LiveFigures(ResponseModel):
 class LiveResponse(LiveFigures):
     """Result of a live calibration: what was measured, what it determines, and what is missing."""
 
-    serial: str
+    serial: Serial
     complete: bool = Field(description="Whether the target was reached.")
     ended: LiveEnd = Field(
         description="Why it ended: the target was reached, the stream ended or failed, or the person ended it."
@@ -119,7 +120,7 @@ class LivePoseResponse(ResponseModel):
     """A pose of a unit."""
 
     name: str = Field(description="Body axes that point up, such as `z`, `x,-z` or `x,y,-z`.")
-    text: str
+    text: str = Field(description="The pose in words.")
     up: list[float] = Field(description="The direction in the body that points up, of length 1: x, y, z.")
     covered: bool = Field(description="Whether a rest that is long enough covers it.")
 
@@ -129,7 +130,7 @@ class LiveTargetResponse(ResponseModel):
 
     u: float = Field(description="Limit of U (k = 2) of each scale factor and each misalignment (rad), 1.")
     bias_dps: float | None = Field(description="Limit of U (k = 2) of each bias, deg/s; null: none.")
-    poses: int
+    poses: int = Field(description="Number of poses to ask for, 12 to 26.")
     rest_s: float = Field(description="How long the unit is to rest in a pose, s.")
 
 
@@ -164,13 +165,15 @@ class LiveStateResponse(ResponseModel):
         "`done`: with a version; `ended`: without one, the recording is kept; `failed`: see `text`."
     )
     number: int = Field(description="It counts the calibrations of this service process; 0: none.")
-    serial: str
+    serial: str = Field(description="Serial number of the unit; empty: none since the service began.")
     stream: str = Field(description="Where the readings come from.")
     bench: str = Field(description="The bench that it has meanwhile; empty for a stream of the network.")
     by: str = Field(description="Who began it.")
-    started_at: datetime | None
+    started_at: datetime | None = Field(description="Time at which it began; null: none since the service began.")
     end_unwatched: bool = Field(description="Whether it ends once no page has followed it for 30 s.")
-    target: LiveTargetResponse | None
+    target: LiveTargetResponse | None = Field(
+        description="When the calibration is complete; null: none since the service began."
+    )
     moment: LiveMoment | None = Field(description="Null before the first readings.")
     text: str = Field(description="What it is doing, or why it ended, in words.")
     result: LiveResponse | None = Field(description="Once the recording is stored.")
@@ -183,9 +186,9 @@ class LiveStateResponse(ResponseModel):
 class LiveUncertaintyColumn(ResponseModel):
     """U of one coefficient over the fits of a live calibration."""
 
-    axis: str
-    name: str
-    unit: str
+    axis: OutputAxis
+    name: CoefficientName
+    unit: CoefficientUnit
     limit: float | None = Field(description="Limit of U by the target; null: the target states none.")
     expanded: list[float | None] = Field(description="U (k = 2) at each fit, in `unit`; null: the fit has none.")
 
@@ -196,4 +199,4 @@ class LiveHistoryResponse(ResponseModel):
     number: int = Field(description="Which calibration of this service process.")
     t_s: list[float] = Field(description="Time of the last reading of each fit, s since the first.")
     poses: list[int] = Field(description="Poses that were covered.")
-    coefficients: list[LiveUncertaintyColumn]
+    coefficients: list[LiveUncertaintyColumn] = Field(description="U of each coefficient, fit by fit.")

@@ -9,6 +9,16 @@ from pydantic import AfterValidator, Field
 
 from instruments.toml_documents import shown
 from labctl.services.schemas.base import LongText, Request, ResponseModel
+from labctl.services.schemas.common_fields import (
+    BenchName,
+    CampaignNumber,
+    Clip,
+    DatasetCount,
+    ExpectedDuration,
+    RecipeName,
+    ScheduleHash,
+    StepCount,
+)
 from procedures.contracts.campaign_state import CampaignState
 from procedures.contracts.errors import RecipeError
 from procedures.recipe.recipe import shipped_recipes
@@ -35,9 +45,7 @@ class PlanRequest(Request):
     """Which recipe to plan on the service's bench."""
 
     recipe: RecipeSource
-    clip: bool = Field(
-        default=False, description="Leave out points that are beyond the limits of the bench or of a unit."
-    )
+    clip: Clip = False
     visibility: bool = Field(
         default=False, description="Also compute which effects the plan could detect; takes some seconds."
     )
@@ -56,7 +64,7 @@ class AttendanceResponse(ResponseModel):
     """When a plan needs a person at the bench, to turn or to switch the units."""
 
     start: datetime = Field(description="Start of the campaign; all times are in `time_zone`.")
-    time_zone: str
+    time_zone: str = Field(description="Time zone of all times, such as Europe/Berlin.")
     needed_at: list[datetime] = Field(
         description="Times at which a person is expected to be needed; questions close together count as one."
     )
@@ -72,16 +80,21 @@ class AttendanceResponse(ResponseModel):
 class Visibility(ResponseModel):
     """Whether a schedule could show an effect, and from which size on."""
 
-    effect: str
-    visible: bool
+    effect: str = Field(description="Id of the effect in the catalogue.")
+    visible: bool = Field(description="Whether the plan could show the effect.")
     share: float = Field(description="Share of the effect that the rest of the model does not absorb, 0 to 1.")
     smallest_size: float | None = Field(
         default=None, description="Smallest size of the effect that the plan can detect, in `unit`."
     )
-    unit: str = ""
-    why: Literal["channel", "schedule"] | None = None
-    needs: list[str] = Field(default_factory=list)
-    experiment: str = ""
+    unit: str = Field(default="", description="Unit of `smallest_size`; empty: none.")
+    why: Literal["channel", "schedule"] | None = Field(
+        default=None,
+        description="What hides the effect: a channel that is not logged, or the schedule; null: it is visible.",
+    )
+    needs: list[str] = Field(default_factory=list, description="Channels that would have to be logged; empty: none.")
+    experiment: str = Field(
+        default="", description="What would have to be measured to show the effect; empty: nothing more."
+    )
 
 
 class FurtherMountings(ResponseModel):
@@ -110,15 +123,18 @@ class MisalignmentOutlook(ResponseModel):
 class PlanResponse(ResponseModel):
     """What a campaign would do, before anything moves."""
 
-    recipe: str
-    bench: str
-    steps: int
-    datasets: int
-    expected_s: float
+    recipe: RecipeName
+    bench: BenchName
+    steps: StepCount
+    datasets: DatasetCount
+    expected_s: ExpectedDuration
+    guessed: list[str] = Field(
+        default_factory=list, description="Figures of the expected time that the bench file does not state."
+    )
     verification_datasets: int = Field(description="Number of the data sets that verify and are never fitted.")
     verification_s: float = Field(description="Expected time of these, with their mountings and soaks, s.")
     clipped: list[str] = Field(description="Points left out because the bench or the unit cannot do them.")
-    schedule_hash: str
+    schedule_hash: ScheduleHash
     misalignment: MisalignmentOutlook | None = Field(
         default=None,
         description="How well a misalignment can be known at best; null: no unit turns across one of its outputs, or "
@@ -140,13 +156,15 @@ StepState = Literal["to come", "running", "done", "failed", "interrupted", "skip
 class RecipeResponse(ResponseModel):
     """A recipe that comes with labctl, and what it would take."""
 
-    name: str
-    description: str
+    name: RecipeName
+    description: str = Field(description="What the recipe is for, in words.")
     text: str = Field(description="The recipe itself, TOML.")
-    bench: str
-    steps: int | None = None
-    datasets: int | None = None
-    expected_s: float | None = None
+    bench: str = Field(description="Name of the bench that the recipe was planned on.")
+    steps: int | None = Field(default=None, description="Number of steps of the plan; null: see `refused`.")
+    datasets: int | None = Field(default=None, description="Number of data sets of the plan; null: see `refused`.")
+    expected_s: float | None = Field(
+        default=None, description="Expected duration of the campaign, s; null: see `refused`."
+    )
     refused: str | None = Field(
         default=None, description="Why this bench cannot run the recipe; steps, data sets and time are then null."
     )
@@ -158,11 +176,11 @@ class TimelineColumns(ResponseModel):
     """The steps of a plan in order, as lists of equal length."""
 
     number: list[int] = Field(description="From 1.")
-    kind: list[str]
+    kind: list[str] = Field(description="Kind of step, such as soak, acquire or turn.")
     start_s: list[float] = Field(
         description="Start of the step, s from the beginning, if every step takes as long as expected."
     )
-    expected_s: list[float]
+    expected_s: list[float] = Field(description="Expected duration of the step, s.")
     temperature_c: list[float | None] = Field(
         description="Set point of the chamber during the step, deg C; null: no set point was set yet."
     )
@@ -176,23 +194,27 @@ class TimelineColumns(ResponseModel):
         description="Body axis of the units that points along the table axis (by "
         "hand: up); null: not yet turned by the campaign."
     )
-    dataset: list[int | None]
+    dataset: list[int | None] = Field(
+        description="Number of the data set that the step measures, from 1; null: it measures none."
+    )
 
 
 class PlannedResponse(PlanResponse):
     """What a campaign would do, with its steps."""
 
-    timeline: TimelineColumns
+    timeline: TimelineColumns = Field(description="The steps of the plan, with expected times.")
 
 
 class RunColumns(TimelineColumns):
     """The steps of a campaign, with what became of each."""
 
-    state: list[StepState]
+    state: list[StepState] = Field(description="What became of the step.")
     started_s: list[float | None] = Field(
         description="Start of the step, s since the start of the campaign; null: not yet started."
     )
-    ended_s: list[float | None]
+    ended_s: list[float | None] = Field(
+        description="End of the step, s since the start of the campaign; null: not yet ended."
+    )
     forecast_s: list[float] = Field(
         description="Start of the step, s since the start of the campaign: measured, or for future steps computed "
         "from the expected times."
@@ -202,16 +224,16 @@ class RunColumns(TimelineColumns):
 class CampaignPlanResponse(ResponseModel):
     """The plan of a campaign, and how far it is."""
 
-    campaign: int
-    recipe: str
+    campaign: CampaignNumber
+    recipe: RecipeName
     text: str = Field(
         description="Text of the recipe that was run, TOML; empty: an older version of labctl ran the campaign "
         "and did not store the text."
     )
-    bench: str
-    state: CampaignState
-    schedule_hash: str
-    steps: int
-    datasets: int
-    expected_s: float
-    timeline: RunColumns
+    bench: BenchName
+    state: CampaignState = Field(description="State of the campaign.")
+    schedule_hash: ScheduleHash
+    steps: StepCount
+    datasets: DatasetCount
+    expected_s: ExpectedDuration
+    timeline: RunColumns = Field(description="The steps of the campaign, with expected and real times.")

@@ -10,6 +10,18 @@ from instruments.bench_config import SERIAL
 from labctl.json_types.noise import AllanJson
 from labctl.recording.info import LeftOut, Motion
 from labctl.services.schemas.base import Request, ResponseModel
+from labctl.services.schemas.common_fields import (
+    KIND,
+    MOTION,
+    POSITION,
+    BenchName,
+    DatasetCount,
+    ReadingCount,
+    RecipeName,
+    RecordingNumber,
+    Serial,
+    TableRates,
+)
 from labctl.services.schemas.plans import RecipeSource
 from labctl.services.schemas.warnings import WARNINGS, DataWarning
 
@@ -53,10 +65,10 @@ class ExampleRequest(Request):
 class ImportResponse(ResponseModel):
     """A recording that is now in the database."""
 
-    serial: str
-    recording: int
-    datasets: int
-    readings: int
+    serial: Serial
+    recording: RecordingNumber
+    datasets: int = Field(description="Number of data sets; 0: a table of coefficients.")
+    readings: int = Field(description="Number of readings; of means or coefficients, the number of rows.")
     suggested_model: str = Field(default="bias_scale", description="Name of a model that suits this kind of recording.")
     measured_at: datetime | None = Field(
         default=None, description="Date of the measurement; null: the file states none, and it is not known."
@@ -70,9 +82,9 @@ class ImportResponse(ResponseModel):
 class SimulatedRecordingResponse(ImportResponse):
     """A simulated recording that is now in the database."""
 
-    recipe: str
-    bench: str
-    seed: int
+    recipe: RecipeName
+    bench: BenchName
+    seed: int = Field(description="Seed of the random numbers; the same seed gives the same recording.")
     hidden: dict[str, float] = Field(
         description="For each effect that is hidden in the unit: its size, in the unit of the catalogue's coefficient."
     )
@@ -81,22 +93,15 @@ class SimulatedRecordingResponse(ImportResponse):
 class RecordingResponse(ResponseModel):
     """One line of the list of recordings."""
 
-    id: int
-    serial: str
-    kind: str = Field(
-        description="Kind of data: samples (every reading), points (one mean per data set) or "
-        "coefficients (a published table)."
-    )
+    id: RecordingNumber
+    serial: Serial
+    kind: str = Field(description=KIND)
     campaign: int | None = Field(description="The campaign that made the recording; null: the recording was imported.")
-    datasets: int
-    readings: int
-    created_at: datetime
-    notes: str = ""
-    motion: Motion = Field(
-        default="rates",
-        description="How the unit was moved: at constant table rates, at rest, "
-        "turned by known angles, along a rate profile, or by hand between poses.",
-    )
+    datasets: DatasetCount
+    readings: ReadingCount
+    created_at: datetime = Field(description="Time at which the recording was stored.")
+    notes: str = Field(default="", description="Notes of recording.toml; empty: none.")
+    motion: Motion = Field(default="rates", description=MOTION)
     simulated_time: bool = Field(
         default=False, description="Whether `created_at` is by the clock of a simulated bench."
     )
@@ -105,20 +110,17 @@ class RecordingResponse(ResponseModel):
 class RecordingFacts(ResponseModel):
     """What a recording is."""
 
-    id: int
-    serial: str
-    campaign: int | None
-    kind: str = Field(
-        description="Kind of data: samples (every reading), points (one mean per data set) or "
-        "coefficients (a published table)."
-    )
+    id: RecordingNumber
+    serial: Serial
+    campaign: int | None = Field(description="Campaign that made the recording; null: the recording was imported.")
+    kind: str = Field(description=KIND)
     info: dict[str, JsonValue] = Field(
         description="Content of the file `recording.toml`: unit, axes, bench, data sheet, notes."
     )
-    created_at: str
-    simulated_time: bool
-    datasets: int
-    readings: int
+    created_at: str = Field(description="Time at which the recording was stored, ISO 8601.")
+    simulated_time: bool = Field(description="Whether `created_at` is by the clock of a simulated bench.")
+    datasets: DatasetCount
+    readings: ReadingCount
 
 
 class RecordingAlone(RecordingFacts):
@@ -137,9 +139,9 @@ class RecordingWithPoints(RecordingFacts):
 class SamplesResponse(ResponseModel):
     """The readings of one data set."""
 
-    recording: int
-    dataset: int
-    readings: int
+    recording: RecordingNumber
+    dataset: int = Field(description="Number of the data set in the recording.")
+    readings: int = Field(description="Number of readings of the data set, also of those that were not requested.")
     columns: Columns = Field(
         description="For each column: one value per reading, up to the number of readings that was requested."
     )
@@ -148,56 +150,74 @@ class SamplesResponse(ResponseModel):
 class ExportedRecording(ResponseModel):
     """A recording that was written to a folder."""
 
-    recording: int
-    folder: str
-    files: list[str]
+    recording: RecordingNumber
+    folder: str = Field(description="Path of the folder.")
+    files: list[str] = Field(description="Names of the files that were written.")
 
 
 class ChannelColumns(ResponseModel):
-    """A channel's figures by data set, in the channel's unit; null: none."""
+    """A channel's figures by data set."""
 
-    mean: list[float | None]
-    std: list[float | None]
+    mean: list[float | None] = Field(description="Mean of each data set, in the unit of the channel; null: none.")
+    std: list[float | None] = Field(
+        description="Standard deviation of single readings in each data set, in the unit of the channel; null: none."
+    )
 
 
 class DataSetsResponse(ResponseModel):
     """The data sets of a recording, as lists of equal length."""
 
-    recording: int
-    number: list[int]
-    state: list[str]
+    recording: RecordingNumber
+    number: list[int] = Field(description="Number of the data set in the recording.")
+    state: list[str] = Field(
+        description="State of the data set: open (being measured), complete or partial; only complete ones are fitted."
+    )
     reason: list[str] = Field(description="Why the data set is not complete; empty if it is complete.")
-    position: list[str]
-    run: list[int]
-    mounting: list[int]
-    table_rate_dps: list[float]
-    t_from_s: list[float | None]
-    t_until_s: list[float | None]
-    n: list[int]
-    lost: list[int]
-    damaged: list[int]
+    position: list[str] = Field(description=POSITION)
+    run: list[int] = Field(description="Number of the run, a powered session of the unit.")
+    mounting: list[int] = Field(description="Number of the mounting, one way in which the unit is fixed to the table.")
+    table_rate_dps: TableRates
+    t_from_s: list[float | None] = Field(
+        description="Time of the first reading, s since the recording began; null: not known."
+    )
+    t_until_s: list[float | None] = Field(
+        description="Time of the last reading, s since the recording began; null: not known."
+    )
+    n: list[int] = Field(description="Number of readings.")
+    lost: list[int] = Field(
+        description="Number of readings that are missing by the instrument's counter or by the clock."
+    )
+    damaged: list[int] = Field(description="Number of lines or frames that could not be read.")
     verification: list[bool] = Field(description="Whether it was measured to verify a calibration: never fitted.")
-    chamber_setpoint_c: list[float | None]
-    channels: dict[str, ChannelColumns]
+    chamber_setpoint_c: list[float | None] = Field(
+        description="Set point of the chamber, deg C; null: none, or not known."
+    )
+    channels: dict[str, ChannelColumns] = Field(
+        description="For each channel: mean and standard deviation by data set."
+    )
 
 
 class TraceResponse(ResponseModel):
     """One channel over a window of time, in bins that hold readings, as lists of equal length."""
 
-    recording: int
-    channel: str
-    unit: str
-    from_s: float | None
-    until_s: float | None
+    recording: RecordingNumber
+    channel: str = Field(description="Name of the channel.")
+    unit: str = Field(description="Unit of the channel; empty: none, or not known.")
+    from_s: float | None = Field(
+        description="Start of the window, s since the recording began; null: the recording has no times."
+    )
+    until_s: float | None = Field(
+        description="End of the window, s since the recording began; null: the recording has no times."
+    )
     raw: bool = Field(
         description="true: the bins were computed from all readings; false: from the stored minimum, "
         "maximum and mean of sections of each data set."
     )
     t_s: list[float] = Field(description="Mean time of the readings in each bin, s.")
-    min: list[float]
-    max: list[float]
-    mean: list[float]
-    n: list[int]
+    min: list[float] = Field(description="Smallest reading in each bin, in `unit`.")
+    max: list[float] = Field(description="Largest reading in each bin, in `unit`.")
+    mean: list[float] = Field(description="Mean of the readings in each bin, in `unit`.")
+    n: list[int] = Field(description="Number of readings in each bin.")
     channels: list[str] = Field(description="All channels of the recording that have a trace.")
 
 
@@ -208,8 +228,10 @@ class AllanResponse(ResponseModel):
         description="Number of the recording; null: the readings came from a file that is not in the database."
     )
     datasets: list[int] = Field(description="First and last data set of the section at rest.")
-    temperature_c: float | None
-    duration_s: float | None
+    temperature_c: float | None = Field(
+        description="Mean temperature of the section at rest, deg C; null: there was no thermometer."
+    )
+    duration_s: float | None = Field(description="Duration of the section at rest, s; null: not known.")
     axes: dict[str, AllanJson] = Field(
         description="For each axis: averaging times tau_s, deviation_dps with its 95 % interval low_dps to high_dps, "
         "model_dps, and the terms N, B and K."
@@ -222,17 +244,17 @@ class AllanResponse(ResponseModel):
 class LogColumn(ResponseModel):
     """One column of a log."""
 
-    name: str
+    name: str = Field(description="Name of the column in the file.")
     unit: str = Field(description="Unit that the file gives for the column; empty: none.")
-    is_text: bool
+    is_text: bool = Field(description="Whether the column holds text, not numbers.")
     target: str = Field(description="Column of the recording that this column becomes; empty: the column is not used.")
 
 
 class LogTarget(ResponseModel):
     """A column that a recording may have."""
 
-    name: str
-    meaning: str
+    name: str = Field(description="Name of the column in the recording.")
+    meaning: str = Field(description="What the column holds, in words.")
     unit: str = Field(description="Unit of the column in the recording; empty: none.")
     units: list[str] = Field(description="Units that a log may use for this quantity.")
 
@@ -240,23 +262,29 @@ class LogTarget(ResponseModel):
 class LogTrace(ResponseModel):
     """Least and largest value of a column in bins of equal count, in the file's own unit."""
 
-    name: str
+    name: str = Field(description="Name of the column in the file.")
     x: list[float] = Field(
         description="Middle of each bin: time in s, or the number of the row if the time is not known."
     )
-    low: list[float | None]
-    high: list[float | None]
+    low: list[float | None] = Field(
+        description="Smallest value in each bin, in the file's own unit; null: the bin has no number."
+    )
+    high: list[float | None] = Field(
+        description="Largest value in each bin, in the file's own unit; null: the bin has no number."
+    )
 
 
 class LogPreview(ResponseModel):
     """A log, its column map, and the recording that it would become; nothing was imported."""
 
-    file: str
-    importer: str
+    file: str = Field(description="Name of the file.")
+    importer: str = Field(description="Name of the importer that reads this format.")
     title: str = Field(description="Title of the format.")
-    rows: int
-    columns: list[LogColumn]
-    first_rows: list[list[str]]
+    rows: int = Field(description="Number of rows of the file.")
+    columns: list[LogColumn] = Field(description="Each column of the file.")
+    first_rows: list[list[str]] = Field(
+        description="First rows of the file as text, at most 8; one value for each column."
+    )
     column_map: dict[str, JsonValue] = Field(description="The column map: keys and values of a MAP.toml.")
     map_toml: str = Field(description="The column map as TOML text.")
     guesses: list[str] = Field(
@@ -268,11 +296,16 @@ class LogPreview(ResponseModel):
         "field `leave_out` of the import, by their kind `what`."
     )
     unused: list[str] = Field(description="Columns of the file that are not used.")
-    serial: str | None
+    serial: str | None = Field(description="Serial number of the unit; null: not known because of `problems`.")
     motion: str | None = Field(
         description="How the unit was moved, as `motion` in recording.toml; null: not known because of `problems`."
     )
-    datasets: int | None
-    duration_s: float | None
-    traces: list[LogTrace]
-    targets: list[LogTarget]
+    datasets: int | None = Field(
+        description="Number of data sets of the recording; null: not known because of `problems`."
+    )
+    duration_s: float | None = Field(
+        description="Time from the first to the last reading, s; null: not known because of `problems`, or the "
+        "file has no times."
+    )
+    traces: list[LogTrace] = Field(description="Course of the columns of numbers, in bins.")
+    targets: list[LogTarget] = Field(description="Columns that a recording may have, for the column map.")

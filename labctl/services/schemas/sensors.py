@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Annotated, Literal
+from typing import Literal
 
 from pydantic import Field
 
 from labctl.services.schemas.base import BY_KEY, Request, ResponseModel
+from labctl.services.schemas.common_fields import FormatTitle, Person, Serial
 from labctl.services.schemas.reports.accelerometer import AccelerometerResponse
 from labctl.services.schemas.reports.magnetometer import MagnetometerResponse
 
@@ -24,7 +25,9 @@ class MeasuredFile(Request):
 class MeasuredData(Request):
     """The data behind a result, and how they were read."""
 
-    files: list[MeasuredFile] = Field(min_length=1, max_length=1000)
+    files: list[MeasuredFile] = Field(
+        min_length=1, max_length=1000, description="The files that the result was fitted to."
+    )
     read_as: str = Field(
         max_length=1000, description="Columns, their unit, and the local gravity or field that was given."
     )
@@ -33,38 +36,40 @@ class MeasuredData(Request):
 class AccelerometerRequest(Request):
     """A calibration of an accelerometer, to be kept as the next version of a unit."""
 
-    data: MeasuredData
+    data: MeasuredData = Field(description="The data that the result was fitted to.")
     result: AccelerometerResponse = Field(description="As `labctl accelerometer FILE --json` prints it.")
-    by: Annotated[str, Field(min_length=1, max_length=200, description="Who.")]
+    by: Person = Field(min_length=1, max_length=200)
 
 
 class MagnetometerRequest(Request):
     """A calibration of a magnetometer, to be kept as the next version of a unit."""
 
-    data: MeasuredData
+    data: MeasuredData = Field(description="The data that the result was fitted to.")
     result: MagnetometerResponse = Field(description="As `labctl magnetometer FILE --json` prints it.")
-    by: Annotated[str, Field(min_length=1, max_length=200, description="Who.")]
+    by: Person = Field(min_length=1, max_length=200)
 
 
 class SensorFormatResponse(ResponseModel):
     """A format in which a version is available."""
 
     id: str = Field(description="Name of the format, to be sent as `format`.")
-    title: str
+    title: FormatTitle
     suffix: str = Field(description="Suffix of a file in this format, without the dot.")
 
 
 class SensorVersionResponse(ResponseModel):
     """A version of a sensor, without its parameters."""
 
-    serial: str
-    sensor: SensorName
+    serial: Serial
+    sensor: SensorName = Field(description="The sensor of the unit that was calibrated.")
     version: int = Field(description="From 1, per serial number and sensor; a version never changes.")
-    verdict: Literal["adequate", "unexplained"]
+    verdict: Literal["adequate", "unexplained"] = Field(
+        description="adequate: the fit explains the data to their noise; unexplained: it does not."
+    )
     at: datetime = Field(description="When it was stored.")
-    by: str
+    by: Person
     by_key: str | None = Field(description=BY_KEY)
-    data: MeasuredData
+    data: MeasuredData = Field(description="The data that the result was fitted to.")
     hash: str = Field(description="SHA-256 of the result in canonical JSON.")
     summary: list[str] = Field(description="What the fit found, in sentences.")
     formats: list[SensorFormatResponse] = Field(
@@ -75,10 +80,10 @@ class SensorVersionResponse(ResponseModel):
 class AccelerometerVersion(SensorVersionResponse):
     """A version of a unit's accelerometer."""
 
-    result: AccelerometerResponse
+    result: AccelerometerResponse = Field(description="Parameters of the accelerometer.")
 
 
 class MagnetometerVersion(SensorVersionResponse):
     """A version of a unit's magnetometer."""
 
-    result: MagnetometerResponse
+    result: MagnetometerResponse = Field(description="Parameters of the magnetometer.")

@@ -9,6 +9,17 @@ from pydantic import AwareDatetime, Field, model_validator
 
 from instruments.bench_config import SERIAL
 from labctl.services.schemas.base import LongText, Request, ResponseModel
+from labctl.services.schemas.common_fields import (
+    ActTime,
+    CertificateNumber,
+    InForce,
+    Person,
+    Reason,
+    Sentences,
+    Serial,
+    StandardLabel,
+    VersionNumber,
+)
 
 TEXT = 2000
 #: No certificate states a smaller uncertainty; the square of a much smaller one has no number.
@@ -31,9 +42,9 @@ class StandardRequest(Request):
     unit: str | None = Field(
         default=None, min_length=1, max_length=10, description="Unit of its values; default: that of a bench file."
     )
-    serial: str = Field(default="", max_length=100)
-    description: LongText = Field(default="", max_length=TEXT)
-    by: str = Name
+    serial: str = Field(default="", max_length=100, description="Serial number of the standard; empty: not stated.")
+    description: LongText = Field(default="", max_length=TEXT, description="Description of the standard; empty: none.")
+    by: Person = Name
 
 
 class CertifiedPointRequest(Request):
@@ -63,19 +74,23 @@ class CertifiedPointRequest(Request):
 class StandardCertificateRequest(Request):
     """Enter a certificate of a standard."""
 
-    number: str = Field(min_length=1, max_length=100)
-    laboratory: str = Field(min_length=1, max_length=300)
-    calibrated: date
+    number: CertificateNumber = Field(min_length=1, max_length=100)
+    laboratory: str = Field(min_length=1, max_length=300, description="Laboratory that issued the certificate.")
+    calibrated: date = Field(description="Day of the calibration.")
     due: date | None = Field(default=None, description="Last day on which the standard may be used.")
     adjusted: bool = Field(
         default=False, description="Whether the standard was adjusted or repaired before: no drift leads across it."
     )
-    traceability: LongText = Field(default="", max_length=TEXT)
-    points: list[CertifiedPointRequest] = Field(min_length=1, max_length=200)
+    traceability: LongText = Field(
+        default="", max_length=TEXT, description="Traceability, as the certificate states it; empty: not stated."
+    )
+    points: list[CertifiedPointRequest] = Field(
+        min_length=1, max_length=200, description="What the certificate states at each nominal."
+    )
     reason: str = Field(
         default="", max_length=TEXT, description="Why this replaces an entry of the same number that was typed wrong."
     )
-    by: str = Name
+    by: Person = Name
 
     @model_validator(mode="after")
     def _consistent(self) -> StandardCertificateRequest:
@@ -96,8 +111,8 @@ class StandardCheckRequest(Request):
     u: float = Field(gt=0, allow_inf_nan=False, description="Standard uncertainty of the check.")
     nominal: float | None = Field(default=None, allow_inf_nan=False, description=NOMINAL)
     checked_at: AwareDatetime | None = Field(default=None, description="Default: now.")
-    note: LongText = Field(default="", max_length=TEXT)
-    by: str = Name
+    note: LongText = Field(default="", max_length=TEXT, description="Remark on the check; empty: none.")
+    by: Person = Name
 
 
 class StandardBadRequest(Request):
@@ -105,8 +120,8 @@ class StandardBadRequest(Request):
 
     bad_from: date = Field(description="First day of which it is not known that the standard was good.")
     bad_until: date | None = Field(default=None, description="Last such day; null: it is still bad.")
-    reason: str = Field(min_length=1, max_length=TEXT)
-    by: str = Name
+    reason: Reason = Field(min_length=1, max_length=TEXT)
+    by: Person = Name
 
     @model_validator(mode="after")
     def _in_order(self) -> StandardBadRequest:
@@ -118,8 +133,8 @@ class StandardBadRequest(Request):
 class WithdrawFindingRequest(Request):
     """Withdraw a finding that was wrong."""
 
-    reason: str = Field(min_length=1, max_length=TEXT)
-    by: str = Name
+    reason: Reason = Field(min_length=1, max_length=TEXT)
+    by: Person = Name
 
 
 class CertifiedPointResponse(ResponseModel):
@@ -134,23 +149,28 @@ class CertifiedPointResponse(ResponseModel):
 class StandardCertificateResponse(ResponseModel):
     """A certificate of a standard."""
 
-    number: str
-    laboratory: str
-    calibrated: date
-    due: date | None
-    adjusted: bool
-    traceability: str
-    points: list[CertifiedPointResponse]
+    number: CertificateNumber
+    laboratory: str = Field(description="Laboratory that issued the certificate.")
+    calibrated: date = Field(description="Day of the calibration.")
+    due: date | None = Field(
+        description="Last day on which the standard may be used by this certificate; null: the certificate has no "
+        "due date."
+    )
+    adjusted: bool = Field(
+        description="Whether the standard was adjusted or repaired before: no drift leads across it."
+    )
+    traceability: str = Field(description="Traceability, as the certificate states it; empty: not stated.")
+    points: list[CertifiedPointResponse] = Field(description="What the certificate states at each nominal.")
     reason: str = Field(description="Why it replaced an entry of the same number; empty: it replaced none.")
-    by: str
-    at: datetime
+    by: Person
+    at: datetime = Field(description="Time of the entry in the register.")
 
 
 class DriftPrediction(ResponseModel):
     """Value and uncertainty of a standard on a day, by a straight line through its certificates."""
 
     nominal: float | None = Field(description=NOMINAL)
-    on: date
+    on: date = Field(description="Day of the prediction.")
     value: float | None = Field(description="Predicted error: indicated minus true; null: the certificates state none.")
     u: float = Field(description="Standard uncertainty; it contains that of the drift where the drift is known.")
     per_year: float | None = Field(description="Drift per year; null: unknown, see `why`.")
@@ -165,66 +185,73 @@ class DriftPrediction(ResponseModel):
 class ChartLimits(ResponseModel):
     """Control limits of one value: three standard deviations about the centre line."""
 
-    basis: Literal["history", "stated u"]
-    centre: float
-    sigma: float
-    low: float
-    high: float
+    basis: Literal["history", "stated u"] = Field(
+        description="What the limits rest on: the earlier values of the chart, or the uncertainty that was stated."
+    )
+    centre: float = Field(description="Centre line of the chart, in the unit of the values.")
+    sigma: float = Field(description="Standard deviation of the chart, in the unit of the values.")
+    low: float = Field(description="Lower limit: centre minus three standard deviations.")
+    high: float = Field(description="Upper limit: centre plus three standard deviations.")
     values: int = Field(description="How many earlier values the limits are from; 0: they are stated.")
 
 
 class StandardCheckResponse(ResponseModel):
     """An intermediate check on the control chart of its nominal."""
 
-    checked_at: datetime
+    checked_at: datetime = Field(description="Time of the check.")
     nominal: float | None = Field(description=NOMINAL)
-    value: float
-    u: float
-    note: str
-    by: str
+    value: float = Field(description="Error that was found: indicated minus true, in the unit of the standard.")
+    u: float = Field(description="Standard uncertainty of the check, in the unit of the standard.")
+    note: str = Field(description="Remark on the check; empty: none.")
+    by: Person
     state: ChartState = Field(description="out: beyond three standard deviations by any of the limits.")
-    limits: list[ChartLimits]
+    limits: list[ChartLimits] = Field(description="Control limits of this check.")
 
 
 class StandardFindingResponse(ResponseModel):
     """A finding that a standard was bad."""
 
-    number: int
-    bad_from: date
+    number: int = Field(description="Number of the finding.")
+    bad_from: date = Field(description="First day of which it is not known that the standard was good.")
     bad_until: date | None = Field(description="null: it is still bad.")
-    reason: str
-    by: str
-    at: datetime
+    reason: Reason
+    by: Person
+    at: ActTime
     withdrawn: str = Field(description="Who withdrew it, when and why; empty: it is in force.")
 
 
 class StandardResponse(ResponseModel):
     """A reference standard: its state on a day, and what that rests on."""
 
-    label: str
-    serial: str
-    quantity: str
-    unit: str
-    description: str
-    state: StandardState
+    label: StandardLabel
+    serial: str = Field(description="Serial number of the standard; empty: not stated.")
+    quantity: str = Field(description="Quantity that the standard realises.")
+    unit: str = Field(description="Unit of its values.")
+    description: str = Field(description="Description of the standard; empty: none.")
+    state: StandardState = Field(
+        description="valid: it may be used; no certificate: nothing is known of it; overdue: its due date has "
+        "passed; check it: an intermediate check is out of limits; bad: it was found bad."
+    )
     text: list[str] = Field(description="The state in sentences, with what to do.")
     due: date | None = Field(description="Last day on which it may be used, of the newest certificate.")
     certificates: list[StandardCertificateResponse] = Field(description="By day of calibration, the newest last.")
     predictions: list[DriftPrediction] = Field(description="For each nominal, on the day that was asked for.")
     checks: list[StandardCheckResponse] = Field(description="In order of time.")
-    findings: list[StandardFindingResponse]
+    findings: list[StandardFindingResponse] = Field(description="Findings that the standard was bad, in order of time.")
 
 
 class AffectedCalibration(ResponseModel):
     """A calibration that a standard was used for."""
 
-    serial: str
-    version: int
+    serial: Serial
+    version: VersionNumber
     recordings: list[int] = Field(description="Its recordings that were measured with the standard.")
-    campaigns: list[int]
+    campaigns: list[int] = Field(description="Campaigns that made these recordings.")
     performed_from: date | None = Field(description="null: the date of a recording is not known.")
-    performed_until: date | None
-    in_force: bool
+    performed_until: date | None = Field(
+        description="Last day of these measurements; null: the date of a recording is not known."
+    )
+    in_force: InForce
     certificates: list[str] = Field(description="Numbers of the certificates issued of it, the newest first.")
     findings: list[int] = Field(description="Findings of the standard that hold for these days.")
 
@@ -232,8 +259,10 @@ class AffectedCalibration(ResponseModel):
 class AffectedResponse(ResponseModel):
     """The calibrations that a standard was used for between two days."""
 
-    label: str
+    label: StandardLabel
     bad_from: date | None = Field(description="null: from the beginning.")
     bad_until: date | None = Field(description="null: until now.")
-    calibrations: list[AffectedCalibration]
-    text: list[str]
+    calibrations: list[AffectedCalibration] = Field(
+        description="Each calibration that the standard was used for on these days."
+    )
+    text: Sentences

@@ -9,6 +9,7 @@ from pydantic import Field
 from labctl.json_types.models import LeftOut
 from labctl.services.schemas.base import ResponseModel
 from labctl.services.schemas.calibrations import Validity
+from labctl.services.schemas.common_fields import Serial, VersionNumber
 
 
 class BudgetLineResponse(ResponseModel):
@@ -21,9 +22,11 @@ class BudgetLineResponse(ResponseModel):
     )
     name: str = Field(description="Name of the reference standard, with the number of its certificate.")
     type: Literal["A", "B"] = Field(description="Evaluated by statistics (A) or otherwise (B).")
-    distribution: str
+    distribution: str = Field(
+        description="Distribution that is assumed of the input: normal, rectangular, triangular or u-shaped."
+    )
     u: float | None = Field(description="Standard uncertainty of the input, in `unit`; null: not stated or unknown.")
-    unit: str
+    unit: str = Field(description="Unit of the input.")
     sensitivity: float | None = Field(description="Derivative of the result along the input, per `unit`.")
     contribution: float | None = Field(description="Magnitude of sensitivity times u, in the unit of the result.")
     degrees_of_freedom: float | None = Field(description="null: infinite.")
@@ -33,7 +36,9 @@ class BudgetLineResponse(ResponseModel):
     )
     stated: bool = Field(description="Whether the bench states this standard; if not, it is not in the result.")
     overdue: bool = Field(description="Whether the standard was past its due date when it was used.")
-    due: str | None
+    due: str | None = Field(
+        description="Day until which the standard may be used, ISO 8601; null: no due date, or no standard."
+    )
     why: str = Field(description="Why a number is null or 0, or how it was evaluated.")
 
 
@@ -46,7 +51,7 @@ class BudgetResponse(ResponseModel):
     )
     unit: str = Field(description="Unit of the result and of every contribution; 1: a ratio to the rate.")
     value: float | None = Field(description="Of a coefficient.")
-    lines: list[BudgetLineResponse]
+    lines: list[BudgetLineResponse] = Field(description="Each source of uncertainty.")
     combined: float | None = Field(description="Combined standard uncertainty; null: a line of type A is unknown.")
     effective_degrees_of_freedom: float | None = Field(description="Welch-Satterthwaite; null: infinite.")
     k: float | None = Field(description="Coverage factor for a probability of 95.45 %.")
@@ -61,12 +66,14 @@ class BudgetResponse(ResponseModel):
 class ContributionLines(ResponseModel):
     """Contributions along one variable, deg/s."""
 
-    at: list[float]
+    at: list[float] = Field(description="Rates, deg/s, or temperatures, deg C, at which the budget was computed.")
     contributions: dict[str, list[float | None]] = Field(
         description="For each source: its contribution, deg/s; null: not stated."
     )
-    combined: list[float | None]
-    expanded: list[float | None]
+    combined: list[float | None] = Field(
+        description="Combined standard uncertainty at each point, deg/s; null: a line of type A is unknown."
+    )
+    expanded: list[float | None] = Field(description="Expanded uncertainty at each point, deg/s; null: unknown.")
 
 
 class ContributionsOver(ResponseModel):
@@ -74,8 +81,8 @@ class ContributionsOver(ResponseModel):
 
     temperature_c: float = Field(description="Temperature at which `over_rate` was computed, deg C.")
     rate_dps: float = Field(description="Rate at which `over_temperature` was computed, deg/s.")
-    over_rate: ContributionLines
-    over_temperature: ContributionLines
+    over_rate: ContributionLines = Field(description="Contributions over the rate, at `temperature_c`.")
+    over_temperature: ContributionLines = Field(description="Contributions over the temperature, at `rate_dps`.")
 
 
 class AxisUncertainty(ResponseModel):
@@ -181,14 +188,14 @@ class AnyAxisUncertainty(ResponseModel):
 class UncertaintyResponse(ResponseModel):
     """The uncertainty of a corrected rate on later days; the noise of a single reading is not included."""
 
-    serial: str
-    version: int
+    serial: Serial
+    version: VersionNumber
     rate_dps: float = Field(description="The rate, deg/s; of a rate vector its magnitude.")
-    temperature_c: float
+    temperature_c: float = Field(description="Temperature for which the uncertainty holds, deg C.")
     coverage_factor: float = Field(description="`expanded_dps` over `combined_dps`.")
     coverage: float = Field(description="Probability that the interval contains the true value.")
     inside: bool = Field(description="Whether rate and temperature are within the calibrated range.")
-    axes: dict[str, AxisUncertainty]
+    axes: dict[str, AxisUncertainty] = Field(description="For each axis: the uncertainty of its corrected rate.")
     budget: dict[str, BudgetResponse] = Field(description="For each axis: the budget of the corrected rate, deg/s.")
     coefficients: dict[str, dict[str, BudgetResponse]] = Field(
         description="For each axis: the budgets of bias, scale factor and misalignments at this temperature."
@@ -214,8 +221,8 @@ class UncertaintyResponse(ResponseModel):
 class Surface(ResponseModel):
     """One axis, turned about itself, the others at rest."""
 
-    rate_dps: list[float]
-    temperature_c: list[float]
+    rate_dps: list[float] = Field(description="Rates of the grid, deg/s.")
+    temperature_c: list[float] = Field(description="Temperatures of the grid, deg C.")
     error_dps: list[list[float]] = Field(
         description="Output minus true rate, deg/s: one row per temperature, one value per rate in each row."
     )
@@ -224,9 +231,9 @@ class Surface(ResponseModel):
 class SurfaceResponse(ResponseModel):
     """The error that a calibration subtracts, within the calibrated range."""
 
-    serial: str
-    version: int
-    validity: Validity
+    serial: Serial
+    version: VersionNumber
+    validity: Validity = Field(description="Rates and temperatures over which the model was calibrated.")
     held: dict[str, float] = Field(description="Other channels that the model needs, held at their mean in the fit.")
     left_out: list[LeftOut] = Field(description="Effects in the fitted model that the exported calibration leaves out.")
-    axes: dict[str, Surface]
+    axes: dict[str, Surface] = Field(description="For each axis: the error over rate and temperature.")

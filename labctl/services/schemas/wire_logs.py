@@ -8,6 +8,7 @@ from pydantic import BaseModel, Field
 
 from labctl.json_types import JsonObject
 from labctl.services.schemas.base import ResponseModel
+from labctl.services.schemas.common_fields import BenchName, Clip, EndsInDraft, FileName
 
 #: What a session does.
 SessionKind = Literal["campaign", "bench check", "campaign resume", "live", "driver test"]
@@ -24,13 +25,20 @@ class ReadingsDigest(ResponseModel):
 class RecordedSession(BaseModel):
     """What a session does, in the header of its wire log: enough to do it again."""
 
-    kind: SessionKind
-    recipe: str = ""  #: of a campaign: a shipped name, or its own TOML text
-    clip: bool = False
-    fit: bool = False
-    campaign: int | None = None  #: that is resumed, by its number in the database of the session
-    unit: str = ""  #: serial number, of a live calibration
-    description: JsonObject = Field(default_factory=dict)  #: of an instrument, which is tried
+    kind: SessionKind = Field(description="What the session does.")
+    recipe: str = Field(
+        default="", description="Only for a campaign: name of a shipped recipe, or its own text as TOML; else empty."
+    )
+    clip: Clip = False
+    fit: EndsInDraft = False
+    campaign: int | None = Field(
+        default=None,
+        description="Number of the campaign that is resumed, in the database of the session; null: none is.",
+    )
+    unit: str = Field(default="", description="Serial number of the unit of a live calibration; else empty.")
+    description: JsonObject = Field(
+        default_factory=dict, description="Description of the instrument that is tried; empty: none is."
+    )
 
     @property
     def can_be_replayed(self) -> bool:
@@ -41,24 +49,26 @@ class RecordedSession(BaseModel):
 class SessionResult(BaseModel):
     """How a session ended, in the last line of its wire log."""
 
-    state: str | None = None  #: of the campaign
-    readings: ReadingsDigest | None = None
-    said: list[str] = Field(default_factory=list)  #: findings of the check of a bench
-    ended_by: str | None = None  #: the error that ended it
-    left_out: int = 0  #: events that are not in the log
+    state: str | None = Field(
+        default=None, description="State in which the campaign ended; null: the session ran none."
+    )
+    readings: ReadingsDigest | None = Field(default=None, description="What the session measured; null: nothing.")
+    said: list[str] = Field(default_factory=list, description="Findings of the check of a bench.")
+    ended_by: str | None = Field(default=None, description="The error that ended the session; null: none did.")
+    left_out: int = Field(default=0, description="Number of events that are not in the log.")
 
 
 class ReplayResponse(ResponseModel):
     """What a replay of a wire log has come to."""
 
-    file: str
+    file: FileName
     ok: bool = Field(
         description="Whether labctl sent what it sent in the session, and the result is that of the session, as far as "
         "the log tells."
     )
     session: SessionKind = Field(description="What the session did.")
     labctl: str = Field(description="Release of labctl that wrote the log.")
-    bench: str
+    bench: BenchName
     duration_s: float = Field(description="Time from the begin of the session to the end of the log, s of its clock.")
     requests: int = Field(description="Number of requests that were the same as in the session.")
     whole: bool = Field(description="Whether the log has the end of the session.")

@@ -20,9 +20,10 @@ from labctl.errors import BadInput
 from labctl.recording import Recording, RecordingInfo
 from labctl.recording.columns import VERIFICATION
 from labctl.services.benches.standards import standards_of
-from procedures.contracts.steps import Acquire, Mount, MoveChamber, PowerOff, PowerOn
+from procedures.contracts.steps import Acquire, Mount, MoveChamber, PowerOff, PowerOn, Step
+from procedures.planning.chamber_time import counted_move_s
 from procedures.planning.plan import Plan
-from procedures.planning.step_writer import MOUNTING_S
+from procedures.planning.step_writer import MOUNTING_S, ROOM_C
 
 #: Interval of the environment log, s.
 ENVIRONMENT_S = 10.0
@@ -58,6 +59,7 @@ class _Walk:
         assert bench.chamber is not None
         self._table = bench.table
         self._run, self._setpoint = 0, bench.chamber.safe_c
+        self._ramp_c_per_min, self._air_c = bench.chamber.ramp_c_per_min, ROOM_C
         self._parts: list[dict[str, NDArray[np.generic]]] = []
         self._environment: list[tuple[float, int, float, float, float]] = []
 
@@ -80,10 +82,17 @@ class _Walk:
                     self._acquire(step)
                 case _:
                     pass
-            # as on a bench where a person turns the units, whatever the bench file says: a seed gives the same again
-            expected_s = MOUNTING_S if isinstance(step, Mount) else step.expected_s
-            self._t = max(self._t, begun + expected_s)
+            self._t = max(self._t, begun + self._counted_s(step))
             self._log(begun, self._t)
+
+    def _counted_s(self, step: Step) -> float:
+        """Return how long a step takes at least, s, whatever is known of the bench: a seed gives the same again."""
+        if isinstance(step, Mount):
+            return MOUNTING_S  # as on a bench where a person turns the units
+        if not isinstance(step, MoveChamber):
+            return step.expected_s
+        way_c, self._air_c = abs(step.temperature_c - self._air_c), step.temperature_c
+        return counted_move_s(way_c, self._ramp_c_per_min, step.band_c)
 
     def _log(self, from_s: float, until_s: float) -> None:
         if self._power_on_s is None:

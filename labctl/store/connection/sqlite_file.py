@@ -7,6 +7,7 @@ process writes; `writer_lock` enforces it.
 
 from __future__ import annotations
 
+import os
 import sqlite3
 from contextlib import suppress
 from pathlib import Path
@@ -19,11 +20,85 @@ from labctl.errors import StoreError
 from labctl.store.connection.anchor_file import anchor_fits, write_anchor
 from labctl.store.connection.commit_seal import count_commit, missing, seal
 from labctl.store.connection.engines import sqlite_engine
-from labctl.store.connection.file_identity import FileIdentity
 from labctl.store.connection.private_files import close_to_others, make_private
-from labctl.store.connection.start_check import first_damage
 from labctl.store.connection.writer_lock import ServiceAddress, WriterLock
 from labctl.store.manifests.chain import ChainHead
+
+# Which file a database is: one that was deleted or replaced below a running process is not written to any more.
+#
+# SQLite goes on writing into a file that has no name any more, and reports success. So the writer remembers device and
+# inode of the database and, as soon as it is there, of its write-ahead log, and compares them before every commit: two
+# system calls, some microseconds.
+
+Identity = tuple[int, int]
+
+
+def identity_of(path: str) -> Identity | None:
+    """Return device and inode of what a path names; None where there is nothing."""
+    try:
+        found = os.stat(path)  # noqa: PTH116  before every commit: a Path costs several times as much
+    except OSError:
+        return None
+    return found.st_dev, found.st_ino
+
+
+class FileIdentity:
+    """The files of one open SQLite database."""
+
+    def __init__(self, location: str) -> None:
+        """Remember the database; it has to be there."""
+        self._paths = (str(location), f"{location}-wal")
+        self._known = [identity_of(path) for path in self._paths]
+
+    def forget_log(self) -> None:
+        """Note that the writing connection is opened anew, and perhaps the log with it."""
+        self._known[1] = None
+
+    def changed(self) -> str:
+        """Say what has become of the files since they were opened; empty while they are the same.
+
+        The log is remembered when it is there for the first time. It stays for as long as a connection is open.
+        """
+        for index, path in enumerate(self._paths):
+            known, now = self._known[index], identity_of(path)
+            if known is None:
+                self._known[index] = now
+            elif known != now:
+                was = "deleted" if now is None else "replaced by another file"
+                return (
+                    f"{self._paths[0]}: {Path(path).name} was {was} while this process had it open; labctl writes "
+                    "nothing more. Stop this process, put the file or the newest backup there, check it with "
+                    "`labctl check`, and start again"
+                )
+        return ""
+
+
+# The check of an SQLite file before this process writes to it: a damaged one is refused, not damaged further.
+#
+# `PRAGMA quick_check` reads every page: 1 GB of readings takes 1 to 2 s from memory and 12 to 30 s from a busy disk,
+# and a bench waits for its safe state meanwhile. Blocks of readings are nearly all of a large file, and each has a
+# checksum of its own that is compared whenever it is read. So a large file is checked without them; `labctl check`
+# reads all.
+
+#: Up to this size every page is checked: some 0.1 s.
+WHOLE_UP_TO_BYTES = 64 << 20
+READINGS = "sample_blocks"
+
+
+def first_damage(connection: sa.Connection) -> str:
+    """Return the first damage that is found; empty for none. Raises DatabaseError for a file that cannot be read."""
+    pages = int(connection.exec_driver_sql("PRAGMA page_count").scalar_one())
+    page_bytes = int(connection.exec_driver_sql("PRAGMA page_size").scalar_one())
+    if pages * page_bytes <= WHOLE_UP_TO_BYTES:
+        return _damage(connection, "PRAGMA quick_check(1)")
+    names = connection.exec_driver_sql("SELECT name FROM sqlite_schema WHERE type = 'table' ORDER BY name").scalars()
+    found = (_damage(connection, f"PRAGMA quick_check('{name}')") for name in names.all() if name != READINGS)
+    return next(filter(None, found), "")
+
+
+def _damage(connection: sa.Connection, check: str) -> str:
+    text = str(connection.exec_driver_sql(check).scalar() or "ok")
+    return "" if text == "ok" else " ".join(text.split())
 
 
 class SqliteFile:

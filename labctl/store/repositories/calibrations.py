@@ -18,10 +18,10 @@ from labctl.store.connection.transactions import transaction
 from labctl.store.manifests.contents import CALIBRATION, CERTIFICATION
 from labctl.store.records import CalibrationRecord, CertificationRow, Judgement, Release, Withdrawal
 from labctl.store.repositories.audit import append
-from labctl.store.repositories.documents.withdrawals import withdraw_of_version
 from labctl.store.repositories.drafts.marks import mark_fitted
 from labctl.store.repositories.releases import waits
 from labctl.store.repositories.units import SEEN
+from labctl.store.repositories.withdrawals import withdraw_of_version
 from labctl.store.schema import tables
 from labctl.store.sealing.seals import seal
 

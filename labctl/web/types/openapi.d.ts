@@ -995,26 +995,6 @@ export interface paths {
         patch?: never;
         trace?: never;
     };
-    "/api/campaigns/{campaign}/resume": {
-        parameters: {
-            query?: never;
-            header?: never;
-            path?: never;
-            cookie?: never;
-        };
-        get?: never;
-        put?: never;
-        /**
-         * Resume a campaign
-         * @description Continue a paused campaign, or resume one that was interrupted, failed or aborted; safe state first.
-         */
-        post: operations["resume_api_campaigns__campaign__resume_post"];
-        delete?: never;
-        options?: never;
-        head?: never;
-        patch?: never;
-        trace?: never;
-    };
     "/api/campaigns/{campaign}/confirm": {
         parameters: {
             query?: never;
@@ -1029,6 +1009,26 @@ export interface paths {
          * @description Answer the question with this id; an answer to an older one is refused.
          */
         post: operations["confirm_api_campaigns__campaign__confirm_post"];
+        delete?: never;
+        options?: never;
+        head?: never;
+        patch?: never;
+        trace?: never;
+    };
+    "/api/campaigns/{campaign}/resume": {
+        parameters: {
+            query?: never;
+            header?: never;
+            path?: never;
+            cookie?: never;
+        };
+        get?: never;
+        put?: never;
+        /**
+         * Resume a campaign
+         * @description Continue a paused campaign, or resume one that was interrupted, failed or aborted; safe state first.
+         */
+        post: operations["resume_api_campaigns__campaign__resume_post"];
         delete?: never;
         options?: never;
         head?: never;
@@ -2028,12 +2028,13 @@ export interface components {
          * @description A calibration of an accelerometer, to be kept as the next version of a unit.
          */
         AccelerometerRequest: {
+            /** @description The data that the result was fitted to. */
             data: components["schemas"]["MeasuredData"];
             /** @description As `labctl accelerometer FILE --json` prints it. */
             result: components["schemas"]["AccelerometerResponse-Input"];
             /**
              * By
-             * @description Who.
+             * @description Name of the person who acted, as typed.
              */
             by: string;
         };
@@ -2048,7 +2049,10 @@ export interface components {
              * @enum {string}
              */
             verdict: "adequate" | "unexplained";
-            /** Bias G */
+            /**
+             * Bias G
+             * @description For each axis: bias in units of 9.80665 m/s2, with its standard uncertainty.
+             */
             bias_g: {
                 [key: string]: components["schemas"]["Estimate"];
             };
@@ -2076,7 +2080,10 @@ export interface components {
              * @description Local gravity, in units of 9.80665 m/s2.
              */
             gravity_g: number;
-            /** Rests */
+            /**
+             * Rests
+             * @description Number of rests, also of those that were left out.
+             */
             rests: number;
             /**
              * Left Out
@@ -2121,7 +2128,10 @@ export interface components {
             temperature?: components["schemas"]["AccelerometerTemperature"] | null;
             /** @description Rotation of the gyro triad from the accelerometer triad, deg; null: no gyro, turns that do not determine it, or a fit over temperature or with an earlier version. */
             alignment?: components["schemas"]["AlignmentJson"] | null;
-            /** Text */
+            /**
+             * Text
+             * @description The result in sentences.
+             */
             text: string[];
         };
         /**
@@ -2135,7 +2145,10 @@ export interface components {
              * @enum {string}
              */
             verdict: "adequate" | "unexplained";
-            /** Bias G */
+            /**
+             * Bias G
+             * @description For each axis: bias in units of 9.80665 m/s2, with its standard uncertainty.
+             */
             bias_g: {
                 [key: string]: components["schemas"]["Estimate"];
             };
@@ -2163,7 +2176,10 @@ export interface components {
              * @description Local gravity, in units of 9.80665 m/s2.
              */
             gravity_g: number;
-            /** Rests */
+            /**
+             * Rests
+             * @description Number of rests, also of those that were left out.
+             */
             rests: number;
             /**
              * Left Out
@@ -2208,7 +2224,10 @@ export interface components {
             temperature: components["schemas"]["AccelerometerTemperature"] | null;
             /** @description Rotation of the gyro triad from the accelerometer triad, deg; null: no gyro, turns that do not determine it, or a fit over temperature or with an earlier version. */
             alignment: components["schemas"]["AlignmentJson"] | null;
-            /** Text */
+            /**
+             * Text
+             * @description The result in sentences.
+             */
             text: string[];
         };
         /**
@@ -2264,10 +2283,14 @@ export interface components {
          * @description A version of a unit's accelerometer.
          */
         AccelerometerVersion: {
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
             serial: string;
             /**
              * Sensor
+             * @description The sensor of the unit that was calibrated.
              * @enum {string}
              */
             sensor: "accelerometer" | "magnetometer";
@@ -2278,6 +2301,7 @@ export interface components {
             version: number;
             /**
              * Verdict
+             * @description adequate: the fit explains the data to their noise; unexplained: it does not.
              * @enum {string}
              */
             verdict: "adequate" | "unexplained";
@@ -2287,13 +2311,17 @@ export interface components {
              * @description When it was stored.
              */
             at: string;
-            /** By */
+            /**
+             * By
+             * @description Name of the person who acted, as typed.
+             */
             by: string;
             /**
              * By Key
              * @description Name of the API key that acted; null: none did, the person's name is as typed.
              */
             by_key: string | null;
+            /** @description The data that the result was fitted to. */
             data: components["schemas"]["MeasuredData"];
             /**
              * Hash
@@ -2310,6 +2338,7 @@ export interface components {
              * @description Formats in which it is available; none for a magnetometer whose field was not constant.
              */
             formats: components["schemas"]["SensorFormatResponse"][];
+            /** @description Parameters of the accelerometer. */
             result: components["schemas"]["AccelerometerResponse-Output"];
         };
         /**
@@ -2348,7 +2377,10 @@ export interface components {
          * @description A failed campaign in words: three short sentences.
          */
         AdviceResponse: {
-            /** Happened */
+            /**
+             * Happened
+             * @description What happened.
+             */
             happened: string;
             /**
              * Done
@@ -2366,25 +2398,40 @@ export interface components {
          * @description A calibration that a standard was used for.
          */
         AffectedCalibration: {
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
             serial: string;
-            /** Version */
+            /**
+             * Version
+             * @description Number of the calibration version, counted from 1 for each unit.
+             */
             version: number;
             /**
              * Recordings
              * @description Its recordings that were measured with the standard.
              */
             recordings: number[];
-            /** Campaigns */
+            /**
+             * Campaigns
+             * @description Campaigns that made these recordings.
+             */
             campaigns: number[];
             /**
              * Performed From
              * @description null: the date of a recording is not known.
              */
             performed_from: string | null;
-            /** Performed Until */
+            /**
+             * Performed Until
+             * @description Last day of these measurements; null: the date of a recording is not known.
+             */
             performed_until: string | null;
-            /** In Force */
+            /**
+             * In Force
+             * @description Whether this version is in force: certified last, and not revoked.
+             */
             in_force: boolean;
             /**
              * Certificates
@@ -2402,7 +2449,10 @@ export interface components {
          * @description The calibrations that a standard was used for between two days.
          */
         AffectedResponse: {
-            /** Label */
+            /**
+             * Label
+             * @description Name of the reference standard in the register.
+             */
             label: string;
             /**
              * Bad From
@@ -2414,9 +2464,15 @@ export interface components {
              * @description null: until now.
              */
             bad_until: string | null;
-            /** Calibrations */
+            /**
+             * Calibrations
+             * @description Each calibration that the standard was used for on these days.
+             */
             calibrations: components["schemas"]["AffectedCalibration"][];
-            /** Text */
+            /**
+             * Text
+             * @description The result in sentences.
+             */
             text: string[];
         };
         /**
@@ -2433,7 +2489,7 @@ export interface components {
             };
             /**
              * Covariance Deg2
-             * @description Covariance of the components, (3, 3), deg2.
+             * @description Covariance of the components, (3, 3), deg^2.
              */
             covariance_deg2: number[][];
             /**
@@ -2519,9 +2575,15 @@ export interface components {
              * @description First and last data set of the section at rest.
              */
             datasets: number[];
-            /** Temperature C */
+            /**
+             * Temperature C
+             * @description Mean temperature of the section at rest, deg C; null: there was no thermometer.
+             */
             temperature_c: number | null;
-            /** Duration S */
+            /**
+             * Duration S
+             * @description Duration of the section at rest, s; null: not known.
+             */
             duration_s: number | null;
             /**
              * Axes
@@ -2640,15 +2702,30 @@ export interface components {
          * @description A version applied to the recording of a draft as it is, nothing refitted. Errors: corrected minus true rate.
          */
         AppliedDraft: {
-            /** Version */
+            /**
+             * Version
+             * @description Number of the calibration version, counted from 1 for each unit.
+             */
             version: number;
-            /** Rms Dps */
+            /**
+             * Rms Dps
+             * @description Root mean square of the error (corrected minus true rate), deg/s.
+             */
             rms_dps: number;
-            /** Max Dps */
+            /**
+             * Max Dps
+             * @description Largest magnitude of the error (corrected minus true rate), deg/s.
+             */
             max_dps: number;
-            /** Bias Dps */
+            /**
+             * Bias Dps
+             * @description Mean of the error (corrected minus true rate), deg/s.
+             */
             bias_dps: number;
-            /** Axes */
+            /**
+             * Axes
+             * @description For each axis: its error, what is expected of it, and its limit.
+             */
             axes: {
                 [key: string]: components["schemas"]["AxisVerification"];
             };
@@ -2675,13 +2752,25 @@ export interface components {
          * @description A version applied to a recording without refitting.
          */
         AppliedVersion: {
-            /** Version */
+            /**
+             * Version
+             * @description Number of the calibration version, counted from 1 for each unit.
+             */
             version: number;
-            /** Rms Dps */
+            /**
+             * Rms Dps
+             * @description Root mean square of the error (corrected minus true rate), deg/s.
+             */
             rms_dps: number;
-            /** Max Dps */
+            /**
+             * Max Dps
+             * @description Largest magnitude of the error (corrected minus true rate), deg/s.
+             */
             max_dps: number;
-            /** Bias Dps */
+            /**
+             * Bias Dps
+             * @description Mean of the error (corrected minus true rate), deg/s.
+             */
             bias_dps: number;
             /**
              * Part
@@ -2695,9 +2784,15 @@ export interface components {
          * @description What is known of a version when it is to be certified.
          */
         AssessmentResponse: {
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
             serial: string;
-            /** Version */
+            /**
+             * Version
+             * @description Number of the calibration version, counted from 1 for each unit.
+             */
             version: number;
             /**
              * Verdict
@@ -2709,15 +2804,22 @@ export interface components {
              * @description Why there is no verdict; empty if there is one.
              */
             verdict_reason: string;
-            /** Verdict Recording */
+            /**
+             * Verdict Recording
+             * @description Recording that the verdict is of; null: there is no verdict.
+             */
             verdict_recording: number | null;
             /**
              * Verdict Text
              * @description The verdict in words; empty if there is none.
              */
             verdict_text: string;
+            /** @description Errors that the version states, deg/s. */
             error: components["schemas"]["CertifiedErrors"];
-            /** Objections */
+            /**
+             * Objections
+             * @description Objections to certifying the version; empty: none.
+             */
             objections: components["schemas"]["Objection"][];
             /**
              * Override Needed
@@ -2729,7 +2831,10 @@ export interface components {
              * @description Smallest number of characters of the reason for an override.
              */
             least_reason_characters: number;
-            /** Least Reason Words */
+            /**
+             * Least Reason Words
+             * @description Smallest number of words of the reason for an override.
+             */
             least_reason_words: number;
             /**
              * Due Days
@@ -2753,7 +2858,10 @@ export interface components {
              * @description Start of the campaign; all times are in `time_zone`.
              */
             start: string;
-            /** Time Zone */
+            /**
+             * Time Zone
+             * @description Time zone of all times, such as Europe/Berlin.
+             */
             time_zone: string;
             /**
              * Needed At
@@ -2787,18 +2895,31 @@ export interface components {
          * @description One act: who did what, when, and why.
          */
         AuditResponse: {
-            /** Id */
+            /**
+             * Id
+             * @description Number of the row in the audit trail, from 1.
+             */
             id: number;
             /**
              * At
              * Format: date-time
+             * @description Time of the act.
              */
             at: string;
-            /** Who */
+            /**
+             * Who
+             * @description Name of the person, from the API key, from `by` or from the command line; `labctl`: the program itself.
+             */
             who: string;
-            /** Action */
+            /**
+             * Action
+             * @description Kind of act, such as `certify` or `campaign state`.
+             */
             action: string;
-            /** Subject */
+            /**
+             * Subject
+             * @description What was acted on, such as a unit, a version, a campaign or a key.
+             */
             subject: string;
             /**
              * Detail
@@ -2807,7 +2928,10 @@ export interface components {
             detail: {
                 [key: string]: components["schemas"]["JsonValue"];
             };
-            /** Hash */
+            /**
+             * Hash
+             * @description SHA-256 of this row and of the hash of the row before it.
+             */
             hash: string;
         };
         /**
@@ -2859,33 +2983,51 @@ export interface components {
          * @description What a version leaves on one axis: a line over the rate.
          */
         AxisPoint: {
-            /** Bias Dps */
+            /**
+             * Bias Dps
+             * @description Remaining bias: error at rate 0, deg/s.
+             */
             bias_dps: number;
-            /** U Bias Dps */
+            /**
+             * U Bias Dps
+             * @description Standard uncertainty of `bias_dps` due to the scatter about the line, deg/s.
+             */
             u_bias_dps: number;
             /**
              * Scale Factor
              * @description Remaining error divided by the rate (1 = 100 %); null: the recording has only one rate.
              */
             scale_factor: number | null;
-            /** U Scale Factor */
+            /**
+             * U Scale Factor
+             * @description Standard uncertainty of `scale_factor` due to the scatter about the line, 1; null: the recording has only one rate.
+             */
             u_scale_factor: number | null;
         };
         /**
          * AxisResponse
-         * @description Delay and bandwidth of one axis, as a version has them; null: not part of its model, or not known.
+         * @description Delay and bandwidth of one axis, as a version has them.
          */
         AxisResponse: {
-            /** Delay S */
+            /**
+             * Delay S
+             * @description Delay of the output, s; null: not part of the model.
+             */
             delay_s: number | null;
-            /** U Delay S */
+            /**
+             * U Delay S
+             * @description Standard uncertainty of the delay, s; null: not part of the model, or not known.
+             */
             u_delay_s: number | null;
             /**
              * Bandwidth Hz
              * @description Frequency at which the power is halved, 1/(2 pi time constant), Hz.
              */
             bandwidth_hz: number | null;
-            /** U Bandwidth Hz */
+            /**
+             * U Bandwidth Hz
+             * @description Standard uncertainty of the bandwidth, Hz; null: not part of the model, or not known.
+             */
             u_bandwidth_hz: number | null;
             /**
              * Expanded Delay S
@@ -2956,11 +3098,20 @@ export interface components {
          * @description Corrected minus true rate of one axis over the data sets, deg/s.
          */
         AxisVerification: {
-            /** Rms Dps */
+            /**
+             * Rms Dps
+             * @description Root mean square of the error (corrected minus true rate), deg/s.
+             */
             rms_dps: number;
-            /** Max Dps */
+            /**
+             * Max Dps
+             * @description Largest magnitude of the error (corrected minus true rate), deg/s.
+             */
             max_dps: number;
-            /** Bias Dps */
+            /**
+             * Bias Dps
+             * @description Mean of the error (corrected minus true rate), deg/s.
+             */
             bias_dps: number;
             /**
              * Expected Dps
@@ -2983,11 +3134,20 @@ export interface components {
          * @description A backup that was made, for the audit trail; nothing is opened by this name.
          */
         BackupNote: {
-            /** File */
+            /**
+             * File
+             * @description Name of the file of the backup, without its folder.
+             */
             file: string;
-            /** Bytes */
+            /**
+             * Bytes
+             * @description Size of the file in bytes.
+             */
             bytes: number;
-            /** Sha256 */
+            /**
+             * Sha256
+             * @description SHA-256 of the file's content, as `sha256sum` prints it.
+             */
             sha256: string;
         };
         /**
@@ -2995,16 +3155,26 @@ export interface components {
          * @description Whether every instrument of a bench answered.
          */
         BenchCheckResponse: {
-            /** Bench */
+            /**
+             * Bench
+             * @description Name of the bench.
+             */
             bench: string;
-            /** Ok */
+            /**
+             * Ok
+             * @description Whether no instrument has a bad finding.
+             */
             ok: boolean;
             /**
              * Checked At
              * Format: date-time
+             * @description Time of the check.
              */
             checked_at: string;
-            /** Devices */
+            /**
+             * Devices
+             * @description The instruments of the bench, each with what was found.
+             */
             devices: components["schemas"]["DeviceCheck"][];
         };
         /**
@@ -3012,13 +3182,25 @@ export interface components {
          * @description A bench and what it is doing.
          */
         BenchDescription: {
-            /** Name */
+            /**
+             * Name
+             * @description Name of the bench.
+             */
             name: string;
-            /** Simulated */
+            /**
+             * Simulated
+             * @description Whether the instruments of the bench are simulated.
+             */
             simulated: boolean;
-            /** Latitude Deg */
+            /**
+             * Latitude Deg
+             * @description Latitude of the bench, deg, north positive; null: the bench file does not state it.
+             */
             latitude_deg: number | null;
-            /** Units */
+            /**
+             * Units
+             * @description Units that the bench file names.
+             */
             units: components["schemas"]["BenchUnit"][];
             /**
              * Campaign
@@ -3062,13 +3244,25 @@ export interface components {
          * @description The bench of a service, and what a person is asked before a campaign starts there.
          */
         BenchResponse: {
-            /** Name */
+            /**
+             * Name
+             * @description Name of the bench.
+             */
             name: string;
-            /** Simulated */
+            /**
+             * Simulated
+             * @description Whether the instruments of the bench are simulated.
+             */
             simulated: boolean;
-            /** Latitude Deg */
+            /**
+             * Latitude Deg
+             * @description Latitude of the bench, deg, north positive; null: the bench file does not state it.
+             */
             latitude_deg: number | null;
-            /** Units */
+            /**
+             * Units
+             * @description Units that the bench file names.
+             */
             units: components["schemas"]["BenchUnit"][];
             /**
              * Campaign
@@ -3119,11 +3313,15 @@ export interface components {
          * @description A bench, and what its last safe state could not confirm.
          */
         BenchStatus: {
-            /** Name */
+            /**
+             * Name
+             * @description Name of the bench.
+             */
             name: string;
             /**
              * Last Used At
              * Format: date-time
+             * @description Time at which the bench was last used.
              */
             last_used_at: string;
             /**
@@ -3132,7 +3330,10 @@ export interface components {
              * @default
              */
             unconfirmed: string;
-            /** Unconfirmed At */
+            /**
+             * Unconfirmed At
+             * @description Time at which the safe state could not be confirmed; null: all is well.
+             */
             unconfirmed_at: string | null;
             /**
              * Attempts
@@ -3140,7 +3341,10 @@ export interface components {
              * @default 0
              */
             attempts: number;
-            /** Attempted At */
+            /**
+             * Attempted At
+             * @description Time of the last of these attempts; null: there was none.
+             */
             attempted_at: string | null;
             /**
              * Confirmed At
@@ -3202,11 +3406,20 @@ export interface components {
          * @description A unit on a bench.
          */
         BenchUnit: {
-            /** Name */
+            /**
+             * Name
+             * @description Name of the unit in the bench file.
+             */
             name: string;
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
             serial: string;
-            /** Driver */
+            /**
+             * Driver
+             * @description Name of the driver of the instrument.
+             */
             driver: string;
         };
         /**
@@ -3237,7 +3450,10 @@ export interface components {
         };
         /** Body_import_log_api_recordings_logs_post */
         Body_import_log_api_recordings_logs_post: {
-            /** File */
+            /**
+             * File
+             * @description The file in another format, such as CSV, Parquet, ULog or a ROS bag.
+             */
             file: string;
             /**
              * Column Map
@@ -3269,7 +3485,10 @@ export interface components {
         };
         /** Body_import_recording_api_recordings_post */
         Body_import_recording_api_recordings_post: {
-            /** Files */
+            /**
+             * Files
+             * @description The files of the recording: `recording.toml`, its data file and, if there is one, the environment file.
+             */
             files: string[];
             /**
              * Leave Out
@@ -3279,7 +3498,10 @@ export interface components {
         };
         /** Body_preview_api_recordings_logs_preview_post */
         Body_preview_api_recordings_logs_preview_post: {
-            /** File */
+            /**
+             * File
+             * @description The file in another format, such as CSV, Parquet, ULog or a ROS bag.
+             */
             file: string;
             /**
              * Column Map
@@ -3330,14 +3552,20 @@ export interface components {
              * @enum {string}
              */
             type: "A" | "B";
-            /** Distribution */
+            /**
+             * Distribution
+             * @description Distribution that is assumed of the input: normal, rectangular, triangular or u-shaped.
+             */
             distribution: string;
             /**
              * U
              * @description Standard uncertainty of the input, in `unit`; null: not stated or unknown.
              */
             u: number | null;
-            /** Unit */
+            /**
+             * Unit
+             * @description Unit of the input.
+             */
             unit: string;
             /**
              * Sensitivity
@@ -3374,7 +3602,10 @@ export interface components {
              * @description Whether the standard was past its due date when it was used.
              */
             overdue: boolean;
-            /** Due */
+            /**
+             * Due
+             * @description Day until which the standard may be used, ISO 8601; null: no due date, or no standard.
+             */
             due: string | null;
             /**
              * Why
@@ -3402,7 +3633,10 @@ export interface components {
              * @description Of a coefficient.
              */
             value: number | null;
-            /** Lines */
+            /**
+             * Lines
+             * @description Each source of uncertainty.
+             */
             lines: components["schemas"]["BudgetLineResponse"][];
             /**
              * Combined
@@ -3440,26 +3674,51 @@ export interface components {
          * @description One line of a unit's list of calibrations.
          */
         CalibrationRow: {
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
             serial: string;
-            /** Version */
+            /**
+             * Version
+             * @description Number of the calibration version, counted from 1 for each unit.
+             */
             version: number;
-            /** Parent */
+            /**
+             * Parent
+             * @description Version of which a change of effects made this version; null: it is from a fit.
+             */
             parent: number | null;
-            /** Model */
+            /**
+             * Model
+             * @description Name of the error model.
+             */
             model: string;
             /**
              * Created At
              * Format: date-time
+             * @description Time at which the version was stored.
              */
             created_at: string;
-            /** Hash */
+            /**
+             * Hash
+             * @description SHA-256 of the calibration as it was stored.
+             */
             hash: string;
-            /** Certified */
+            /**
+             * Certified
+             * @description Whether this version is in force: certified last, and not revoked.
+             */
             certified: boolean;
-            /** Rms Dps */
+            /**
+             * Rms Dps
+             * @description RMS error after compensation, on the data that were fitted, deg/s; null: not known.
+             */
             rms_dps: number | null;
-            /** Heldout Rms Dps */
+            /**
+             * Heldout Rms Dps
+             * @description RMS error on data that were left out of the fit, deg/s; null: not known.
+             */
             heldout_rms_dps: number | null;
             /**
              * Notices
@@ -3472,14 +3731,24 @@ export interface components {
          * @description State of a version whose file a program holds, found by the hash of its calibration.
          */
         CalibrationStateResponse: {
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
             serial: string;
-            /** Version */
+            /**
+             * Version
+             * @description Number of the calibration version, counted from 1 for each unit.
+             */
             version: number;
-            /** Calibration Hash */
+            /**
+             * Calibration Hash
+             * @description SHA-256 of the calibration as it was stored.
+             */
             calibration_hash: string;
             /**
              * State
+             * @description in-force: the unit's certified version; superseded: another version was certified later; revoked: its certification was revoked; not-certified: it was never certified.
              * @enum {string}
              */
             state: "in-force" | "superseded" | "revoked" | "not-certified";
@@ -3501,26 +3770,49 @@ export interface components {
          * @description The plan of a campaign, and how far it is.
          */
         CampaignPlanResponse: {
-            /** Campaign */
+            /**
+             * Campaign
+             * @description Number of the campaign.
+             */
             campaign: number;
-            /** Recipe */
+            /**
+             * Recipe
+             * @description Name of the recipe.
+             */
             recipe: string;
             /**
              * Text
              * @description Text of the recipe that was run, TOML; empty: an older version of labctl ran the campaign and did not store the text.
              */
             text: string;
-            /** Bench */
+            /**
+             * Bench
+             * @description Name of the bench.
+             */
             bench: string;
+            /** @description State of the campaign. */
             state: components["schemas"]["CampaignState"];
-            /** Schedule Hash */
+            /**
+             * Schedule Hash
+             * @description SHA-256 of the steps in their order; it is equal for two plans of the same steps.
+             */
             schedule_hash: string;
-            /** Steps */
+            /**
+             * Steps
+             * @description Number of steps of the plan.
+             */
             steps: number;
-            /** Datasets */
+            /**
+             * Datasets
+             * @description Number of data sets.
+             */
             datasets: number;
-            /** Expected S */
+            /**
+             * Expected S
+             * @description Expected duration of the campaign, s.
+             */
             expected_s: number;
+            /** @description The steps of the campaign, with expected and real times. */
             timeline: components["schemas"]["RunColumns"];
         };
         /**
@@ -3535,7 +3827,7 @@ export interface components {
             recipe: string;
             /**
              * Clip
-             * @description Leave out points that are beyond the limits of the bench or of a unit.
+             * @description Whether to leave out points that are beyond the limits of the bench or of a unit.
              * @default false
              */
             clip?: boolean;
@@ -3593,15 +3885,26 @@ export interface components {
          * @description Where a campaign is.
          */
         CampaignResponse: {
-            /** Id */
+            /**
+             * Id
+             * @description Number of the campaign.
+             */
             id: number;
-            /** Recipe */
+            /**
+             * Recipe
+             * @description Name of the recipe.
+             */
             recipe: string;
-            /** Bench */
+            /**
+             * Bench
+             * @description Name of the bench.
+             */
             bench: string;
+            /** @description State of the campaign. */
             state: components["schemas"]["CampaignState"];
             /**
              * Reason
+             * @description Why the campaign is in this state, such as the cause of a failure; empty: no reason is needed.
              * @default
              */
             reason: string;
@@ -3610,27 +3913,46 @@ export interface components {
              * @description Number of the step, from 1.
              */
             step: number | null;
-            /** Steps */
+            /**
+             * Steps
+             * @description Number of steps of the plan.
+             */
             steps: number;
             /**
              * Step Text
+             * @description The present step in words; empty: none has begun.
              * @default
              */
             step_text: string;
-            /** Progress */
+            /**
+             * Progress
+             * @description Share of the expected time that is over, 0 to 1.
+             */
             progress: number;
-            /** Expected End */
+            /**
+             * Expected End
+             * @description Expected time of the end; null: the campaign has ended, or no step has begun.
+             */
             expected_end: string | null;
             /**
              * T S
              * @description Campaign time: seconds since the campaign began, by the campaign's own clock.
              */
             t_s: number | null;
-            /** Chamber C */
+            /**
+             * Chamber C
+             * @description Temperature of the chamber, deg C; null: there is no chamber, or it was not read yet.
+             */
             chamber_c: number | null;
-            /** Setpoint C */
+            /**
+             * Setpoint C
+             * @description Set point of the chamber, deg C; null: none was set, or not known.
+             */
             setpoint_c: number | null;
-            /** Gyro C */
+            /**
+             * Gyro C
+             * @description Temperature of the first unit that reports one, by its own thermometer, deg C; null: none was read.
+             */
             gyro_c: number | null;
             /**
              * References
@@ -3639,14 +3961,20 @@ export interface components {
             references: {
                 [key: string]: number;
             };
-            /** Rate Dps */
+            /**
+             * Rate Dps
+             * @description Rate of the table, deg/s; null: no step has begun.
+             */
             rate_dps: number | null;
             /**
              * Outputs
              * @description Present outputs of the units; empty if this process does not run the campaign.
              */
             outputs: components["schemas"]["OutputResponse"][];
-            /** Last Error */
+            /**
+             * Last Error
+             * @description Newest error event in words; null: there was none.
+             */
             last_error: string | null;
             /**
              * Repeated
@@ -3689,9 +4017,15 @@ export interface components {
              * @default false
              */
             abandoned: boolean;
-            /** Started At */
+            /**
+             * Started At
+             * @description Time of the start; null: the campaign has not begun.
+             */
             started_at: string | null;
-            /** Ended At */
+            /**
+             * Ended At
+             * @description Time of the end; null: the campaign has not ended.
+             */
             ended_at: string | null;
             /**
              * Recordings
@@ -3768,9 +4102,15 @@ export interface components {
          * @description Every effect that a model can be made of, and every model that a fit can be asked for by name.
          */
         CatalogueResponse: {
-            /** Effects */
+            /**
+             * Effects
+             * @description Every effect that a model can be made of.
+             */
             effects: components["schemas"]["CataloguedEffect"][];
-            /** Models */
+            /**
+             * Models
+             * @description Every model that a fit can be asked for by name.
+             */
             models: components["schemas"]["PresetJson"][];
         };
         /**
@@ -3863,6 +4203,7 @@ export interface components {
          */
         CertificateOrder: {
             /**
+             * @description The customer who ordered the calibration.
              * @default {
              *       "name": "",
              *       "street": "",
@@ -3877,6 +4218,7 @@ export interface components {
              */
             customer?: components["schemas"]["Customer"];
             /**
+             * @description The item as the laboratory received it.
              * @default {
              *       "description": "Gyroscope",
              *       "manufacturer": "",
@@ -3886,6 +4228,7 @@ export interface components {
              */
             item?: components["schemas"]["OrderedItem"];
             /**
+             * @description Facts of the method that the recipe does not state.
              * @default {
              *       "name": "",
              *       "deviations": ""
@@ -3935,6 +4278,7 @@ export interface components {
              */
             by: string;
             /**
+             * @description The facts of the order; they are kept with the certificate.
              * @default {
              *       "customer": {
              *         "city": "",
@@ -3975,18 +4319,31 @@ export interface components {
          * @description A certificate that was issued, and its state now.
          */
         CertificateResponse: {
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
             serial: string;
-            /** Version */
+            /**
+             * Version
+             * @description Number of the calibration version, counted from 1 for each unit.
+             */
             version: number;
-            /** Number */
+            /**
+             * Number
+             * @description Number of the certificate.
+             */
             number: string;
             /**
              * Issued At
              * Format: date-time
+             * @description Time of issue.
              */
             issued_at: string;
-            /** By */
+            /**
+             * By
+             * @description Name of the person who issued the certificate.
+             */
             by: string;
             /**
              * By Key
@@ -4029,7 +4386,7 @@ export interface components {
             state: "valid" | "amended" | "superseded" | "withdrawn";
             /**
              * State Since
-             * @description When it came into this state.
+             * @description When it came into this state; of a valid certificate the time of issue.
              */
             state_since: string | null;
             /**
@@ -4040,7 +4397,7 @@ export interface components {
             state_reason: string;
             /**
              * State By
-             * @description Name of the person whose act brought it into this state.
+             * @description Name of the person whose act brought it into this state; of a valid certificate, who issued it.
              * @default
              */
             state_by: string;
@@ -4065,30 +4422,47 @@ export interface components {
          * @description A certification or its revocation; without a verdict's keys for a revocation and before verdicts were kept.
          */
         CertificationResponse: {
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
             serial: string;
-            /** Version */
+            /**
+             * Version
+             * @description Number of the calibration version, counted from 1 for each unit.
+             */
             version: number;
             /**
              * Act
+             * @description Whether the version was certified or its certification revoked.
              * @enum {string}
              */
             act: "certify" | "revoke";
-            /** By */
+            /**
+             * By
+             * @description Name of the person who acted, as typed.
+             */
             by: string;
             /**
              * By Key
              * @description Name of the API key that acted; null: none did, the person's name is as typed.
              */
             by_key: string | null;
-            /** Reason */
+            /**
+             * Reason
+             * @description Reason for the act, as typed.
+             */
             reason: string;
             /**
              * At
              * Format: date-time
+             * @description Time of the act.
              */
             at: string;
-            /** Due */
+            /**
+             * Due
+             * @description Time until which the certification is valid; null: no due date.
+             */
             due: string | null;
             /**
              * Due From
@@ -4105,7 +4479,10 @@ export interface components {
              * @description Why there is no verdict; empty if there is one.
              */
             verdict_reason: string | null;
-            /** Verdict Recording */
+            /**
+             * Verdict Recording
+             * @description Recording that the verdict is of; null: there is no verdict.
+             */
             verdict_recording: number | null;
             /**
              * Verdict At
@@ -4117,13 +4494,17 @@ export interface components {
              * @description The verdict in words.
              */
             verdict_text: string | null;
+            /** @description Errors that the version stated at its certification, deg/s; null: not kept. */
             error: components["schemas"]["CertifiedErrors"] | null;
             /**
              * Override
              * @description Whether the version was certified although there were objections.
              */
             override: boolean | null;
-            /** Objections */
+            /**
+             * Objections
+             * @description Objections to certifying the version at that time; empty: none.
+             */
             objections: components["schemas"]["Objection"][];
             /**
              * Released By
@@ -4135,7 +4516,10 @@ export interface components {
              * @description Name of the API key of the second person.
              */
             released_key: string | null;
-            /** Release Reason */
+            /**
+             * Release Reason
+             * @description Reason that the second person gave; null: none was needed.
+             */
             release_reason: string | null;
             /**
              * Withdrawn Certificates
@@ -4153,13 +4537,25 @@ export interface components {
          * @description Errors that a version states, deg/s.
          */
         CertifiedErrors: {
-            /** Raw Rms Dps */
+            /**
+             * Raw Rms Dps
+             * @description RMS error before any compensation, deg/s; null: not known.
+             */
             raw_rms_dps: number | null;
-            /** Rms Dps */
+            /**
+             * Rms Dps
+             * @description RMS error after compensation, on the data that were fitted, deg/s; null: not known.
+             */
             rms_dps: number | null;
-            /** Heldout Rms Dps */
+            /**
+             * Heldout Rms Dps
+             * @description RMS error on data that were left out of the fit, deg/s; null: not known.
+             */
             heldout_rms_dps: number | null;
-            /** Noise Floor Dps */
+            /**
+             * Noise Floor Dps
+             * @description RMS error of data-set means due to noise and drift alone, deg/s; null: not known.
+             */
             noise_floor_dps: number | null;
         };
         /**
@@ -4230,9 +4626,15 @@ export interface components {
          * @description Who certifies a version, and why.
          */
         CertifyRequest: {
-            /** By */
+            /**
+             * By
+             * @description Name of the person who acted, as typed.
+             */
             by: string;
-            /** Reason */
+            /**
+             * Reason
+             * @description Reason for the act, as typed.
+             */
             reason: string;
             /**
              * Due Days
@@ -4248,12 +4650,18 @@ export interface components {
         };
         /**
          * ChannelColumns
-         * @description A channel's figures by data set, in the channel's unit; null: none.
+         * @description A channel's figures by data set.
          */
         ChannelColumns: {
-            /** Mean */
+            /**
+             * Mean
+             * @description Mean of each data set, in the unit of the channel; null: none.
+             */
             mean: (number | null)[];
-            /** Std */
+            /**
+             * Std
+             * @description Standard deviation of single readings in each data set, in the unit of the channel; null: none.
+             */
             std: (number | null)[];
         };
         /**
@@ -4307,9 +4715,15 @@ export interface components {
          * @description One line of a data sheet.
          */
         Characteristic: {
-            /** Id */
+            /**
+             * Id
+             * @description Identifier of the characteristic, for programs.
+             */
             id: string;
-            /** Title */
+            /**
+             * Title
+             * @description Name of the characteristic, by IEEE Std 528 or 952.
+             */
             title: string;
             /**
              * Axis
@@ -4337,8 +4751,12 @@ export interface components {
              * @description Upper limit of a figure that cannot be distinguished from zero, in `unit`.
              */
             at_most: number | null;
-            /** Unit */
+            /**
+             * Unit
+             * @description Unit of `value`, `u`, `at_most` and `specified`; 1: a ratio.
+             */
             unit: string;
+            /** @description Conditions of the measurement; null: not measured. */
             conditions: components["schemas"]["MeasuredUnder"] | null;
             /**
              * Specified
@@ -4376,16 +4794,29 @@ export interface components {
         ChartLimits: {
             /**
              * Basis
+             * @description What the limits rest on: the earlier values of the chart, or the uncertainty that was stated.
              * @enum {string}
              */
             basis: "history" | "stated u";
-            /** Centre */
+            /**
+             * Centre
+             * @description Centre line of the chart, in the unit of the values.
+             */
             centre: number;
-            /** Sigma */
+            /**
+             * Sigma
+             * @description Standard deviation of the chart, in the unit of the values.
+             */
             sigma: number;
-            /** Low */
+            /**
+             * Low
+             * @description Lower limit: centre minus three standard deviations.
+             */
             low: number;
-            /** High */
+            /**
+             * High
+             * @description Upper limit: centre plus three standard deviations.
+             */
             high: number;
             /**
              * Values
@@ -4398,16 +4829,26 @@ export interface components {
          * @description One result of a check gyro over its campaigns.
          */
         CheckGyroChart: {
-            /** Axis */
+            /**
+             * Axis
+             * @description Output axis of the unit: x, y or z.
+             */
             axis: string;
             /**
              * Result
+             * @description The result that the chart follows.
              * @enum {string}
              */
             result: "bias" | "scale_factor";
-            /** Unit */
+            /**
+             * Unit
+             * @description Unit of the result.
+             */
             unit: string;
-            /** Points */
+            /**
+             * Points
+             * @description One point for each recording with a version of its own, in order of time.
+             */
             points: components["schemas"]["CheckGyroPoint"][];
         };
         /**
@@ -4415,7 +4856,10 @@ export interface components {
          * @description The result of one recording.
          */
         CheckGyroPoint: {
-            /** Recording */
+            /**
+             * Recording
+             * @description Number of the recording.
+             */
             recording: number;
             /**
              * Campaign
@@ -4425,6 +4869,7 @@ export interface components {
             /**
              * At
              * Format: date-time
+             * @description Time of the measurement.
              */
             at: string;
             /**
@@ -4432,7 +4877,10 @@ export interface components {
              * @description The newest version that was fitted to this recording alone.
              */
             version: number;
-            /** Value */
+            /**
+             * Value
+             * @description Value of the result, in the unit of the chart.
+             */
             value: number;
             /**
              * U
@@ -4445,7 +4893,10 @@ export interface components {
              * @enum {string}
              */
             state: "in" | "warning" | "out" | "unknown";
-            /** Limits */
+            /**
+             * Limits
+             * @description Control limits of this point.
+             */
             limits: components["schemas"]["ChartLimits"][];
         };
         /**
@@ -4469,9 +4920,15 @@ export interface components {
              * @description First day of the chart, such as after a repair; default: all recordings.
              */
             chart_from?: string | null;
-            /** Reason */
+            /**
+             * Reason
+             * @description Reason for the act, as typed.
+             */
             reason: string;
-            /** By */
+            /**
+             * By
+             * @description Name of the person who acted, as typed.
+             */
             by: string;
         };
         /**
@@ -4479,7 +4936,10 @@ export interface components {
          * @description A check gyro: a unit that is measured in each campaign to check the bench.
          */
         CheckGyroResponse: {
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
             serial: string;
             /**
              * Marked
@@ -4491,14 +4951,20 @@ export interface components {
              * @description Temperature of the bias, deg C.
              */
             temperature_c: number;
-            /** Chart From */
+            /**
+             * Chart From
+             * @description First day of the chart; null: all recordings.
+             */
             chart_from: string | null;
             /**
              * Alarm
              * @description Whether a result of the newest recording is out of the control limits.
              */
             alarm: boolean;
-            /** Charts */
+            /**
+             * Charts
+             * @description Chart of each result and axis.
+             */
             charts: components["schemas"]["CheckGyroChart"][];
             /**
              * Left Out
@@ -4507,7 +4973,10 @@ export interface components {
             left_out: {
                 [key: string]: string;
             };
-            /** Text */
+            /**
+             * Text
+             * @description The result in sentences.
+             */
             text: string[];
         };
         /**
@@ -4520,10 +4989,14 @@ export interface components {
          * @description Who has inspected a bench whose safe state was not confirmed.
          */
         ClearRequest: {
-            /** By */
+            /**
+             * By
+             * @description Name of the person who has inspected the bench.
+             */
             by: string;
             /**
              * Reason
+             * @description What the person did, for the audit trail.
              * @default inspected the bench
              */
             reason?: string;
@@ -4564,18 +5037,30 @@ export interface components {
          * @description One coefficient of the draft beside the same of the version in force.
          */
         CoefficientChange: {
-            /** Axis */
+            /**
+             * Axis
+             * @description Output axis of the unit: x, y or z.
+             */
             axis: string;
-            /** Coefficient */
+            /**
+             * Coefficient
+             * @description Name of the coefficient.
+             */
             coefficient: string;
             /**
              * Temperature C
              * @description Node of a temperature table, deg C; null: there is no table.
              */
             temperature_c: number | null;
-            /** In Force */
+            /**
+             * In Force
+             * @description Value in the version in force, in `unit`.
+             */
             in_force: number;
-            /** Draft */
+            /**
+             * Draft
+             * @description Value in the draft, in `unit`.
+             */
             draft: number;
             /**
              * Change
@@ -4587,7 +5072,10 @@ export interface components {
              * @description Standard uncertainty of `change`: root sum of squares; null: unknown.
              */
             u: number | null;
-            /** Unit */
+            /**
+             * Unit
+             * @description Unit of the coefficient.
+             */
             unit: string;
             /**
              * Significant
@@ -4631,9 +5119,15 @@ export interface components {
          * @description One side of a comparison.
          */
         ComparedCalibration: {
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
             serial: string;
-            /** Version */
+            /**
+             * Version
+             * @description Number of the calibration version, counted from 1 for each unit.
+             */
             version: number;
             /**
              * Bench
@@ -4656,12 +5150,16 @@ export interface components {
          * @description A model fitted to the recording of a draft; only the draft's own is kept as a version.
          */
         ComparedModel: {
-            /** Model */
+            /**
+             * Model
+             * @description Name of the error model.
+             */
             model: string;
             /** @description Errors of the model, deg/s; null: the model could not be fitted, see `why`. */
             error: components["schemas"]["CertifiedErrors"] | null;
             /**
              * Why
+             * @description Why the model could not be fitted; else empty.
              * @default
              */
             why: string;
@@ -4671,13 +5169,25 @@ export interface components {
          * @description One result of both calibrations with En number and zeta score.
          */
         ComparedResult: {
-            /** Axis */
+            /**
+             * Axis
+             * @description Output axis of the unit: x, y or z.
+             */
             axis: string;
-            /** Result */
+            /**
+             * Result
+             * @description Name of the result, such as bias or scale_factor.
+             */
             result: string;
-            /** Unit */
+            /**
+             * Unit
+             * @description Unit of the result.
+             */
             unit: string;
-            /** Values */
+            /**
+             * Values
+             * @description Value of the first and of the second calibration, in `unit`.
+             */
             values: [
                 number,
                 number
@@ -4690,7 +5200,10 @@ export interface components {
                 number,
                 number
             ];
-            /** K */
+            /**
+             * K
+             * @description Coverage factors of these expanded uncertainties.
+             */
             k: [
                 number,
                 number
@@ -4712,6 +5225,7 @@ export interface components {
             en: number;
             /**
              * En Performance
+             * @description satisfactory: |En| <= 1; unsatisfactory: larger.
              * @enum {string}
              */
             en_performance: "satisfactory" | "questionable" | "unsatisfactory";
@@ -4722,6 +5236,7 @@ export interface components {
             zeta: number;
             /**
              * Zeta Performance
+             * @description satisfactory: |zeta| <= 2; questionable: above 2 and below 3; unsatisfactory: 3 or above.
              * @enum {string}
              */
             zeta_performance: "satisfactory" | "questionable" | "unsatisfactory";
@@ -4756,14 +5271,20 @@ export interface components {
              * @description The body axis that pointed along the table axis.
              */
             position: string[];
-            /** Table Rate Dps */
+            /**
+             * Table Rate Dps
+             * @description Rate of the table, deg/s.
+             */
             table_rate_dps: number[];
             /**
              * Own Rate Dps
              * @description True rate along the output axis, deg/s.
              */
             own_rate_dps: number[];
-            /** Temperature C */
+            /**
+             * Temperature C
+             * @description Mean temperature of the unit during the data set, deg C.
+             */
             temperature_c: number[];
             /**
              * Temperature Level C
@@ -4806,11 +5327,20 @@ export interface components {
          * @description A version applied without refitting, and a recording.
          */
         ComparisonResponse: {
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
             serial: string;
-            /** Version */
+            /**
+             * Version
+             * @description Number of the calibration version, counted from 1 for each unit.
+             */
             version: number;
-            /** Recording */
+            /**
+             * Recording
+             * @description Number of the recording.
+             */
             recording: number;
             /**
              * Recordings
@@ -4849,6 +5379,7 @@ export interface components {
              * @description A data set counts as at rest if the magnitude of its table rate is below this, deg/s.
              */
             at_rest_dps: number;
+            /** @description Measured and modelled error of each data set and output axis. */
             columns: components["schemas"]["ComparisonColumns"];
             /**
              * Over Rate
@@ -4866,9 +5397,15 @@ export interface components {
          * @description An answer to the question with this id; an answer to an older question is refused.
          */
         ConfirmRequest: {
-            /** Prompt */
+            /**
+             * Prompt
+             * @description Id of the question that is answered.
+             */
             prompt: string;
-            /** By */
+            /**
+             * By
+             * @description Name of the person who acted, as typed.
+             */
             by: string;
             /**
              * Confirmed
@@ -4884,6 +5421,7 @@ export interface components {
             again?: boolean;
             /**
              * Reason
+             * @description Reason for the act, as typed.
              * @default
              */
             reason?: string;
@@ -4893,7 +5431,10 @@ export interface components {
          * @description Contributions along one variable, deg/s.
          */
         ContributionLines: {
-            /** At */
+            /**
+             * At
+             * @description Rates, deg/s, or temperatures, deg C, at which the budget was computed.
+             */
             at: number[];
             /**
              * Contributions
@@ -4902,9 +5443,15 @@ export interface components {
             contributions: {
                 [key: string]: (number | null)[];
             };
-            /** Combined */
+            /**
+             * Combined
+             * @description Combined standard uncertainty at each point, deg/s; null: a line of type A is unknown.
+             */
             combined: (number | null)[];
-            /** Expanded */
+            /**
+             * Expanded
+             * @description Expanded uncertainty at each point, deg/s; null: unknown.
+             */
             expanded: (number | null)[];
         };
         /**
@@ -4922,7 +5469,9 @@ export interface components {
              * @description Rate at which `over_temperature` was computed, deg/s.
              */
             rate_dps: number;
+            /** @description Contributions over the rate, at `temperature_c`. */
             over_rate: components["schemas"]["ContributionLines"];
+            /** @description Contributions over the temperature, at `rate_dps`. */
             over_temperature: components["schemas"]["ContributionLines"];
         };
         /**
@@ -5035,11 +5584,20 @@ export interface components {
          * @description A model compared with a recording: the verdict in one of five forms, and its evidence.
          */
         CriticismResponse: {
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
             serial: string;
-            /** Version */
+            /**
+             * Version
+             * @description Number of the calibration version, counted from 1 for each unit.
+             */
             version: number;
-            /** Recording */
+            /**
+             * Recording
+             * @description Number of the recording.
+             */
             recording: number;
             /**
              * Recordings
@@ -5050,6 +5608,7 @@ export interface components {
             joint: components["schemas"]["JointJson"] | null;
             /**
              * Verdict
+             * @description adequate: the residual is explained by noise; missing: the named effects are missing in the model; ambiguous: one of the named effects is missing, and the data do not distinguish them; unexplained: no effect of the catalogue explains the residual; insufficient_data: too little was measured for a verdict.
              * @enum {string}
              */
             verdict: "adequate" | "missing" | "ambiguous" | "unexplained" | "insufficient_data";
@@ -5058,15 +5617,21 @@ export interface components {
              * @description The verdict in sentences, the conclusion first.
              */
             text: string[];
+            /** @description Errors of the model as refitted for this comparison, and the noise floor, deg/s. */
             error: components["schemas"]["CriticisedErrors"];
+            /** @description The noise by which the residual is judged. */
             noise: components["schemas"]["CriticisedNoise"];
+            /** @description Test of whether the residual is larger than the noise explains. */
             lack_of_fit: components["schemas"]["LackOfFit"];
             /**
              * Where
              * @description Ranges of channels in which the residual is far from 0.
              */
             where: components["schemas"]["FailingRange"][];
-            /** Suspects */
+            /**
+             * Suspects
+             * @description Effects that may be missing in the model, each with its evidence and size.
+             */
             suspects: components["schemas"]["Suspect"][];
             /**
              * Named
@@ -5125,9 +5690,15 @@ export interface components {
              * @description For each effect that the verdict is based on: whether to add it, by what would be exported.
              */
             advice: components["schemas"]["Advice"][];
-            /** Not Testable */
+            /**
+             * Not Testable
+             * @description Effects that this recording cannot show, and why.
+             */
             not_testable: components["schemas"]["NotTestable"][];
-            /** Experiments */
+            /**
+             * Experiments
+             * @description Measurements that would distinguish the effects in question, or show effects that cannot be seen here.
+             */
             experiments: components["schemas"]["Experiment"][];
             /**
              * Worst
@@ -5183,6 +5754,7 @@ export interface components {
         Customer: {
             /**
              * Name
+             * @description Name of the organisation; empty: not stated.
              * @default
              */
             name?: string;
@@ -5194,11 +5766,13 @@ export interface components {
             street?: string;
             /**
              * Post Code
+             * @description Postal code; empty: not stated.
              * @default
              */
             post_code?: string;
             /**
              * City
+             * @description City; empty: not stated.
              * @default
              */
             city?: string;
@@ -5210,11 +5784,13 @@ export interface components {
             country?: string;
             /**
              * Email
+             * @description E-mail address; empty: not stated.
              * @default
              */
             email?: string;
             /**
              * Phone
+             * @description Telephone number; empty: not stated.
              * @default
              */
             phone?: string;
@@ -5298,43 +5874,85 @@ export interface components {
          * @description The data sets of a recording, as lists of equal length.
          */
         DataSetsResponse: {
-            /** Recording */
+            /**
+             * Recording
+             * @description Number of the recording.
+             */
             recording: number;
-            /** Number */
+            /**
+             * Number
+             * @description Number of the data set in the recording.
+             */
             number: number[];
-            /** State */
+            /**
+             * State
+             * @description State of the data set: open (being measured), complete or partial; only complete ones are fitted.
+             */
             state: string[];
             /**
              * Reason
              * @description Why the data set is not complete; empty if it is complete.
              */
             reason: string[];
-            /** Position */
+            /**
+             * Position
+             * @description Position of the unit: the body axis that points up, such as z or -x.
+             */
             position: string[];
-            /** Run */
+            /**
+             * Run
+             * @description Number of the run, a powered session of the unit.
+             */
             run: number[];
-            /** Mounting */
+            /**
+             * Mounting
+             * @description Number of the mounting, one way in which the unit is fixed to the table.
+             */
             mounting: number[];
-            /** Table Rate Dps */
+            /**
+             * Table Rate Dps
+             * @description Rate of the table, deg/s.
+             */
             table_rate_dps: number[];
-            /** T From S */
+            /**
+             * T From S
+             * @description Time of the first reading, s since the recording began; null: not known.
+             */
             t_from_s: (number | null)[];
-            /** T Until S */
+            /**
+             * T Until S
+             * @description Time of the last reading, s since the recording began; null: not known.
+             */
             t_until_s: (number | null)[];
-            /** N */
+            /**
+             * N
+             * @description Number of readings.
+             */
             n: number[];
-            /** Lost */
+            /**
+             * Lost
+             * @description Number of readings that are missing by the instrument's counter or by the clock.
+             */
             lost: number[];
-            /** Damaged */
+            /**
+             * Damaged
+             * @description Number of lines or frames that could not be read.
+             */
             damaged: number[];
             /**
              * Verification
              * @description Whether it was measured to verify a calibration: never fitted.
              */
             verification: boolean[];
-            /** Chamber Setpoint C */
+            /**
+             * Chamber Setpoint C
+             * @description Set point of the chamber, deg C; null: none, or not known.
+             */
             chamber_setpoint_c: (number | null)[];
-            /** Channels */
+            /**
+             * Channels
+             * @description For each channel: mean and standard deviation by data set.
+             */
             channels: {
                 [key: string]: components["schemas"]["ChannelColumns"];
             };
@@ -5360,15 +5978,30 @@ export interface components {
              * @description The axis, position, data sets or column that the warning concerns.
              */
             where: string;
-            /** Said */
+            /**
+             * Said
+             * @description What is the case, in words, with value and unit.
+             */
             said: string;
-            /** Value */
+            /**
+             * Value
+             * @description Value that was found, in `unit`; null: the warning has no number.
+             */
             value: number | null;
-            /** Unit */
+            /**
+             * Unit
+             * @description Unit of `value`; empty: none.
+             */
             unit: string;
-            /** Expected */
+            /**
+             * Expected
+             * @description What was expected, in words.
+             */
             expected: string;
-            /** Do */
+            /**
+             * Do
+             * @description What to do.
+             */
             do: string;
             /**
              * Text
@@ -5405,18 +6038,30 @@ export interface components {
          * @description A unit in the terms of IEEE Std 528 and 952.
          */
         DatasheetResponse: {
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
             serial: string;
-            /** Model */
+            /**
+             * Model
+             * @description Model of the unit, as its manufacturer names it; empty: not stated.
+             */
             model: string;
-            /** Technology */
+            /**
+             * Technology
+             * @description Technology of the gyro: fog (fibre-optic), mems or piezo; null: not known.
+             */
             technology: string | null;
             /**
              * Recordings
              * @description Ids of the recordings from which the values in this data sheet were computed, ascending.
              */
             recordings: number[];
-            /** Characteristics */
+            /**
+             * Characteristics
+             * @description Each characteristic, by axis.
+             */
             characteristics: components["schemas"]["Characteristic"][];
             /**
              * Passed
@@ -5428,9 +6073,15 @@ export interface components {
              * @description Ids of characteristics without a value on any axis.
              */
             not_measured: string[];
-            /** Decision Rule */
+            /**
+             * Decision Rule
+             * @description Rule by which `passed` was decided.
+             */
             decision_rule: string;
-            /** Text */
+            /**
+             * Text
+             * @description The result in sentences.
+             */
             text: string[];
         };
         /**
@@ -5438,9 +6089,15 @@ export interface components {
          * @description What one instrument of a bench answered.
          */
         DeviceCheck: {
-            /** Device */
+            /**
+             * Device
+             * @description Name of the instrument in the bench file.
+             */
             device: string;
-            /** Ok */
+            /**
+             * Ok
+             * @description Whether no finding is bad.
+             */
             ok: boolean;
             /**
              * Text
@@ -5449,6 +6106,7 @@ export interface components {
             text: string;
             /**
              * Kind
+             * @description Kind of instrument.
              * @default other
              * @enum {string}
              */
@@ -5466,7 +6124,10 @@ export interface components {
              * @default
              */
             address: string;
-            /** Findings */
+            /**
+             * Findings
+             * @description Each thing that was examined on this instrument.
+             */
             findings: components["schemas"]["FindingResponse"][];
             /**
              * Reported
@@ -5499,8 +6160,12 @@ export interface components {
          * @description What is known of a draft when it is made.
          */
         DraftReport: {
-            /** Model */
+            /**
+             * Model
+             * @description Name of the error model.
+             */
             model: string;
+            /** @description Errors that the draft states, deg/s. */
             error: components["schemas"]["CertifiedErrors"];
             /**
              * Compared
@@ -5517,7 +6182,10 @@ export interface components {
              * @description Verdict of the criticism on the recording; null: see `verdict_reason`.
              */
             verdict: string | null;
-            /** Verdict Text */
+            /**
+             * Verdict Text
+             * @description The verdict in words; empty: there is none.
+             */
             verdict_text: string;
             /**
              * Verdict Reason
@@ -5533,6 +6201,7 @@ export interface components {
             as_found: components["schemas"]["AppliedDraft"] | null;
             /**
              * As Found Why
+             * @description Why `as_found` is null; else empty.
              * @default
              */
             as_found_why: string;
@@ -5540,12 +6209,16 @@ export interface components {
             as_left: components["schemas"]["AppliedDraft"] | null;
             /**
              * As Left Why
+             * @description Why `as_left` is null; else empty.
              * @default
              */
             as_left_why: string;
             /** @description Difference between the draft and the version in force; null: no version was in force, or the recipe does not request it. */
             drift: components["schemas"]["DriftFromVersion"] | null;
-            /** Limits */
+            /**
+             * Limits
+             * @description The figures that the recipe limits; empty: it limits none.
+             */
             limits: components["schemas"]["LimitResult"][];
             /**
              * Within Limits
@@ -5563,11 +6236,20 @@ export interface components {
          * @description The draft of one recording of a campaign.
          */
         DraftResponse: {
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
             serial: string;
-            /** Campaign */
+            /**
+             * Campaign
+             * @description Number of the campaign.
+             */
             campaign: number;
-            /** Recording */
+            /**
+             * Recording
+             * @description Number of the recording.
+             */
             recording: number;
             /**
              * State
@@ -5596,6 +6278,7 @@ export interface components {
              * @description Why the draft failed, and what to do; else empty.
              */
             reason: string;
+            /** @description What is known of the draft; null: it is not made. */
             report: components["schemas"]["DraftReport"] | null;
         };
         /**
@@ -5615,7 +6298,10 @@ export interface components {
          * @description The drafts of a campaign.
          */
         DraftsResponse: {
-            /** Campaign */
+            /**
+             * Campaign
+             * @description Number of the campaign.
+             */
             campaign: number;
             /**
              * Drafts
@@ -5638,11 +6324,20 @@ export interface components {
              * @description The figure that changes with time: bias, scale_factor or error.
              */
             what: string;
-            /** Unit */
+            /**
+             * Unit
+             * @description Unit of `per_year`: deg/s/year for bias and error, 1/year for the scale factor.
+             */
             unit: string;
-            /** Points */
+            /**
+             * Points
+             * @description Number of recordings that the line was fitted to.
+             */
             points: number;
-            /** Per Year */
+            /**
+             * Per Year
+             * @description Slope of the line: change per year, in `unit`.
+             */
             per_year: number;
             /**
              * U
@@ -5654,7 +6349,10 @@ export interface components {
              * @description Lower limit of the 95 % interval of `per_year`, by Student's t; null with fewer than three recordings.
              */
             low: number | null;
-            /** High */
+            /**
+             * High
+             * @description Upper limit of the 95 % interval of `per_year`, by Student's t; null with fewer than three recordings.
+             */
             high: number | null;
             /**
              * Repeatability
@@ -5700,6 +6398,7 @@ export interface components {
             coefficients: components["schemas"]["CoefficientChange"][];
             /**
              * Why
+             * @description Why the coefficients were not compared; else empty.
              * @default
              */
             why: string;
@@ -5710,7 +6409,10 @@ export interface components {
          *     lists of equal length.
          */
         DriftLine: {
-            /** At */
+            /**
+             * At
+             * @description Times of the points of the line.
+             */
             at: string[];
             /**
              * Value
@@ -5722,7 +6424,10 @@ export interface components {
              * @description Lower limit of the 95 % interval of the line, by Student's t; null with fewer than three recordings.
              */
             low: (number | null)[];
-            /** High */
+            /**
+             * High
+             * @description Upper limit of the 95 % interval of the line, by Student's t; null with fewer than three recordings.
+             */
             high: (number | null)[];
         };
         /**
@@ -5738,6 +6443,7 @@ export interface components {
             /**
              * On
              * Format: date
+             * @description Day of the prediction.
              */
             on: string;
             /**
@@ -5781,11 +6487,20 @@ export interface components {
          * @description The driver of an instrument, and the distribution that it came from.
          */
         DriverResponse: {
-            /** Driver */
+            /**
+             * Driver
+             * @description Name of the driver of the instrument.
+             */
             driver: string;
-            /** Distribution */
+            /**
+             * Distribution
+             * @description Python distribution (installed package) that provides the driver.
+             */
             distribution: string;
-            /** Version */
+            /**
+             * Version
+             * @description Version of that distribution.
+             */
             version: string;
         };
         /**
@@ -5793,7 +6508,10 @@ export interface components {
          * @description An earlier version that a calibration by few poses rests on; its bias is not used.
          */
         EarlierVersion: {
-            /** Version */
+            /**
+             * Version
+             * @description Number of that version of the accelerometer.
+             */
             version: number;
             /**
              * Scale Change
@@ -5869,22 +6587,22 @@ export interface components {
         ErrorFigures: {
             /**
              * Raw Rms Dps
-             * @description Error before any compensation, deg/s.
+             * @description RMS error before any compensation, deg/s; null: not known.
              */
             raw_rms_dps: number | null;
             /**
              * Rms Dps
-             * @description Error after compensation, on the data that were fitted, deg/s.
+             * @description RMS error after compensation, on the data that were fitted, deg/s; null: not known.
              */
             rms_dps: number | null;
             /**
              * Heldout Rms Dps
-             * @description Error at temperatures that were left out of the fit, deg/s.
+             * @description RMS error on data that were left out of the fit, deg/s; null: not known.
              */
             heldout_rms_dps: number | null;
             /**
              * Noise Floor Dps
-             * @description Error of data-set means due to noise and drift alone, deg/s.
+             * @description RMS error of data-set means due to noise and drift alone, deg/s; null: not known.
              */
             noise_floor_dps: number | null;
             /**
@@ -5904,7 +6622,10 @@ export interface components {
          * @description A value with its standard uncertainty.
          */
         Estimate: {
-            /** Value */
+            /**
+             * Value
+             * @description Value, in the unit that the field of this estimate states.
+             */
             value: number;
             /**
              * U
@@ -5917,23 +6638,37 @@ export interface components {
          * @description Something that happened in a campaign.
          */
         EventResponse: {
-            /** Id */
+            /**
+             * Id
+             * @description Number of the event.
+             */
             id: number;
             /**
              * At
              * Format: date-time
+             * @description Time of the event.
              */
             at: string;
-            /** T S */
+            /**
+             * T S
+             * @description Campaign time of the event: seconds since the campaign began, by the campaign's own clock.
+             */
             t_s: number;
-            /** Kind */
+            /**
+             * Kind
+             * @description Kind of event, as a fixed word for programs.
+             */
             kind: string;
             /**
              * Level
+             * @description Importance of the event.
              * @enum {string}
              */
             level: "info" | "warning" | "error";
-            /** Message */
+            /**
+             * Message
+             * @description The event in words.
+             */
             message: string;
             /**
              * Device
@@ -5950,7 +6685,10 @@ export interface components {
              * @description Limit that `value` was compared with, in `unit`.
              */
             limit: number | null;
-            /** Unit */
+            /**
+             * Unit
+             * @description Unit of `value` and `limit`; null: the event has no value.
+             */
             unit: string | null;
         };
         /**
@@ -6017,7 +6755,10 @@ export interface components {
              * @description Name of the format, to be sent as `format`.
              */
             id: string;
-            /** Title */
+            /**
+             * Title
+             * @description Title of the format for a person, such as in a list.
+             */
             title: string;
             /**
              * Suffix
@@ -6078,6 +6819,7 @@ export interface components {
             /**
              * First At
              * Format: date-time
+             * @description Time of the first fetch.
              */
             first_at: string;
             /**
@@ -6088,11 +6830,54 @@ export interface components {
             last_at: string;
         };
         /**
+         * FieldAlignmentJson
+         * @description Rotation of the magnetometer's axes from the accelerometer's, and the dip of the field.
+         */
+        FieldAlignmentJson: {
+            /**
+             * Axes
+             * @description Axis -> component of the rotation vector, deg.
+             */
+            axes: {
+                [key: string]: components["schemas"]["AccelerometerCoefficient"];
+            };
+            /** @description Angle of the field below the horizontal, deg. */
+            dip: components["schemas"]["AccelerometerCoefficient"];
+            /**
+             * Covariance Deg2
+             * @description Covariance of the three components and the dip, (4, 4), deg^2.
+             */
+            covariance_deg2: number[][];
+            /**
+             * Place Deg
+             * @description Standard deviation of a component of the direction from rest to rest, beyond the noise, deg.
+             */
+            place_deg: number;
+            /**
+             * Rests
+             * @description Number of rests that were used.
+             */
+            rests: number;
+            /**
+             * Moves
+             * @description Number of moves between rests that were used.
+             */
+            moves: number;
+            /**
+             * Definition
+             * @description How rotation and dip are defined.
+             */
+            definition: string;
+        };
+        /**
          * FindingResponse
          * @description One thing that was found out about an instrument.
          */
         FindingResponse: {
-            /** What */
+            /**
+             * What
+             * @description Property that was examined, such as clock, port or air temperature.
+             */
             what: string;
             /**
              * Text
@@ -6101,13 +6886,18 @@ export interface components {
             text: string;
             /**
              * State
+             * @description good: as it should be; doubtful: results may be less accurate; bad: a campaign cannot run, or its results would be wrong.
              * @enum {string}
              */
             state: "good" | "doubtful" | "bad";
-            /** Value */
+            /**
+             * Value
+             * @description Value that was read, in `unit`; null: the finding has no number.
+             */
             value: number | null;
             /**
              * Unit
+             * @description Unit of `value`; empty: none.
              * @default
              */
             unit: string;
@@ -6189,8 +6979,12 @@ export interface components {
          * @description A calibration version, as `labctl fit --json` and `POST .../calibrations` give it.
          */
         FitResponse: {
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
             serial: string;
+            /** @description The effects of the fitted model. */
             model: components["schemas"]["ModelResponse"];
             /**
              * Axes
@@ -6199,7 +6993,9 @@ export interface components {
             axes: {
                 [key: string]: components["schemas"]["AxisCoefficients"];
             };
+            /** @description Errors of the model before and after compensation, deg/s. */
             error: components["schemas"]["ErrorFigures"];
+            /** @description Rates and temperatures over which the model was calibrated. */
             validity: components["schemas"]["Validity"];
             /**
              * Warnings
@@ -6243,20 +7039,29 @@ export interface components {
             recordings: number[];
             /** @description Only for several recordings: repeatability, agreement between the recordings, and the error when each recording is predicted by a fit to the others. */
             joint: components["schemas"]["JointJson"] | null;
-            /** Version */
+            /**
+             * Version
+             * @description Number of the calibration version, counted from 1 for each unit.
+             */
             version: number;
             /**
              * Campaign
              * @description Campaign that made the recording; null: imported.
              */
             campaign: number | null;
-            /** Recipe */
+            /**
+             * Recipe
+             * @description Name of the recipe of the campaign that made the recording; null: the recording was imported.
+             */
             recipe: string | null;
-            /** Bench */
+            /**
+             * Bench
+             * @description Name of the bench of that campaign; null: the recording was imported.
+             */
             bench: string | null;
             /**
              * Hash
-             * @description SHA-256 of the calibration file.
+             * @description SHA-256 of the calibration as it was stored.
              */
             hash: string;
         };
@@ -6265,7 +7070,10 @@ export interface components {
          * @description A known coefficient: a number, or a list over temperatures.
          */
         FixedCoefficient: {
-            /** Value */
+            /**
+             * Value
+             * @description Value of the coefficient, in `unit`; a list: one value for each of `temperature_c`.
+             */
             value: number | number[];
             /**
              * U
@@ -6304,15 +7112,24 @@ export interface components {
              * @description Reference temperature, deg C, from which the temperature terms count.
              */
             reference_temperature_c?: number | null;
-            /** X */
+            /**
+             * X
+             * @description Known coefficients of axis x: name -> value.
+             */
             x?: {
                 [key: string]: components["schemas"]["FixedCoefficient"] | number;
             };
-            /** Y */
+            /**
+             * Y
+             * @description Known coefficients of axis y: name -> value.
+             */
             y?: {
                 [key: string]: components["schemas"]["FixedCoefficient"] | number;
             };
-            /** Z */
+            /**
+             * Z
+             * @description Known coefficients of axis z: name -> value.
+             */
             z?: {
                 [key: string]: components["schemas"]["FixedCoefficient"] | number;
             };
@@ -6348,6 +7165,7 @@ export interface components {
         Follower: {
             /**
              * Kind
+             * @description lag: the element follows the temperature with a time constant; play: it follows with a hysteresis of constant width.
              * @enum {string}
              */
             kind: "lag" | "play";
@@ -6358,6 +7176,7 @@ export interface components {
             parameter: number;
             /**
              * Unit
+             * @description Unit of `parameter`: s for a lag, K for a play.
              * @enum {string}
              */
             unit: "s" | "K";
@@ -6466,10 +7285,14 @@ export interface components {
         HealthResponse: {
             /**
              * Status
+             * @description ok: all is well; else the last safe state of the bench is not confirmed.
              * @enum {string}
              */
             status: "ok" | "look at the bench";
-            /** Version */
+            /**
+             * Version
+             * @description Version of labctl that the service runs.
+             */
             version: string;
             /**
              * Database
@@ -6481,6 +7304,7 @@ export interface components {
              * @description When the service was started, ISO 8601, UTC.
              */
             since: string;
+            /** @description The bench of the service; null: it has none. */
             bench: components["schemas"]["BenchDescription"] | null;
             /**
              * Schedule Trouble
@@ -6495,11 +7319,15 @@ export interface components {
         HeartbeatResponse: {
             /**
              * Status
+             * @description Always ok: the service answers.
              * @default ok
              * @constant
              */
             status: "ok";
-            /** Version */
+            /**
+             * Version
+             * @description Version of labctl that the service runs.
+             */
             version: string;
             /**
              * Heard S
@@ -6611,13 +7439,25 @@ export interface components {
          * @description A recording that is now in the database.
          */
         ImportResponse: {
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
             serial: string;
-            /** Recording */
+            /**
+             * Recording
+             * @description Number of the recording.
+             */
             recording: number;
-            /** Datasets */
+            /**
+             * Datasets
+             * @description Number of data sets; 0: a table of coefficients.
+             */
             datasets: number;
-            /** Readings */
+            /**
+             * Readings
+             * @description Number of readings; of means or coefficients, the number of rows.
+             */
             readings: number;
             /**
              * Suggested Model
@@ -6688,8 +7528,12 @@ export interface components {
          * @description The version that a change of effects made, as `labctl improve --json` and `POST .../improve` give it.
          */
         ImproveResponse: {
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
             serial: string;
+            /** @description The effects of the fitted model. */
             model: components["schemas"]["ModelResponse"];
             /**
              * Axes
@@ -6698,7 +7542,9 @@ export interface components {
             axes: {
                 [key: string]: components["schemas"]["AxisCoefficients"];
             };
+            /** @description Errors of the model before and after compensation, deg/s. */
             error: components["schemas"]["ErrorFigures"];
+            /** @description Rates and temperatures over which the model was calibrated. */
             validity: components["schemas"]["Validity"];
             /**
              * Warnings
@@ -6763,13 +7609,19 @@ export interface components {
             left_out: components["schemas"]["labctl__json_types__models__LeftOut"][];
             /** @description Of a thermal lag that was added at rest and is not certain: what it leaves of stretches left out, and why it is not certain; else null. */
             thermal_hint: components["schemas"]["ThermalHintJson"] | null;
-            /** Version */
+            /**
+             * Version
+             * @description Number of the calibration version, counted from 1 for each unit.
+             */
             version: number;
-            /** Parent */
+            /**
+             * Parent
+             * @description Version that was changed, as `improved_from`.
+             */
             parent: number;
             /**
              * Hash
-             * @description SHA-256 of the calibration file.
+             * @description SHA-256 of the calibration as it was stored.
              */
             hash: string;
         };
@@ -6778,8 +7630,12 @@ export interface components {
          * @description A calibration version that a change of effects made, and whether it is in force.
          */
         ImprovedVersionResponse: {
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
             serial: string;
+            /** @description The effects of the fitted model. */
             model: components["schemas"]["ModelResponse"];
             /**
              * Axes
@@ -6788,7 +7644,9 @@ export interface components {
             axes: {
                 [key: string]: components["schemas"]["AxisCoefficients"];
             };
+            /** @description Errors of the model before and after compensation, deg/s. */
             error: components["schemas"]["ErrorFigures"];
+            /** @description Rates and temperatures over which the model was calibrated. */
             validity: components["schemas"]["Validity"];
             /**
              * Warnings
@@ -6853,21 +7711,31 @@ export interface components {
             left_out: components["schemas"]["labctl__json_types__models__LeftOut"][];
             /** @description Of a thermal lag that was added at rest and is not certain: what it leaves of stretches left out, and why it is not certain; else null. */
             thermal_hint: components["schemas"]["ThermalHintJson"] | null;
-            /** Version */
+            /**
+             * Version
+             * @description Number of the calibration version, counted from 1 for each unit.
+             */
             version: number;
-            /** Parent */
+            /**
+             * Parent
+             * @description Version that was changed, as `improved_from`.
+             */
             parent: number;
             /**
              * Hash
-             * @description SHA-256 of the calibration file.
+             * @description SHA-256 of the calibration as it was stored.
              */
             hash: string;
             /**
              * Created At
              * Format: date-time
+             * @description Time at which the version was stored.
              */
             created_at: string;
-            /** In Force */
+            /**
+             * In Force
+             * @description Whether this version is in force: certified last, and not revoked.
+             */
             in_force: boolean;
             /**
              * Notices
@@ -6908,12 +7776,19 @@ export interface components {
              * @description Number of the recording; null: a file that is not imported.
              */
             recording: number | null;
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
             serial: string;
-            /** Kind */
+            /**
+             * Kind
+             * @description Kind of data: samples (every reading), points (one mean per data set) or coefficients (a published table).
+             */
             kind: string;
             /**
              * Motion
+             * @description How the unit was moved: at constant table rates, at rest, turned by known angles, along a rate profile, or by hand between poses.
              * @enum {string}
              */
             motion: "rates" | "rest" | "turns" | "profile" | "poses";
@@ -6999,6 +7874,7 @@ export interface components {
              * @description Name of the key's owner, shown in the audit trail; a name cannot be used for a second key.
              */
             name: string;
+            /** @description What the key may do. viewer: read; operator: also import, fit, improve and run campaigns; approver: also certify, revoke, and make and revoke keys. */
             role: components["schemas"]["Role"];
         };
         /**
@@ -7006,15 +7882,23 @@ export interface components {
          * @description A key as it may be seen later: without the key.
          */
         KeyResponse: {
-            /** Name */
+            /**
+             * Name
+             * @description Name of the key's owner, as in the audit trail.
+             */
             name: string;
+            /** @description What the key may do. viewer: read; operator: also import, fit, improve and run campaigns; approver: also certify, revoke, and make and revoke keys. */
             role: components["schemas"]["Role"];
             /**
              * Created At
              * Format: date-time
+             * @description Time at which the key was made.
              */
             created_at: string;
-            /** Revoked At */
+            /**
+             * Revoked At
+             * @description Time at which the key was revoked; null: it is in force.
+             */
             revoked_at: string | null;
         };
         /**
@@ -7024,6 +7908,7 @@ export interface components {
         Laboratory: {
             /**
              * Name
+             * @description Name of the organisation; empty: not stated.
              * @default
              */
             name?: string;
@@ -7035,11 +7920,13 @@ export interface components {
             street?: string;
             /**
              * Post Code
+             * @description Postal code; empty: not stated.
              * @default
              */
             post_code?: string;
             /**
              * City
+             * @description City; empty: not stated.
              * @default
              */
             city?: string;
@@ -7051,11 +7938,13 @@ export interface components {
             country?: string;
             /**
              * Email
+             * @description E-mail address; empty: not stated.
              * @default
              */
             email?: string;
             /**
              * Phone
+             * @description Telephone number; empty: not stated.
              * @default
              */
             phone?: string;
@@ -7067,17 +7956,20 @@ export interface components {
             accreditation?: string;
             /**
              * Place
+             * @description Where the calibration was performed, in the words of the DCC schema.
              * @default laboratory
              * @enum {string}
              */
             place?: "laboratory" | "customer" | "laboratoryBranch" | "customerBranch" | "other";
             /**
              * Url
+             * @description Address of labctl as a customer reaches it, for the QR code of a certificate; empty: none.
              * @default
              */
             url?: string;
             /**
              * Number Prefix
+             * @description Prefix of the number of every certificate, so that no two laboratories have a number in common.
              * @default
              */
             number_prefix?: string;
@@ -7093,11 +7985,19 @@ export interface components {
          * @description Two calibrations of one unit compared.
          */
         LaboratoryComparison: {
+            /** @description The first calibration. */
             first: components["schemas"]["ComparedCalibration"];
+            /** @description The second calibration. */
             second: components["schemas"]["ComparedCalibration"];
-            /** Temperature C */
+            /**
+             * Temperature C
+             * @description Temperature at which the results were compared, deg C.
+             */
             temperature_c: number;
-            /** Results */
+            /**
+             * Results
+             * @description Each result that both calibrations have.
+             */
             results: components["schemas"]["ComparedResult"][];
             /**
              * Shared
@@ -7116,7 +8016,10 @@ export interface components {
              * @description Whether |En| <= 1 for every result.
              */
             satisfactory: boolean;
-            /** Text */
+            /**
+             * Text
+             * @description The result in sentences.
+             */
             text: string[];
         };
         /**
@@ -7140,7 +8043,10 @@ export interface components {
          * @description The error of the versions fitted to one recording, each version after its parent.
          */
         LadderResponse: {
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
             serial: string;
             /**
              * Recording
@@ -7152,14 +8058,20 @@ export interface components {
              * @description All recordings that `steps` were fitted to.
              */
             recordings: number[];
-            /** Steps */
+            /**
+             * Steps
+             * @description Each version that was fitted to `recordings`.
+             */
             steps: components["schemas"]["LadderRow"][];
             /**
              * Others
              * @description Versions fitted to other recordings, with their error on this recording.
              */
             others: components["schemas"]["LadderRow"][];
-            /** Noise Floor Dps */
+            /**
+             * Noise Floor Dps
+             * @description RMS error of data-set means due to noise and drift alone, deg/s; null: not known.
+             */
             noise_floor_dps: number | null;
         };
         /**
@@ -7167,9 +8079,15 @@ export interface components {
          * @description One version of a unit's calibration, with its errors.
          */
         LadderRow: {
-            /** Version */
+            /**
+             * Version
+             * @description Number of the calibration version, counted from 1 for each unit.
+             */
             version: number;
-            /** Parent */
+            /**
+             * Parent
+             * @description Version of which a change of effects made this version; null: it is from a fit.
+             */
             parent: number | null;
             /**
              * Recording
@@ -7181,41 +8099,71 @@ export interface components {
              * @description All recordings that the model was fitted to; `recording` is the newest of these.
              */
             recordings: number[];
-            /** Model */
+            /**
+             * Model
+             * @description Name of the error model.
+             */
             model: string;
-            /** Effects */
+            /**
+             * Effects
+             * @description Ids of the effects in the model, as the catalogue names them.
+             */
             effects: string[];
             /**
              * Applied Rms Dps
              * @description Only for versions in `others`: RMS error on this recording without refitting, deg/s.
              */
             applied_rms_dps: number | null;
-            /** Raw Rms Dps */
+            /**
+             * Raw Rms Dps
+             * @description RMS error before any compensation, deg/s; null: not known.
+             */
             raw_rms_dps: number | null;
-            /** Rms Dps */
+            /**
+             * Rms Dps
+             * @description RMS error after compensation, on the data that were fitted, deg/s; null: not known.
+             */
             rms_dps: number | null;
-            /** Heldout Rms Dps */
+            /**
+             * Heldout Rms Dps
+             * @description RMS error on data that were left out of the fit, deg/s; null: not known.
+             */
             heldout_rms_dps: number | null;
-            /** Noise Floor Dps */
+            /**
+             * Noise Floor Dps
+             * @description RMS error of data-set means due to noise and drift alone, deg/s; null: not known.
+             */
             noise_floor_dps: number | null;
         };
         /**
          * Leaving
-         * @description When the bias of an axis leaves the limit; null: not within 50 years, or not known.
+         * @description When the bias of an axis leaves the limit.
          */
         Leaving: {
-            /** Axis */
+            /**
+             * Axis
+             * @description Output axis of the unit: x, y or z.
+             */
             axis: string;
             /**
              * Outside
              * @description Whether the fitted line is already outside the limit at the time of the newest recording.
              */
             outside: boolean;
-            /** Expected */
+            /**
+             * Expected
+             * @description Time at which the fitted line leaves the limit; null: not within 50 years, or not known.
+             */
             expected: string | null;
-            /** Earliest */
+            /**
+             * Earliest
+             * @description Earliest such time by the 95 % interval of the line; null: not within 50 years, or not known.
+             */
             earliest: string | null;
-            /** Latest */
+            /**
+             * Latest
+             * @description Latest such time by the 95 % interval of the line; null: not within 50 years, or not known.
+             */
             latest: string | null;
         };
         /**
@@ -7238,7 +8186,10 @@ export interface components {
              * @description RMS prediction error of the data sets tested, deg/s; null: see `why`.
              */
             rms_dps: number | null;
-            /** Datasets */
+            /**
+             * Datasets
+             * @description Number of data sets that were predicted.
+             */
             datasets: number;
             /**
              * Why
@@ -7300,6 +8251,7 @@ export interface components {
         LimitResult: {
             /**
              * Limit
+             * @description Name of the limit in the recipe.
              * @enum {string}
              */
             limit: "heldout_rms_dps" | "max_error_dps" | "drift_dps";
@@ -7313,7 +8265,10 @@ export interface components {
              * @description Figure that is compared with the limit, deg/s; null: not known, see `why`.
              */
             value_dps: number | null;
-            /** At Most Dps */
+            /**
+             * At Most Dps
+             * @description Limit of the recipe, deg/s.
+             */
             at_most_dps: number;
             /**
              * Passed
@@ -7322,6 +8277,7 @@ export interface components {
             passed: boolean | null;
             /**
              * Why
+             * @description Why the figure is not known; else empty.
              * @default
              */
             why: string;
@@ -7331,18 +8287,30 @@ export interface components {
          * @description One coefficient of a live calibration.
          */
         LiveCoefficientResponse: {
-            /** Axis */
+            /**
+             * Axis
+             * @description Output axis of the unit: x, y or z.
+             */
             axis: string;
-            /** Name */
+            /**
+             * Name
+             * @description Name of the coefficient.
+             */
             name: string;
-            /** Value */
+            /**
+             * Value
+             * @description Value of the coefficient, in `unit`.
+             */
             value: number;
             /**
              * Expanded
              * @description Expanded uncertainty U with k = 2, in `unit`.
              */
             expanded: number;
-            /** Unit */
+            /**
+             * Unit
+             * @description Unit of the coefficient.
+             */
             unit: string;
             /**
              * Limit
@@ -7388,7 +8356,10 @@ export interface components {
              * @description Poses that were covered.
              */
             poses: number[];
-            /** Coefficients */
+            /**
+             * Coefficients
+             * @description U of each coefficient, fit by fit.
+             */
             coefficients: components["schemas"]["LiveUncertaintyColumn"][];
         };
         /**
@@ -7396,7 +8367,10 @@ export interface components {
          * @description A live calibration while the unit is turned.
          */
         LiveMoment: {
-            /** Readings */
+            /**
+             * Readings
+             * @description Number of readings so far.
+             */
             readings: number;
             /**
              * Lost
@@ -7408,16 +8382,25 @@ export interface components {
              * @description Lines or frames of the stream that could not be read.
              */
             damaged: number;
-            /** Duration S */
+            /**
+             * Duration S
+             * @description Time from the first to the last reading, s.
+             */
             duration_s: number;
-            /** Rests */
+            /**
+             * Rests
+             * @description Number of rests that were recognised.
+             */
             rests: number;
             /**
              * Poses
              * @description Asked poses that rests cover, by the body axes that point up.
              */
             poses: string[];
-            /** Poses Asked */
+            /**
+             * Poses Asked
+             * @description Number of poses that the target asks for.
+             */
             poses_asked: number;
             /**
              * Coefficients
@@ -7487,7 +8470,10 @@ export interface components {
              * @description Body axes that point up, such as `z`, `x,-z` or `x,y,-z`.
              */
             name: string;
-            /** Text */
+            /**
+             * Text
+             * @description The pose in words.
+             */
             text: string;
             /**
              * Up
@@ -7561,7 +8547,10 @@ export interface components {
          * @description Result of a live calibration: what was measured, what it determines, and what is missing.
          */
         LiveResponse: {
-            /** Readings */
+            /**
+             * Readings
+             * @description Number of readings so far.
+             */
             readings: number;
             /**
              * Lost
@@ -7573,16 +8562,25 @@ export interface components {
              * @description Lines or frames of the stream that could not be read.
              */
             damaged: number;
-            /** Duration S */
+            /**
+             * Duration S
+             * @description Time from the first to the last reading, s.
+             */
             duration_s: number;
-            /** Rests */
+            /**
+             * Rests
+             * @description Number of rests that were recognised.
+             */
             rests: number;
             /**
              * Poses
              * @description Asked poses that rests cover, by the body axes that point up.
              */
             poses: string[];
-            /** Poses Asked */
+            /**
+             * Poses Asked
+             * @description Number of poses that the target asks for.
+             */
             poses_asked: number;
             /**
              * Coefficients
@@ -7599,7 +8597,10 @@ export interface components {
              * @description Turns that the fit could not use, and why.
              */
             left_out: string[];
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
             serial: string;
             /**
              * Complete
@@ -7647,7 +8648,10 @@ export interface components {
              * @description It counts the calibrations of this service process; 0: none.
              */
             number: number;
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit; empty: none since the service began.
+             */
             serial: string;
             /**
              * Stream
@@ -7664,13 +8668,17 @@ export interface components {
              * @description Who began it.
              */
             by: string;
-            /** Started At */
+            /**
+             * Started At
+             * @description Time at which it began; null: none since the service began.
+             */
             started_at: string | null;
             /**
              * End Unwatched
              * @description Whether it ends once no page has followed it for 30 s.
              */
             end_unwatched: boolean;
+            /** @description When the calibration is complete; null: none since the service began. */
             target: components["schemas"]["LiveTargetResponse"] | null;
             /** @description Null before the first readings. */
             moment: components["schemas"]["LiveMoment"] | null;
@@ -7702,7 +8710,10 @@ export interface components {
              * @description Limit of U (k = 2) of each bias, deg/s; null: none.
              */
             bias_dps: number | null;
-            /** Poses */
+            /**
+             * Poses
+             * @description Number of poses to ask for, 12 to 26.
+             */
             poses: number;
             /**
              * Rest S
@@ -7715,11 +8726,20 @@ export interface components {
          * @description U of one coefficient over the fits of a live calibration.
          */
         LiveUncertaintyColumn: {
-            /** Axis */
+            /**
+             * Axis
+             * @description Output axis of the unit: x, y or z.
+             */
             axis: string;
-            /** Name */
+            /**
+             * Name
+             * @description Name of the coefficient.
+             */
             name: string;
-            /** Unit */
+            /**
+             * Unit
+             * @description Unit of the coefficient.
+             */
             unit: string;
             /**
              * Limit
@@ -7737,14 +8757,20 @@ export interface components {
          * @description One column of a log.
          */
         LogColumn: {
-            /** Name */
+            /**
+             * Name
+             * @description Name of the column in the file.
+             */
             name: string;
             /**
              * Unit
              * @description Unit that the file gives for the column; empty: none.
              */
             unit: string;
-            /** Is Text */
+            /**
+             * Is Text
+             * @description Whether the column holds text, not numbers.
+             */
             is_text: boolean;
             /**
              * Target
@@ -7757,20 +8783,35 @@ export interface components {
          * @description A log, its column map, and the recording that it would become; nothing was imported.
          */
         LogPreview: {
-            /** File */
+            /**
+             * File
+             * @description Name of the file.
+             */
             file: string;
-            /** Importer */
+            /**
+             * Importer
+             * @description Name of the importer that reads this format.
+             */
             importer: string;
             /**
              * Title
              * @description Title of the format.
              */
             title: string;
-            /** Rows */
+            /**
+             * Rows
+             * @description Number of rows of the file.
+             */
             rows: number;
-            /** Columns */
+            /**
+             * Columns
+             * @description Each column of the file.
+             */
             columns: components["schemas"]["LogColumn"][];
-            /** First Rows */
+            /**
+             * First Rows
+             * @description First rows of the file as text, at most 8; one value for each column.
+             */
             first_rows: string[][];
             /**
              * Column Map
@@ -7804,20 +8845,35 @@ export interface components {
              * @description Columns of the file that are not used.
              */
             unused: string[];
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit; null: not known because of `problems`.
+             */
             serial: string | null;
             /**
              * Motion
              * @description How the unit was moved, as `motion` in recording.toml; null: not known because of `problems`.
              */
             motion: string | null;
-            /** Datasets */
+            /**
+             * Datasets
+             * @description Number of data sets of the recording; null: not known because of `problems`.
+             */
             datasets: number | null;
-            /** Duration S */
+            /**
+             * Duration S
+             * @description Time from the first to the last reading, s; null: not known because of `problems`, or the file has no times.
+             */
             duration_s: number | null;
-            /** Traces */
+            /**
+             * Traces
+             * @description Course of the columns of numbers, in bins.
+             */
             traces: components["schemas"]["LogTrace"][];
-            /** Targets */
+            /**
+             * Targets
+             * @description Columns that a recording may have, for the column map.
+             */
             targets: components["schemas"]["LogTarget"][];
         };
         /**
@@ -7825,9 +8881,15 @@ export interface components {
          * @description A column that a recording may have.
          */
         LogTarget: {
-            /** Name */
+            /**
+             * Name
+             * @description Name of the column in the recording.
+             */
             name: string;
-            /** Meaning */
+            /**
+             * Meaning
+             * @description What the column holds, in words.
+             */
             meaning: string;
             /**
              * Unit
@@ -7845,16 +8907,25 @@ export interface components {
          * @description Least and largest value of a column in bins of equal count, in the file's own unit.
          */
         LogTrace: {
-            /** Name */
+            /**
+             * Name
+             * @description Name of the column in the file.
+             */
             name: string;
             /**
              * X
              * @description Middle of each bin: time in s, or the number of the row if the time is not known.
              */
             x: number[];
-            /** Low */
+            /**
+             * Low
+             * @description Smallest value in each bin, in the file's own unit; null: the bin has no number.
+             */
             low: (number | null)[];
-            /** High */
+            /**
+             * High
+             * @description Largest value in each bin, in the file's own unit; null: the bin has no number.
+             */
             high: (number | null)[];
         };
         /**
@@ -7862,12 +8933,13 @@ export interface components {
          * @description A calibration of a magnetometer, to be kept as the next version of a unit.
          */
         MagnetometerRequest: {
+            /** @description The data that the result was fitted to. */
             data: components["schemas"]["MeasuredData"];
             /** @description As `labctl magnetometer FILE --json` prints it. */
-            result: components["schemas"]["MagnetometerResponse"];
+            result: components["schemas"]["MagnetometerResponse-Input"];
             /**
              * By
-             * @description Who.
+             * @description Name of the person who acted, as typed.
              */
             by: string;
         };
@@ -7875,14 +8947,17 @@ export interface components {
          * MagnetometerResponse
          * @description Hard and soft iron of a magnetometer: field = soft iron (reading - hard iron), in the axes of the sensor.
          */
-        MagnetometerResponse: {
+        "MagnetometerResponse-Input": {
             /**
              * Verdict
              * @description adequate: the readings are those of a constant field up to their noise; unexplained: they are not.
              * @enum {string}
              */
             verdict: "adequate" | "unexplained";
-            /** Hard Iron Ut */
+            /**
+             * Hard Iron Ut
+             * @description For each axis: hard iron, uT.
+             */
             hard_iron_ut: {
                 [key: string]: components["schemas"]["Estimate"];
             };
@@ -7893,13 +8968,17 @@ export interface components {
             soft_iron: {
                 [key: string]: components["schemas"]["Estimate"];
             };
+            /** @description Magnitude of the field, uT: given, or with a soft iron of determinant 1. */
             field_ut: components["schemas"]["Estimate"];
             /**
              * Covariance
              * @description Of hard iron x, y, z, soft iron xx, yy, zz, xy, xz, yz, and field.
              */
             covariance: number[][];
-            /** Readings */
+            /**
+             * Readings
+             * @description Number of readings, also of those that were left out.
+             */
             readings: number;
             /**
              * Left Out
@@ -7941,7 +9020,97 @@ export interface components {
              * @description From any direction to the nearest that was measured, at most, deg.
              */
             largest_gap_deg: number;
-            /** Text */
+            /** @description Rotation of the axes of the corrected field from those of the corrected force and rate, deg, and the dip of the field; null: no recording in poses, or rests and turns that do not determine it. */
+            alignment?: components["schemas"]["FieldAlignmentJson"] | null;
+            /**
+             * Text
+             * @description The result in sentences.
+             */
+            text: string[];
+        };
+        /**
+         * MagnetometerResponse
+         * @description Hard and soft iron of a magnetometer: field = soft iron (reading - hard iron), in the axes of the sensor.
+         */
+        "MagnetometerResponse-Output": {
+            /**
+             * Verdict
+             * @description adequate: the readings are those of a constant field up to their noise; unexplained: they are not.
+             * @enum {string}
+             */
+            verdict: "adequate" | "unexplained";
+            /**
+             * Hard Iron Ut
+             * @description For each axis: hard iron, uT.
+             */
+            hard_iron_ut: {
+                [key: string]: components["schemas"]["Estimate"];
+            };
+            /**
+             * Soft Iron
+             * @description Symmetric matrix: xx, yy, zz, xy, xz, yz.
+             */
+            soft_iron: {
+                [key: string]: components["schemas"]["Estimate"];
+            };
+            /** @description Magnitude of the field, uT: given, or with a soft iron of determinant 1. */
+            field_ut: components["schemas"]["Estimate"];
+            /**
+             * Covariance
+             * @description Of hard iron x, y, z, soft iron xx, yy, zz, xy, xz, yz, and field.
+             */
+            covariance: number[][];
+            /**
+             * Readings
+             * @description Number of readings, also of those that were left out.
+             */
+            readings: number;
+            /**
+             * Left Out
+             * @description Readings further from the ellipsoid than five robust standard deviations.
+             */
+            left_out: number;
+            /**
+             * Before Ut
+             * @description Standard deviation of the size of the raw readings, uT.
+             */
+            before_ut: number;
+            /**
+             * Residual Ut
+             * @description Root mean square of the distances from the ellipsoid, uT.
+             */
+            residual_ut: number;
+            /**
+             * Heldout Ut
+             * @description The same of readings predicted from those of other times, uT.
+             */
+            heldout_ut: number;
+            /**
+             * Noise Ut
+             * @description Noise of the distances from one reading to the next, uT.
+             */
+            noise_ut: number;
+            /**
+             * Repetition
+             * @description Readings that tell as much as one independent reading, by the autocorrelation of the distances; the covariance includes it.
+             */
+            repetition: number;
+            /**
+             * Heading Error Deg
+             * @description Angle to which the held-out error turns a field square to it, deg.
+             */
+            heading_error_deg: number;
+            /**
+             * Largest Gap Deg
+             * @description From any direction to the nearest that was measured, at most, deg.
+             */
+            largest_gap_deg: number;
+            /** @description Rotation of the axes of the corrected field from those of the corrected force and rate, deg, and the dip of the field; null: no recording in poses, or rests and turns that do not determine it. */
+            alignment: components["schemas"]["FieldAlignmentJson"] | null;
+            /**
+             * Text
+             * @description The result in sentences.
+             */
             text: string[];
         };
         /**
@@ -7949,10 +9118,14 @@ export interface components {
          * @description A version of a unit's magnetometer.
          */
         MagnetometerVersion: {
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
             serial: string;
             /**
              * Sensor
+             * @description The sensor of the unit that was calibrated.
              * @enum {string}
              */
             sensor: "accelerometer" | "magnetometer";
@@ -7963,6 +9136,7 @@ export interface components {
             version: number;
             /**
              * Verdict
+             * @description adequate: the fit explains the data to their noise; unexplained: it does not.
              * @enum {string}
              */
             verdict: "adequate" | "unexplained";
@@ -7972,13 +9146,17 @@ export interface components {
              * @description When it was stored.
              */
             at: string;
-            /** By */
+            /**
+             * By
+             * @description Name of the person who acted, as typed.
+             */
             by: string;
             /**
              * By Key
              * @description Name of the API key that acted; null: none did, the person's name is as typed.
              */
             by_key: string | null;
+            /** @description The data that the result was fitted to. */
             data: components["schemas"]["MeasuredData"];
             /**
              * Hash
@@ -7995,7 +9173,8 @@ export interface components {
              * @description Formats in which it is available; none for a magnetometer whose field was not constant.
              */
             formats: components["schemas"]["SensorFormatResponse"][];
-            result: components["schemas"]["MagnetometerResponse"];
+            /** @description Parameters of the magnetometer. */
+            result: components["schemas"]["MagnetometerResponse-Output"];
         };
         /**
          * MarkJson
@@ -8038,7 +9217,10 @@ export interface components {
          * @description The data behind a result, and how they were read.
          */
         MeasuredData: {
-            /** Files */
+            /**
+             * Files
+             * @description The files that the result was fitted to.
+             */
             files: components["schemas"]["MeasuredFile"][];
             /**
              * Read As
@@ -8067,7 +9249,10 @@ export interface components {
          * @description Conditions of a measured figure.
          */
         MeasuredUnder: {
-            /** Recording */
+            /**
+             * Recording
+             * @description Number of the recording.
+             */
             recording: number;
             /**
              * Version
@@ -8129,9 +9314,15 @@ export interface components {
          *     A row for each level, a number for each `at` in it.
          */
         ModelLines: {
-            /** Axis */
+            /**
+             * Axis
+             * @description Output axis of the unit: x, y or z.
+             */
             axis: string;
-            /** Position */
+            /**
+             * Position
+             * @description Position of the unit: the body axis that points up, such as z or -x.
+             */
             position: string;
             /**
              * Level
@@ -8148,7 +9339,10 @@ export interface components {
              * @description Points of the lines: table rate, deg/s, of lines over the rate; temperature, deg C, of lines over the temperature.
              */
             at: number[];
-            /** Error Dps */
+            /**
+             * Error Dps
+             * @description Error (output minus true rate), deg/s: one row for each `level`, one value for each `at` in each row.
+             */
             error_dps: number[][];
         };
         /**
@@ -8156,9 +9350,15 @@ export interface components {
          * @description Which effects a calibration is made of; null: made by an older version of labctl, which did not say.
          */
         ModelResponse: {
-            /** Name */
+            /**
+             * Name
+             * @description Name of the error model.
+             */
             name: string;
-            /** Effects */
+            /**
+             * Effects
+             * @description Ids of the effects in the model, as the catalogue names them.
+             */
             effects: string[];
             /**
              * Argument
@@ -8183,9 +9383,15 @@ export interface components {
          * @description A recording by what moved the unit; exactly one of `rest`, `turns`, `profile` and `poses` is present.
          */
         MotionResponse: {
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
             serial: string;
-            /** Recording */
+            /**
+             * Recording
+             * @description Number of the recording.
+             */
             recording: number;
             /**
              * Version
@@ -8194,6 +9400,7 @@ export interface components {
             version: number | null;
             /**
              * Motion
+             * @description How the unit was moved: at constant table rates, at rest, turned by known angles, along a rate profile, or by hand between poses.
              * @enum {string}
              */
             motion: "rates" | "rest" | "turns" | "profile" | "poses";
@@ -8212,9 +9419,13 @@ export interface components {
              * @description Number of rows of each axis in the recording; if larger than `rows`, evenly spaced rows were chosen.
              */
             of: number;
+            /** @description Data sets at rest; null: the unit was moved in another way. */
             rest: components["schemas"]["RestColumns"] | null;
+            /** @description Turns by known angles; null: the unit was moved in another way. */
             turns: components["schemas"]["TurnColumns"] | null;
+            /** @description Windows of a rate profile; null: the unit was moved in another way. */
             profile: components["schemas"]["ProfileColumns"] | null;
+            /** @description Turns by hand between rests; null: the unit was moved in another way. */
             poses: components["schemas"]["PoseColumns"] | null;
             /**
              * Responses
@@ -8313,17 +9524,28 @@ export interface components {
          * @description A key that was just made. This is the only time that it is shown.
          */
         NewKeyResponse: {
-            /** Name */
+            /**
+             * Name
+             * @description Name of the key's owner, as in the audit trail.
+             */
             name: string;
+            /** @description What the key may do. viewer: read; operator: also import, fit, improve and run campaigns; approver: also certify, revoke, and make and revoke keys. */
             role: components["schemas"]["Role"];
             /**
              * Created At
              * Format: date-time
+             * @description Time at which the key was made.
              */
             created_at: string;
-            /** Revoked At */
+            /**
+             * Revoked At
+             * @description Time at which the key was revoked; null: it is in force.
+             */
             revoked_at: string | null;
-            /** Key */
+            /**
+             * Key
+             * @description The key itself, to be sent with every request; only a hash of it is stored.
+             */
             key: string;
         };
         /**
@@ -8391,6 +9613,7 @@ export interface components {
         Objection: {
             /**
              * What
+             * @description verdict: the model lacks something, or there is no verdict; worse: an error without compensation or of another version is smaller; data: the data are certainly wrong; standard: a reference standard was bad.
              * @enum {string}
              */
             what: "verdict" | "worse" | "data" | "standard";
@@ -8447,11 +9670,14 @@ export interface components {
          * @description The specification to which conformity is to be stated, and the rule.
          */
         OrderedConformity: {
-            /** Specification */
+            /**
+             * Specification
+             * @description Specification, as the certificate names it.
+             */
             specification: string;
             /**
              * Limit Dps
-             * @description Largest permitted error of a corrected rate.
+             * @description Largest permitted error of a corrected rate, deg/s.
              */
             limit_dps: number;
             /**
@@ -8475,11 +9701,13 @@ export interface components {
         OrderedItem: {
             /**
              * Description
+             * @description Kind of item, as the certificate names it.
              * @default Gyroscope
              */
             description?: string;
             /**
              * Manufacturer
+             * @description Manufacturer of the item; empty: not stated.
              * @default
              */
             manufacturer?: string;
@@ -8560,7 +9788,10 @@ export interface components {
              * @description First day of the measurements; only for an imported recording, since a campaign knows its dates.
              */
             performed_from?: string | null;
-            /** Performed Until */
+            /**
+             * Performed Until
+             * @description Last day of the measurements; only for an imported recording; null: the same day.
+             */
             performed_until?: string | null;
         };
         /**
@@ -8568,21 +9799,30 @@ export interface components {
          * @description The angle of one axis, positive counter-clockwise and never wrapped, from its rate.
          */
         OrientationResponse: {
-            /** Axis */
+            /**
+             * Axis
+             * @description Output axis of the unit: x, y or z.
+             */
             axis: string;
             /**
              * Version
              * @description Version of the calibration by which the rates were corrected; null: no correction.
              */
             version: number | null;
-            /** Readings */
+            /**
+             * Readings
+             * @description Number of valid readings after the warm-up.
+             */
             readings: number;
             /**
              * Left Out
              * @description Number of readings left out because they were marked invalid or were not numbers.
              */
             left_out: number;
-            /** Seconds */
+            /**
+             * Seconds
+             * @description Time over which the angle was integrated, s.
+             */
             seconds: number;
             /** @description Static bias that was subtracted; null: no rest at the beginning was given. */
             static_bias: components["schemas"]["StaticBiasResponse"] | null;
@@ -8591,7 +9831,10 @@ export interface components {
              * @description Angle at the end, deg; the angle is 0 at the end of the rest at the beginning.
              */
             angle_deg: number;
-            /** Drift Between Stops Deg Per Min */
+            /**
+             * Drift Between Stops Deg Per Min
+             * @description For each leg between two declared stops: its drift, deg/min; empty: no stops were declared.
+             */
             drift_between_stops_deg_per_min: number[];
             /**
              * Drift Deg Per Min
@@ -8640,18 +9883,30 @@ export interface components {
              * @description The unit's name on the bench.
              */
             gyro: string;
-            /** Channel */
+            /**
+             * Channel
+             * @description Name of the channel.
+             */
             channel: string;
-            /** Unit */
+            /**
+             * Unit
+             * @description Unit of the channel.
+             */
             unit: string;
-            /** Mean */
+            /**
+             * Mean
+             * @description Mean of the readings, in `unit`.
+             */
             mean: number;
             /**
              * Std
              * @description Standard deviation of single readings.
              */
             std: number;
-            /** N */
+            /**
+             * N
+             * @description Number of readings.
+             */
             n: number;
             /**
              * T S
@@ -8684,17 +9939,20 @@ export interface components {
         OutputUnit: {
             /**
              * Unit
+             * @description Unit of the gyro column.
              * @default deg/s
              * @enum {string}
              */
             unit?: "deg/s" | "rad/s" | "deg/h" | "V" | "mV" | "count" | "arb";
             /**
              * Offset
+             * @description Value of the column at rate 0, in `unit`.
              * @default 0
              */
             offset?: number;
             /**
              * Scale
+             * @description Change of the column per deg/s, in `unit`, not 0; default for deg/s, rad/s and deg/h: that of the unit.
              * @default 1
              */
             scale?: number;
@@ -8730,11 +9988,20 @@ export interface components {
          * @description One picture.
          */
         PictureResponse: {
-            /** Id */
+            /**
+             * Id
+             * @description Identifier of the picture, for programs.
+             */
             id: string;
-            /** Title */
+            /**
+             * Title
+             * @description Title of the picture.
+             */
             title: string;
-            /** How To Read */
+            /**
+             * How To Read
+             * @description What the picture shows and how it is read, in words.
+             */
             how_to_read: string;
             /**
              * Effects
@@ -8761,7 +10028,7 @@ export interface components {
             recipe: string;
             /**
              * Clip
-             * @description Leave out points that are beyond the limits of the bench or of a unit.
+             * @description Whether to leave out points that are beyond the limits of the bench or of a unit.
              * @default false
              */
             clip?: boolean;
@@ -8792,16 +10059,36 @@ export interface components {
          * @description What a campaign would do, with its steps.
          */
         PlannedResponse: {
-            /** Recipe */
+            /**
+             * Recipe
+             * @description Name of the recipe.
+             */
             recipe: string;
-            /** Bench */
+            /**
+             * Bench
+             * @description Name of the bench.
+             */
             bench: string;
-            /** Steps */
+            /**
+             * Steps
+             * @description Number of steps of the plan.
+             */
             steps: number;
-            /** Datasets */
+            /**
+             * Datasets
+             * @description Number of data sets.
+             */
             datasets: number;
-            /** Expected S */
+            /**
+             * Expected S
+             * @description Expected duration of the campaign, s.
+             */
             expected_s: number;
+            /**
+             * Guessed
+             * @description Figures of the expected time that the bench file does not state.
+             */
+            guessed: string[];
             /**
              * Verification Datasets
              * @description Number of the data sets that verify and are never fitted.
@@ -8817,7 +10104,10 @@ export interface components {
              * @description Points left out because the bench or the unit cannot do them.
              */
             clipped: string[];
-            /** Schedule Hash */
+            /**
+             * Schedule Hash
+             * @description SHA-256 of the steps in their order; it is equal for two plans of the same steps.
+             */
             schedule_hash: string;
             /** @description How well a misalignment can be known at best; null: no unit turns across one of its outputs, or the bench states none of fixture_angle, tilt and mounting_repeatability. */
             misalignment: components["schemas"]["MisalignmentOutlook"] | null;
@@ -8828,6 +10118,7 @@ export interface components {
             visibility: components["schemas"]["Visibility"][] | null;
             /** @description When the campaign needs a person; null: never, since the bench turns the units and switches them on and off itself. */
             attendance: components["schemas"]["AttendanceResponse"] | null;
+            /** @description The steps of the plan, with expected times. */
             timeline: components["schemas"]["TimelineColumns"];
         };
         /**
@@ -8835,9 +10126,15 @@ export interface components {
          * @description Turns by hand between rests: one row per move, as lists of equal length.
          */
         PoseColumns: {
-            /** From S */
+            /**
+             * From S
+             * @description Start of the move, s since the recording began.
+             */
             from_s: number[];
-            /** Until S */
+            /**
+             * Until S
+             * @description End of the move, s since the recording began.
+             */
             until_s: number[];
             /**
              * Accelerometer Deg
@@ -8897,8 +10194,12 @@ export interface components {
          * @description What a changed model would be; nothing was stored, so it has no version of its own.
          */
         PreviewResponse: {
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
             serial: string;
+            /** @description The effects of the fitted model. */
             model: components["schemas"]["ModelResponse"];
             /**
              * Axes
@@ -8907,7 +10208,9 @@ export interface components {
             axes: {
                 [key: string]: components["schemas"]["AxisCoefficients"];
             };
+            /** @description Errors of the model before and after compensation, deg/s. */
             error: components["schemas"]["ErrorFigures"];
+            /** @description Rates and temperatures over which the model was calibrated. */
             validity: components["schemas"]["Validity"];
             /**
              * Warnings
@@ -9021,16 +10324,25 @@ export interface components {
              * @description The gyro axis whose output is compared.
              */
             axis: string[];
-            /** Dataset */
+            /**
+             * Dataset
+             * @description Number of the data set in its recording.
+             */
             dataset: number[];
-            /** T S */
+            /**
+             * T S
+             * @description Mean time of the readings of the window, s since the recording began.
+             */
             t_s: number[];
             /**
              * True Dps
              * @description Component of the table's rate along the axis, deg/s.
              */
             true_dps: number[];
-            /** Output Dps */
+            /**
+             * Output Dps
+             * @description Mean of the uncorrected output in the window, deg/s.
+             */
             output_dps: number[];
             /**
              * Residual Dps
@@ -9048,13 +10360,25 @@ export interface components {
          * @description A question to a person; an answer names its id.
          */
         PromptResponse: {
-            /** Id */
+            /**
+             * Id
+             * @description Id of the question, to be named by the answer.
+             */
             id: string;
-            /** Kind */
+            /**
+             * Kind
+             * @description mount: mount or turn the units; power_on, power_off: switch them; turn: turn them by a known angle.
+             */
             kind: string;
-            /** Text */
+            /**
+             * Text
+             * @description The question in words.
+             */
             text: string;
-            /** Position */
+            /**
+             * Position
+             * @description Position to which the units are to be turned; of a turn the axis that points up; null: they stay as they are.
+             */
             position: string | null;
             /**
              * Turn Deg
@@ -9072,7 +10396,10 @@ export interface components {
          * @description What the page behind the QR code of a certificate says: its state, and what to compare with the paper.
          */
         PublicCertificate: {
-            /** Number */
+            /**
+             * Number
+             * @description Number of the certificate.
+             */
             number: string;
             /**
              * Hash
@@ -9084,33 +10411,62 @@ export interface components {
              * @description SHA-256 of the calibration, as printed on the certificate.
              */
             calibration_hash: string;
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
             serial: string;
-            /** Version */
+            /**
+             * Version
+             * @description Number of the calibration version, counted from 1 for each unit.
+             */
             version: number;
-            /** Laboratory */
+            /**
+             * Laboratory
+             * @description Name of the laboratory that issued the certificate.
+             */
             laboratory: string;
             /**
              * Issued At
              * Format: date-time
+             * @description Time of issue.
              */
             issued_at: string;
             /**
              * State
+             * @description withdrawn: by its number, or with its version; amended: another certificate of the version replaces it (`replaced_by`); superseded: another version was certified later and has a certificate (`superseded_by`); valid: none of these.
              * @enum {string}
              */
             state: "valid" | "amended" | "superseded" | "withdrawn";
-            /** State Since */
+            /**
+             * State Since
+             * @description When it came into this state; of a valid certificate the time of issue.
+             */
             state_since: string | null;
-            /** State Reason */
+            /**
+             * State Reason
+             * @description Why it is in this state; empty for a valid certificate.
+             */
             state_reason: string;
-            /** State By */
+            /**
+             * State By
+             * @description Name of the person whose act brought it into this state; of a valid certificate, who issued it.
+             */
             state_by: string;
-            /** Replaced By */
+            /**
+             * Replaced By
+             * @description Number of the certificate of the same version that was issued in place of this one; null: none.
+             */
             replaced_by: string | null;
-            /** Superseded By */
+            /**
+             * Superseded By
+             * @description Number of the certificate of the version that was certified last; null: it is of this version, or was withdrawn.
+             */
             superseded_by: string | null;
-            /** Valid Instead */
+            /**
+             * Valid Instead
+             * @description Number of the unit's valid certificate; null: it is this one, or none is valid.
+             */
             valid_instead: string | null;
             /**
              * Notices
@@ -9125,11 +10481,15 @@ export interface components {
         PulseResponse: {
             /**
              * Status
+             * @description Always ok: the service answers.
              * @default ok
              * @constant
              */
             status: "ok";
-            /** Version */
+            /**
+             * Version
+             * @description Version of labctl that the service runs.
+             */
             version: string;
         };
         /**
@@ -9137,10 +10497,14 @@ export interface components {
          * @description Why something is done to a campaign, or to a key, and by whom.
          */
         ReasonRequest: {
-            /** Reason */
+            /**
+             * Reason
+             * @description Reason for the act, as typed.
+             */
             reason: string;
             /**
              * By
+             * @description Name of the person who acted, as typed.
              * @default
              */
             by?: string;
@@ -9155,9 +10519,15 @@ export interface components {
              * @description Recipe of that campaign as TOML text, for `POST /api/campaigns`.
              */
             recipe: string;
-            /** Name */
+            /**
+             * Name
+             * @description Name of the recipe.
+             */
             name: string;
-            /** Bench */
+            /**
+             * Bench
+             * @description Name of the bench.
+             */
             bench: string;
         };
         /**
@@ -9165,22 +10535,40 @@ export interface components {
          * @description A recipe that comes with labctl, and what it would take.
          */
         RecipeResponse: {
-            /** Name */
+            /**
+             * Name
+             * @description Name of the recipe.
+             */
             name: string;
-            /** Description */
+            /**
+             * Description
+             * @description What the recipe is for, in words.
+             */
             description: string;
             /**
              * Text
              * @description The recipe itself, TOML.
              */
             text: string;
-            /** Bench */
+            /**
+             * Bench
+             * @description Name of the bench that the recipe was planned on.
+             */
             bench: string;
-            /** Steps */
+            /**
+             * Steps
+             * @description Number of steps of the plan; null: see `refused`.
+             */
             steps: number | null;
-            /** Datasets */
+            /**
+             * Datasets
+             * @description Number of data sets of the plan; null: see `refused`.
+             */
             datasets: number | null;
-            /** Expected S */
+            /**
+             * Expected S
+             * @description Expected duration of the campaign, s; null: see `refused`.
+             */
             expected_s: number | null;
             /**
              * Refused
@@ -9205,11 +10593,20 @@ export interface components {
          * @description What a recording is, without the means of its data sets.
          */
         RecordingAlone: {
-            /** Id */
+            /**
+             * Id
+             * @description Number of the recording.
+             */
             id: number;
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
             serial: string;
-            /** Campaign */
+            /**
+             * Campaign
+             * @description Campaign that made the recording; null: the recording was imported.
+             */
             campaign: number | null;
             /**
              * Kind
@@ -9223,13 +10620,25 @@ export interface components {
             info: {
                 [key: string]: components["schemas"]["JsonValue"];
             };
-            /** Created At */
+            /**
+             * Created At
+             * @description Time at which the recording was stored, ISO 8601.
+             */
             created_at: string;
-            /** Simulated Time */
+            /**
+             * Simulated Time
+             * @description Whether `created_at` is by the clock of a simulated bench.
+             */
             simulated_time: boolean;
-            /** Datasets */
+            /**
+             * Datasets
+             * @description Number of data sets.
+             */
             datasets: number;
-            /** Readings */
+            /**
+             * Readings
+             * @description Number of readings.
+             */
             readings: number;
         };
         /**
@@ -9237,9 +10646,15 @@ export interface components {
          * @description One line of the list of recordings.
          */
         RecordingResponse: {
-            /** Id */
+            /**
+             * Id
+             * @description Number of the recording.
+             */
             id: number;
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
             serial: string;
             /**
              * Kind
@@ -9251,17 +10666,25 @@ export interface components {
              * @description The campaign that made the recording; null: the recording was imported.
              */
             campaign: number | null;
-            /** Datasets */
+            /**
+             * Datasets
+             * @description Number of data sets.
+             */
             datasets: number;
-            /** Readings */
+            /**
+             * Readings
+             * @description Number of readings.
+             */
             readings: number;
             /**
              * Created At
              * Format: date-time
+             * @description Time at which the recording was stored.
              */
             created_at: string;
             /**
              * Notes
+             * @description Notes of recording.toml; empty: none.
              * @default
              */
             notes: string;
@@ -9284,11 +10707,20 @@ export interface components {
          * @description What a recording is, with the means of its data sets.
          */
         RecordingWithPoints: {
-            /** Id */
+            /**
+             * Id
+             * @description Number of the recording.
+             */
             id: number;
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
             serial: string;
-            /** Campaign */
+            /**
+             * Campaign
+             * @description Campaign that made the recording; null: the recording was imported.
+             */
             campaign: number | null;
             /**
              * Kind
@@ -9302,13 +10734,25 @@ export interface components {
             info: {
                 [key: string]: components["schemas"]["JsonValue"];
             };
-            /** Created At */
+            /**
+             * Created At
+             * @description Time at which the recording was stored, ISO 8601.
+             */
             created_at: string;
-            /** Simulated Time */
+            /**
+             * Simulated Time
+             * @description Whether `created_at` is by the clock of a simulated bench.
+             */
             simulated_time: boolean;
-            /** Datasets */
+            /**
+             * Datasets
+             * @description Number of data sets.
+             */
             datasets: number;
-            /** Readings */
+            /**
+             * Readings
+             * @description Number of readings.
+             */
             readings: number;
             /**
              * Points
@@ -9334,9 +10778,15 @@ export interface components {
          * @description Who releases, as the second person, what a first one asked to certify, and why.
          */
         ReleaseRequest: {
-            /** By */
+            /**
+             * By
+             * @description Name of the person who acted, as typed.
+             */
             by: string;
-            /** Reason */
+            /**
+             * Reason
+             * @description Reason for the act, as typed.
+             */
             reason: string;
         };
         /**
@@ -9344,30 +10794,50 @@ export interface components {
          * @description A version that waits for its release by a second person; it is not in force yet.
          */
         ReleaseRequestResponse: {
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
             serial: string;
-            /** Version */
+            /**
+             * Version
+             * @description Number of the calibration version, counted from 1 for each unit.
+             */
             version: number;
-            /** By */
+            /**
+             * By
+             * @description Name of the person who acted, as typed.
+             */
             by: string;
             /**
              * By Key
              * @description Name of the API key of the first person; the second needs another one.
              */
             by_key: string;
-            /** Reason */
+            /**
+             * Reason
+             * @description Reason for the act, as typed.
+             */
             reason: string;
             /**
              * At
              * Format: date-time
+             * @description Time of the act.
              */
             at: string;
-            /** Due Days */
+            /**
+             * Due Days
+             * @description Days until the next calibration is due, as the first person asked for; 0: no due date; null: by recipe or service.
+             */
             due_days: number | null;
-            /** Override */
+            /**
+             * Override
+             * @description Whether the version is to be certified although there are objections.
+             */
             override: boolean;
             /**
              * Waits For Release
+             * @description Always true: the version is not in force before a second person releases it.
              * @default true
              * @constant
              */
@@ -9399,16 +10869,25 @@ export interface components {
          * @description Straight line over the rate through the error that a version leaves on one axis, by least squares.
          */
         RemainingLine: {
-            /** Bias Dps */
+            /**
+             * Bias Dps
+             * @description Remaining bias: error at rate 0, deg/s.
+             */
             bias_dps: number;
-            /** U Bias Dps */
+            /**
+             * U Bias Dps
+             * @description Standard uncertainty of `bias_dps` due to the scatter about the line, deg/s.
+             */
             u_bias_dps: number;
             /**
              * Scale Factor
              * @description Scale factor error: slope of the error over the rate (1 = 100 %); null: the recording has only one rate.
              */
             scale_factor: number | null;
-            /** U Scale Factor */
+            /**
+             * U Scale Factor
+             * @description Standard uncertainty of `scale_factor` due to the scatter about the line, 1; null: the recording has only one rate.
+             */
             u_scale_factor: number | null;
         };
         /**
@@ -9534,24 +11013,45 @@ export interface components {
              * @description Number of the recording.
              */
             recording: number[];
-            /** Dataset */
+            /**
+             * Dataset
+             * @description Number of the data set in its recording.
+             */
             dataset: number[];
-            /** Axis */
+            /**
+             * Axis
+             * @description Output axis: x, y or z.
+             */
             axis: string[];
-            /** Position */
+            /**
+             * Position
+             * @description Position of the unit: the body axis that points up, such as z or -x.
+             */
             position: string[];
-            /** Run */
+            /**
+             * Run
+             * @description Number of the run, a powered session of the unit.
+             */
             run: number[];
-            /** Table Rate Dps */
+            /**
+             * Table Rate Dps
+             * @description Rate of the table, deg/s.
+             */
             table_rate_dps: number[];
             /**
              * Own Rate Dps
              * @description True rate along the output axis, deg/s; it includes the Earth's rate where that is known.
              */
             own_rate_dps: number[];
-            /** Temperature C */
+            /**
+             * Temperature C
+             * @description Mean temperature of the unit during the data set, deg C.
+             */
             temperature_c: number[];
-            /** T S */
+            /**
+             * T S
+             * @description Mean time of the data set, s since the recording began; null: not known.
+             */
             t_s: (number | null)[];
             /**
              * N
@@ -9563,7 +11063,10 @@ export interface components {
              * @description Error of the output: output minus true rate along the axis, deg/s.
              */
             measured_error_dps: number[];
-            /** Modelled Error Dps */
+            /**
+             * Modelled Error Dps
+             * @description Error that the model states: output minus true rate along the axis, deg/s.
+             */
             modelled_error_dps: number[];
             /**
              * Residual Dps
@@ -9623,7 +11126,7 @@ export interface components {
             temperature_level_c: number[];
             /**
              * Level Width C
-             * @description Largest difference of the temperatures in one level, K.
+             * @description Largest difference of the temperatures in one level, deg C.
              */
             level_width_c: number;
             /**
@@ -9642,17 +11145,27 @@ export interface components {
          * @description The residual of a version on a recording.
          */
         ResidualsResponse: {
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
             serial: string;
-            /** Version */
+            /**
+             * Version
+             * @description Number of the calibration version, counted from 1 for each unit.
+             */
             version: number;
-            /** Recording */
+            /**
+             * Recording
+             * @description Number of the recording.
+             */
             recording: number;
             /**
              * Recordings
              * @description All recordings that the model is compared with; `recording` is the newest.
              */
             recordings: number[];
+            /** @description Residual of each data set and axis. */
             columns: components["schemas"]["ResidualColumns"];
         };
         /**
@@ -9665,7 +11178,10 @@ export interface components {
              * @description The gyro axis whose output is compared.
              */
             axis: string[];
-            /** Dataset */
+            /**
+             * Dataset
+             * @description Number of the data set in its recording.
+             */
             dataset: number[];
             /**
              * T S
@@ -9760,11 +11276,13 @@ export interface components {
         ResumeRequest: {
             /**
              * By
+             * @description Name of the person who acted, as typed.
              * @default a person
              */
             by?: string;
             /**
              * Reason
+             * @description Reason for the act, as typed.
              * @default
              */
             reason?: string;
@@ -9779,9 +11297,15 @@ export interface components {
          * @description Who revokes a version, and why.
          */
         RevokeRequest: {
-            /** By */
+            /**
+             * By
+             * @description Name of the person who acted, as typed.
+             */
             by: string;
-            /** Reason */
+            /**
+             * Reason
+             * @description Reason for the act, as typed.
+             */
             reason: string;
             /**
              * Due Days
@@ -9830,7 +11354,10 @@ export interface components {
          * @description Readings of the environment of the room, by an instrument that logs or by a person who reads.
          */
         RoomEnvironmentRequest: {
-            /** Readings */
+            /**
+             * Readings
+             * @description Readings, each with its time.
+             */
             readings: components["schemas"]["RoomRecord"][];
             /**
              * Source
@@ -9854,7 +11381,10 @@ export interface components {
          * @description The environment of the room over a time.
          */
         RoomEnvironmentResponse: {
-            /** Spans */
+            /**
+             * Spans
+             * @description Smallest and largest reading of each quantity over that time.
+             */
             spans: components["schemas"]["RoomSpanResponse"][];
             /**
              * Readings
@@ -9870,17 +11400,33 @@ export interface components {
             /**
              * Measured At
              * Format: date-time
+             * @description Time of the reading.
              */
             measured_at: string;
-            /** Bench */
+            /**
+             * Bench
+             * @description Name of the bench that the reading holds for; empty: all benches.
+             */
             bench: string;
-            /** Quantity */
+            /**
+             * Quantity
+             * @description Quantity that was read: temperature, humidity or pressure.
+             */
             quantity: string;
-            /** Unit */
+            /**
+             * Unit
+             * @description Unit of the quantity: deg C for temperature, % for relative humidity, hPa for air pressure.
+             */
             unit: string;
-            /** Value */
+            /**
+             * Value
+             * @description Value of the reading, in `unit`.
+             */
             value: number;
-            /** Source */
+            /**
+             * Source
+             * @description The instrument, with its number.
+             */
             source: string;
         };
         /**
@@ -9893,7 +11439,10 @@ export interface components {
              * @description Default: now.
              */
             measured_at?: string | null;
-            /** Values */
+            /**
+             * Values
+             * @description Values that were read at this time.
+             */
             values: components["schemas"]["RoomValue"][];
         };
         /**
@@ -9901,15 +11450,30 @@ export interface components {
          * @description Least and largest reading of a quantity.
          */
         RoomSpanResponse: {
-            /** Quantity */
+            /**
+             * Quantity
+             * @description Quantity that was read: temperature, humidity or pressure.
+             */
             quantity: string;
-            /** Unit */
+            /**
+             * Unit
+             * @description Unit of the quantity: deg C for temperature, % for relative humidity, hPa for air pressure.
+             */
             unit: string;
-            /** Low */
+            /**
+             * Low
+             * @description Smallest reading, in `unit`.
+             */
             low: number;
-            /** High */
+            /**
+             * High
+             * @description Largest reading, in `unit`.
+             */
             high: number;
-            /** Readings */
+            /**
+             * Readings
+             * @description Number of readings.
+             */
             readings: number;
         };
         /**
@@ -9919,10 +11483,14 @@ export interface components {
         RoomValue: {
             /**
              * Quantity
+             * @description Quantity that was read.
              * @enum {string}
              */
             quantity: "temperature" | "humidity" | "pressure";
-            /** Value */
+            /**
+             * Value
+             * @description Value of the reading, in `unit`.
+             */
             value: number;
             /**
              * Unit
@@ -9940,14 +11508,20 @@ export interface components {
              * @description From 1.
              */
             number: number[];
-            /** Kind */
+            /**
+             * Kind
+             * @description Kind of step, such as soak, acquire or turn.
+             */
             kind: string[];
             /**
              * Start S
              * @description Start of the step, s from the beginning, if every step takes as long as expected.
              */
             start_s: number[];
-            /** Expected S */
+            /**
+             * Expected S
+             * @description Expected duration of the step, s.
+             */
             expected_s: number[];
             /**
              * Temperature C
@@ -9969,16 +11543,25 @@ export interface components {
              * @description Body axis of the units that points along the table axis (by hand: up); null: not yet turned by the campaign.
              */
             position: (string | null)[];
-            /** Dataset */
+            /**
+             * Dataset
+             * @description Number of the data set that the step measures, from 1; null: it measures none.
+             */
             dataset: (number | null)[];
-            /** State */
+            /**
+             * State
+             * @description What became of the step.
+             */
             state: ("to come" | "running" | "done" | "failed" | "interrupted" | "skipped")[];
             /**
              * Started S
              * @description Start of the step, s since the start of the campaign; null: not yet started.
              */
             started_s: (number | null)[];
-            /** Ended S */
+            /**
+             * Ended S
+             * @description End of the step, s since the start of the campaign; null: not yet ended.
+             */
             ended_s: (number | null)[];
             /**
              * Forecast S
@@ -9991,11 +11574,20 @@ export interface components {
          * @description The readings of one data set.
          */
         SamplesResponse: {
-            /** Recording */
+            /**
+             * Recording
+             * @description Number of the recording.
+             */
             recording: number;
-            /** Dataset */
+            /**
+             * Dataset
+             * @description Number of the data set in the recording.
+             */
             dataset: number;
-            /** Readings */
+            /**
+             * Readings
+             * @description Number of readings of the data set, also of those that were not requested.
+             */
             readings: number;
             /**
              * Columns
@@ -10010,11 +11602,20 @@ export interface components {
          * @description A campaign that is to begin later.
          */
         ScheduledResponse: {
-            /** Id */
+            /**
+             * Id
+             * @description Number of the entry.
+             */
             id: number;
-            /** Bench */
+            /**
+             * Bench
+             * @description Name of the bench.
+             */
             bench: string;
-            /** Recipe */
+            /**
+             * Recipe
+             * @description Name of the recipe.
+             */
             recipe: string;
             /**
              * State
@@ -10026,13 +11627,25 @@ export interface components {
              * @description Time of the next start, in `time_zone`; null: no start is to come.
              */
             due_at: string | null;
-            /** Time Zone */
+            /**
+             * Time Zone
+             * @description Time zone of the entry, such as Europe/Berlin.
+             */
             time_zone: string;
-            /** Cron */
+            /**
+             * Cron
+             * @description Cron line of repeated starts; null: a single start.
+             */
             cron: string | null;
-            /** Priority */
+            /**
+             * Priority
+             * @description Priority, -100 to 100: of several starts that are due, the one with the highest begins first.
+             */
             priority: number;
-            /** Clip */
+            /**
+             * Clip
+             * @description Whether to leave out points that are beyond the limits of the bench or of a unit.
+             */
             clip: boolean;
             /**
              * Hide
@@ -10058,14 +11671,19 @@ export interface components {
             /**
              * Created At
              * Format: date-time
+             * @description Time at which the entry was made.
              */
             created_at: string;
             /**
              * Note
+             * @description Remark on the entry, such as the time zone that was assumed; empty: none.
              * @default
              */
             note: string;
-            /** History */
+            /**
+             * History
+             * @description Outcome of each past start.
+             */
             history: components["schemas"]["StartEventResponse"][];
             /**
              * Confirmed By
@@ -10086,7 +11704,10 @@ export interface components {
              * @description Name of the format, to be sent as `format`.
              */
             id: string;
-            /** Title */
+            /**
+             * Title
+             * @description Title of the format for a person, such as in a list.
+             */
             title: string;
             /**
              * Suffix
@@ -10099,10 +11720,14 @@ export interface components {
          * @description A version of a sensor, without its parameters.
          */
         SensorVersionResponse: {
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
             serial: string;
             /**
              * Sensor
+             * @description The sensor of the unit that was calibrated.
              * @enum {string}
              */
             sensor: "accelerometer" | "magnetometer";
@@ -10113,6 +11738,7 @@ export interface components {
             version: number;
             /**
              * Verdict
+             * @description adequate: the fit explains the data to their noise; unexplained: it does not.
              * @enum {string}
              */
             verdict: "adequate" | "unexplained";
@@ -10122,13 +11748,17 @@ export interface components {
              * @description When it was stored.
              */
             at: string;
-            /** By */
+            /**
+             * By
+             * @description Name of the person who acted, as typed.
+             */
             by: string;
             /**
              * By Key
              * @description Name of the API key that acted; null: none did, the person's name is as typed.
              */
             by_key: string | null;
+            /** @description The data that the result was fitted to. */
             data: components["schemas"]["MeasuredData"];
             /**
              * Hash
@@ -10203,13 +11833,25 @@ export interface components {
          * @description A simulated recording that is now in the database.
          */
         SimulatedRecordingResponse: {
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
             serial: string;
-            /** Recording */
+            /**
+             * Recording
+             * @description Number of the recording.
+             */
             recording: number;
-            /** Datasets */
+            /**
+             * Datasets
+             * @description Number of data sets; 0: a table of coefficients.
+             */
             datasets: number;
-            /** Readings */
+            /**
+             * Readings
+             * @description Number of readings; of means or coefficients, the number of rows.
+             */
             readings: number;
             /**
              * Suggested Model
@@ -10232,11 +11874,20 @@ export interface components {
              * @description Readings that were left out by choice, with how many and why.
              */
             left_out: components["schemas"]["labctl__recording__info__LeftOut"][];
-            /** Recipe */
+            /**
+             * Recipe
+             * @description Name of the recipe.
+             */
             recipe: string;
-            /** Bench */
+            /**
+             * Bench
+             * @description Name of the bench.
+             */
             bench: string;
-            /** Seed */
+            /**
+             * Seed
+             * @description Seed of the random numbers; the same seed gives the same recording.
+             */
             seed: number;
             /**
              * Hidden
@@ -10307,7 +11958,10 @@ export interface components {
          * @description The stage of a followed criticism that begins now.
          */
         StageResponse: {
-            /** Stage */
+            /**
+             * Stage
+             * @description The stage in words, such as `inspecting the recording`.
+             */
             stage: string;
         };
         /**
@@ -10326,9 +11980,15 @@ export interface components {
              * @description Last such day; null: it is still bad.
              */
             bad_until?: string | null;
-            /** Reason */
+            /**
+             * Reason
+             * @description Reason for the act, as typed.
+             */
             reason: string;
-            /** By */
+            /**
+             * By
+             * @description Name of the person who acted, as typed.
+             */
             by: string;
         };
         /**
@@ -10336,13 +11996,20 @@ export interface components {
          * @description Enter a certificate of a standard.
          */
         StandardCertificateRequest: {
-            /** Number */
+            /**
+             * Number
+             * @description Number of the certificate.
+             */
             number: string;
-            /** Laboratory */
+            /**
+             * Laboratory
+             * @description Laboratory that issued the certificate.
+             */
             laboratory: string;
             /**
              * Calibrated
              * Format: date
+             * @description Day of the calibration.
              */
             calibrated: string;
             /**
@@ -10358,10 +12025,14 @@ export interface components {
             adjusted?: boolean;
             /**
              * Traceability
+             * @description Traceability, as the certificate states it; empty: not stated.
              * @default
              */
             traceability?: string;
-            /** Points */
+            /**
+             * Points
+             * @description What the certificate states at each nominal.
+             */
             points: components["schemas"]["CertifiedPointRequest"][];
             /**
              * Reason
@@ -10369,7 +12040,10 @@ export interface components {
              * @default
              */
             reason?: string;
-            /** By */
+            /**
+             * By
+             * @description Name of the person who acted, as typed.
+             */
             by: string;
         };
         /**
@@ -10377,33 +12051,56 @@ export interface components {
          * @description A certificate of a standard.
          */
         StandardCertificateResponse: {
-            /** Number */
+            /**
+             * Number
+             * @description Number of the certificate.
+             */
             number: string;
-            /** Laboratory */
+            /**
+             * Laboratory
+             * @description Laboratory that issued the certificate.
+             */
             laboratory: string;
             /**
              * Calibrated
              * Format: date
+             * @description Day of the calibration.
              */
             calibrated: string;
-            /** Due */
+            /**
+             * Due
+             * @description Last day on which the standard may be used by this certificate; null: the certificate has no due date.
+             */
             due: string | null;
-            /** Adjusted */
+            /**
+             * Adjusted
+             * @description Whether the standard was adjusted or repaired before: no drift leads across it.
+             */
             adjusted: boolean;
-            /** Traceability */
+            /**
+             * Traceability
+             * @description Traceability, as the certificate states it; empty: not stated.
+             */
             traceability: string;
-            /** Points */
+            /**
+             * Points
+             * @description What the certificate states at each nominal.
+             */
             points: components["schemas"]["CertifiedPointResponse"][];
             /**
              * Reason
              * @description Why it replaced an entry of the same number; empty: it replaced none.
              */
             reason: string;
-            /** By */
+            /**
+             * By
+             * @description Name of the person who acted, as typed.
+             */
             by: string;
             /**
              * At
              * Format: date-time
+             * @description Time of the entry in the register.
              */
             at: string;
         };
@@ -10434,10 +12131,14 @@ export interface components {
             checked_at?: string | null;
             /**
              * Note
+             * @description Remark on the check; empty: none.
              * @default
              */
             note?: string;
-            /** By */
+            /**
+             * By
+             * @description Name of the person who acted, as typed.
+             */
             by: string;
         };
         /**
@@ -10448,6 +12149,7 @@ export interface components {
             /**
              * Checked At
              * Format: date-time
+             * @description Time of the check.
              */
             checked_at: string;
             /**
@@ -10455,13 +12157,25 @@ export interface components {
              * @description Nominal value that it holds for, in the unit of the standard; null: it holds for all.
              */
             nominal: number | null;
-            /** Value */
+            /**
+             * Value
+             * @description Error that was found: indicated minus true, in the unit of the standard.
+             */
             value: number;
-            /** U */
+            /**
+             * U
+             * @description Standard uncertainty of the check, in the unit of the standard.
+             */
             u: number;
-            /** Note */
+            /**
+             * Note
+             * @description Remark on the check; empty: none.
+             */
             note: string;
-            /** By */
+            /**
+             * By
+             * @description Name of the person who acted, as typed.
+             */
             by: string;
             /**
              * State
@@ -10469,7 +12183,10 @@ export interface components {
              * @enum {string}
              */
             state: "in" | "warning" | "out" | "unknown";
-            /** Limits */
+            /**
+             * Limits
+             * @description Control limits of this check.
+             */
             limits: components["schemas"]["ChartLimits"][];
         };
         /**
@@ -10477,11 +12194,15 @@ export interface components {
          * @description A finding that a standard was bad.
          */
         StandardFindingResponse: {
-            /** Number */
+            /**
+             * Number
+             * @description Number of the finding.
+             */
             number: number;
             /**
              * Bad From
              * Format: date
+             * @description First day of which it is not known that the standard was good.
              */
             bad_from: string;
             /**
@@ -10489,13 +12210,20 @@ export interface components {
              * @description null: it is still bad.
              */
             bad_until: string | null;
-            /** Reason */
+            /**
+             * Reason
+             * @description Reason for the act, as typed.
+             */
             reason: string;
-            /** By */
+            /**
+             * By
+             * @description Name of the person who acted, as typed.
+             */
             by: string;
             /**
              * At
              * Format: date-time
+             * @description Time of the act.
              */
             at: string;
             /**
@@ -10526,15 +12254,20 @@ export interface components {
             unit?: string | null;
             /**
              * Serial
+             * @description Serial number of the standard; empty: not stated.
              * @default
              */
             serial?: string;
             /**
              * Description
+             * @description Description of the standard; empty: none.
              * @default
              */
             description?: string;
-            /** By */
+            /**
+             * By
+             * @description Name of the person who acted, as typed.
+             */
             by: string;
         };
         /**
@@ -10542,18 +12275,34 @@ export interface components {
          * @description A reference standard: its state on a day, and what that rests on.
          */
         StandardResponse: {
-            /** Label */
+            /**
+             * Label
+             * @description Name of the reference standard in the register.
+             */
             label: string;
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the standard; empty: not stated.
+             */
             serial: string;
-            /** Quantity */
+            /**
+             * Quantity
+             * @description Quantity that the standard realises.
+             */
             quantity: string;
-            /** Unit */
+            /**
+             * Unit
+             * @description Unit of its values.
+             */
             unit: string;
-            /** Description */
+            /**
+             * Description
+             * @description Description of the standard; empty: none.
+             */
             description: string;
             /**
              * State
+             * @description valid: it may be used; no certificate: nothing is known of it; overdue: its due date has passed; check it: an intermediate check is out of limits; bad: it was found bad.
              * @enum {string}
              */
             state: "valid" | "no certificate" | "overdue" | "check it" | "bad";
@@ -10582,7 +12331,10 @@ export interface components {
              * @description In order of time.
              */
             checks: components["schemas"]["StandardCheckResponse"][];
-            /** Findings */
+            /**
+             * Findings
+             * @description Findings that the standard was bad, in order of time.
+             */
             findings: components["schemas"]["StandardFindingResponse"][];
         };
         /**
@@ -10593,21 +12345,30 @@ export interface components {
             /**
              * At
              * Format: date-time
+             * @description Time at which the service acted on the start.
              */
             at: string;
             /**
              * Due At
              * Format: date-time
+             * @description Time at which the start was due, in the time zone of the entry.
              */
             due_at: string;
             /**
              * Outcome
+             * @description claimed: a service is starting the campaign; started: the campaign began; refused: it could not begin; missed: it was too late.
              * @enum {string}
              */
             outcome: "claimed" | "started" | "refused" | "missed";
-            /** Message */
+            /**
+             * Message
+             * @description The outcome in words.
+             */
             message: string;
-            /** Campaign */
+            /**
+             * Campaign
+             * @description Campaign that began; null: none did.
+             */
             campaign: number | null;
         };
         /**
@@ -10656,16 +12417,25 @@ export interface components {
          * @description The mean output at rest before a mission (Ojeda et al. 2000, eqs. 1, 15 and 16); it contains the Earth's rate.
          */
         StaticBiasResponse: {
-            /** Bias Dps */
+            /**
+             * Bias Dps
+             * @description Mean output at rest, deg/s.
+             */
             bias_dps: number;
             /**
              * U Dps
              * @description Standard uncertainty of the static bias, deg/s, from the white noise of the mean and the bias instability.
              */
             u_dps: number;
-            /** Readings */
+            /**
+             * Readings
+             * @description Number of readings.
+             */
             readings: number;
-            /** Seconds */
+            /**
+             * Seconds
+             * @description Duration of the rest, s.
+             */
             seconds: number;
         };
         /**
@@ -10743,9 +12513,15 @@ export interface components {
          * @description One axis, turned about itself, the others at rest.
          */
         Surface: {
-            /** Rate Dps */
+            /**
+             * Rate Dps
+             * @description Rates of the grid, deg/s.
+             */
             rate_dps: number[];
-            /** Temperature C */
+            /**
+             * Temperature C
+             * @description Temperatures of the grid, deg C.
+             */
             temperature_c: number[];
             /**
              * Error Dps
@@ -10758,10 +12534,17 @@ export interface components {
          * @description The error that a calibration subtracts, within the calibrated range.
          */
         SurfaceResponse: {
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
             serial: string;
-            /** Version */
+            /**
+             * Version
+             * @description Number of the calibration version, counted from 1 for each unit.
+             */
             version: number;
+            /** @description Rates and temperatures over which the model was calibrated. */
             validity: components["schemas"]["Validity"];
             /**
              * Held
@@ -10775,7 +12558,10 @@ export interface components {
              * @description Effects in the fitted model that the exported calibration leaves out.
              */
             left_out: components["schemas"]["labctl__json_types__models__LeftOut"][];
-            /** Axes */
+            /**
+             * Axes
+             * @description For each axis: the error over rate and temperature.
+             */
             axes: {
                 [key: string]: components["schemas"]["Surface"];
             };
@@ -11093,14 +12879,20 @@ export interface components {
              * @description From 1.
              */
             number: number[];
-            /** Kind */
+            /**
+             * Kind
+             * @description Kind of step, such as soak, acquire or turn.
+             */
             kind: string[];
             /**
              * Start S
              * @description Start of the step, s from the beginning, if every step takes as long as expected.
              */
             start_s: number[];
-            /** Expected S */
+            /**
+             * Expected S
+             * @description Expected duration of the step, s.
+             */
             expected_s: number[];
             /**
              * Temperature C
@@ -11122,7 +12914,10 @@ export interface components {
              * @description Body axis of the units that points along the table axis (by hand: up); null: not yet turned by the campaign.
              */
             position: (string | null)[];
-            /** Dataset */
+            /**
+             * Dataset
+             * @description Number of the data set that the step measures, from 1; null: it measures none.
+             */
             dataset: (number | null)[];
         };
         /**
@@ -11130,15 +12925,30 @@ export interface components {
          * @description One channel over a window of time, in bins that hold readings, as lists of equal length.
          */
         TraceResponse: {
-            /** Recording */
+            /**
+             * Recording
+             * @description Number of the recording.
+             */
             recording: number;
-            /** Channel */
+            /**
+             * Channel
+             * @description Name of the channel.
+             */
             channel: string;
-            /** Unit */
+            /**
+             * Unit
+             * @description Unit of the channel; empty: none, or not known.
+             */
             unit: string;
-            /** From S */
+            /**
+             * From S
+             * @description Start of the window, s since the recording began; null: the recording has no times.
+             */
             from_s: number | null;
-            /** Until S */
+            /**
+             * Until S
+             * @description End of the window, s since the recording began; null: the recording has no times.
+             */
             until_s: number | null;
             /**
              * Raw
@@ -11150,13 +12960,25 @@ export interface components {
              * @description Mean time of the readings in each bin, s.
              */
             t_s: number[];
-            /** Min */
+            /**
+             * Min
+             * @description Smallest reading in each bin, in `unit`.
+             */
             min: number[];
-            /** Max */
+            /**
+             * Max
+             * @description Largest reading in each bin, in `unit`.
+             */
             max: number[];
-            /** Mean */
+            /**
+             * Mean
+             * @description Mean of the readings in each bin, in `unit`.
+             */
             mean: number[];
-            /** N */
+            /**
+             * N
+             * @description Number of readings in each bin.
+             */
             n: number[];
             /**
              * Channels
@@ -11169,11 +12991,15 @@ export interface components {
          * @description One recording of the unit.
          */
         TrendPoint: {
-            /** Recording */
+            /**
+             * Recording
+             * @description Number of the recording.
+             */
             recording: number;
             /**
              * At
              * Format: date-time
+             * @description Time of the measurement.
              */
             at: string;
             /** @description RMS error on this recording, deg/s, of the newest version that was fitted only to recordings made before it; null: there is no such version, or it cannot be applied to this recording. */
@@ -11204,24 +13030,45 @@ export interface components {
          * @description A version compared with all recordings of its unit, in order of time.
          */
         TrendResponse: {
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
             serial: string;
-            /** Version */
+            /**
+             * Version
+             * @description Number of the calibration version, counted from 1 for each unit.
+             */
             version: number;
-            /** Limit Dps */
+            /**
+             * Limit Dps
+             * @description Limit of the magnitude of the bias, deg/s: as requested, else twice the error that the version states; null: not known.
+             */
             limit_dps: number | null;
-            /** Points */
+            /**
+             * Points
+             * @description Each recording of the unit whose date is known, in order of time.
+             */
             points: components["schemas"]["TrendPoint"][];
-            /** Drifts */
+            /**
+             * Drifts
+             * @description A line over time for each figure; empty: fewer than two occasions were measured.
+             */
             drifts: components["schemas"]["Drift"][];
-            /** Leaves */
+            /**
+             * Leaves
+             * @description For each axis: when its bias leaves `limit_dps`; empty: there is no line or no limit.
+             */
             leaves: components["schemas"]["Leaving"][];
             /**
              * Undated
              * @description Recordings whose date of measurement is not known; they are left out.
              */
             undated: number[];
-            /** Text */
+            /**
+             * Text
+             * @description The result in sentences.
+             */
             text: string[];
         };
         /**
@@ -11234,7 +13081,10 @@ export interface components {
              * @description The gyro axis whose output is compared.
              */
             axis: string[];
-            /** Dataset */
+            /**
+             * Dataset
+             * @description Number of the data set in its recording.
+             */
             dataset: number[];
             /**
              * About
@@ -11342,16 +13192,25 @@ export interface components {
          * @description The uncertainty of a corrected rate on later days; the noise of a single reading is not included.
          */
         UncertaintyResponse: {
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
             serial: string;
-            /** Version */
+            /**
+             * Version
+             * @description Number of the calibration version, counted from 1 for each unit.
+             */
             version: number;
             /**
              * Rate Dps
              * @description The rate, deg/s; of a rate vector its magnitude.
              */
             rate_dps: number;
-            /** Temperature C */
+            /**
+             * Temperature C
+             * @description Temperature for which the uncertainty holds, deg C.
+             */
             temperature_c: number;
             /**
              * Coverage Factor
@@ -11368,7 +13227,10 @@ export interface components {
              * @description Whether rate and temperature are within the calibrated range.
              */
             inside: boolean;
-            /** Axes */
+            /**
+             * Axes
+             * @description For each axis: the uncertainty of its corrected rate.
+             */
             axes: {
                 [key: string]: components["schemas"]["AxisUncertainty"];
             };
@@ -11415,17 +13277,35 @@ export interface components {
          * @description A unit, its recordings and its calibrations.
          */
         UnitResponse: {
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
             serial: string;
-            /** Model */
+            /**
+             * Model
+             * @description Model of the unit, as its manufacturer names it; empty: not stated.
+             */
             model: string;
-            /** Technology */
+            /**
+             * Technology
+             * @description Technology of the gyro: fog (fibre-optic), mems or piezo; null: not known.
+             */
             technology: string | null;
-            /** Recordings */
+            /**
+             * Recordings
+             * @description Numbers of the unit's recordings.
+             */
             recordings: number[];
-            /** Calibrations */
+            /**
+             * Calibrations
+             * @description Numbers of the unit's calibration versions.
+             */
             calibrations: number[];
-            /** Certified Version */
+            /**
+             * Certified Version
+             * @description Number of the version in force; null: none.
+             */
             certified_version: number | null;
             /**
              * Due
@@ -11554,11 +13434,20 @@ export interface components {
          *     rate.
          */
         VerificationResponse: {
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
             serial: string;
-            /** Version */
+            /**
+             * Version
+             * @description Number of the calibration version, counted from 1 for each unit.
+             */
             version: number;
-            /** Recording */
+            /**
+             * Recording
+             * @description Number of the recording.
+             */
             recording: number;
             /**
              * Recorded Unit
@@ -11576,21 +13465,30 @@ export interface components {
              * @enum {string}
              */
             part: "verification" | "all";
-            /** Datasets */
+            /**
+             * Datasets
+             * @description Number of data sets to which the version was applied.
+             */
             datasets: number;
             /**
              * Rms Dps
-             * @description Root mean square of the error over data sets and axes, deg/s.
+             * @description Root mean square of the error (corrected minus true rate), deg/s.
              */
             rms_dps: number;
-            /** Max Dps */
+            /**
+             * Max Dps
+             * @description Largest magnitude of the error (corrected minus true rate), deg/s.
+             */
             max_dps: number;
             /**
              * Bias Dps
-             * @description Mean of the error over data sets and axes, deg/s.
+             * @description Mean of the error (corrected minus true rate), deg/s.
              */
             bias_dps: number;
-            /** Axes */
+            /**
+             * Axes
+             * @description For each axis: its error, what is expected of it, and its limit.
+             */
             axes: {
                 [key: string]: components["schemas"]["AxisVerification"];
             };
@@ -11620,8 +13518,12 @@ export interface components {
          * @description A calibration version that a fit made, as it was made, and whether it is in force.
          */
         VersionResponse: {
-            /** Serial */
+            /**
+             * Serial
+             * @description Serial number of the unit.
+             */
             serial: string;
+            /** @description The effects of the fitted model. */
             model: components["schemas"]["ModelResponse"];
             /**
              * Axes
@@ -11630,7 +13532,9 @@ export interface components {
             axes: {
                 [key: string]: components["schemas"]["AxisCoefficients"];
             };
+            /** @description Errors of the model before and after compensation, deg/s. */
             error: components["schemas"]["ErrorFigures"];
+            /** @description Rates and temperatures over which the model was calibrated. */
             validity: components["schemas"]["Validity"];
             /**
              * Warnings
@@ -11674,28 +13578,41 @@ export interface components {
             recordings: number[];
             /** @description Only for several recordings: repeatability, agreement between the recordings, and the error when each recording is predicted by a fit to the others. */
             joint: components["schemas"]["JointJson"] | null;
-            /** Version */
+            /**
+             * Version
+             * @description Number of the calibration version, counted from 1 for each unit.
+             */
             version: number;
             /**
              * Campaign
              * @description Campaign that made the recording; null: imported.
              */
             campaign: number | null;
-            /** Recipe */
+            /**
+             * Recipe
+             * @description Name of the recipe of the campaign that made the recording; null: the recording was imported.
+             */
             recipe: string | null;
-            /** Bench */
+            /**
+             * Bench
+             * @description Name of the bench of that campaign; null: the recording was imported.
+             */
             bench: string | null;
             /**
              * Hash
-             * @description SHA-256 of the calibration file.
+             * @description SHA-256 of the calibration as it was stored.
              */
             hash: string;
             /**
              * Created At
              * Format: date-time
+             * @description Time at which the version was stored.
              */
             created_at: string;
-            /** In Force */
+            /**
+             * In Force
+             * @description Whether this version is in force: certified last, and not revoked.
+             */
             in_force: boolean;
             /**
              * Notices
@@ -11725,7 +13642,10 @@ export interface components {
              * @description Temperature states (thermal lag or hysteresis) that must be updated with the temperature of every sample.
              */
             remembers: components["schemas"]["Follower"][];
-            /** Parent */
+            /**
+             * Parent
+             * @description Version of which a change of effects made this version; null: it is from a fit.
+             */
             parent: number | null;
         };
         /**
@@ -11793,9 +13713,15 @@ export interface components {
          * @description Whether a schedule could show an effect, and from which size on.
          */
         Visibility: {
-            /** Effect */
+            /**
+             * Effect
+             * @description Id of the effect in the catalogue.
+             */
             effect: string;
-            /** Visible */
+            /**
+             * Visible
+             * @description Whether the plan could show the effect.
+             */
             visible: boolean;
             /**
              * Share
@@ -11809,15 +13735,23 @@ export interface components {
             smallest_size: number | null;
             /**
              * Unit
+             * @description Unit of `smallest_size`; empty: none.
              * @default
              */
             unit: string;
-            /** Why */
+            /**
+             * Why
+             * @description What hides the effect: a channel that is not logged, or the schedule; null: it is visible.
+             */
             why: ("channel" | "schedule") | null;
-            /** Needs */
+            /**
+             * Needs
+             * @description Channels that would have to be logged; empty: none.
+             */
             needs: string[];
             /**
              * Experiment
+             * @description What would have to be measured to show the effect; empty: nothing more.
              * @default
              */
             experiment: string;
@@ -11827,9 +13761,15 @@ export interface components {
          * @description Withdraw a finding that was wrong.
          */
         WithdrawFindingRequest: {
-            /** Reason */
+            /**
+             * Reason
+             * @description Reason for the act, as typed.
+             */
             reason: string;
-            /** By */
+            /**
+             * By
+             * @description Name of the person who acted, as typed.
+             */
             by: string;
         };
         /**
@@ -11861,11 +13801,18 @@ export interface components {
             /**
              * At
              * Format: date-time
+             * @description Time of the act.
              */
             at: string;
-            /** By */
+            /**
+             * By
+             * @description Name of the person who acted, as typed.
+             */
             by: string;
-            /** Reason */
+            /**
+             * Reason
+             * @description Reason for the act, as typed.
+             */
             reason: string;
             /**
              * Certificate
@@ -11931,18 +13878,31 @@ export interface components {
          * @description Readings that were left out by choice when a recording was imported: they are marked with valid = 0.
          */
         labctl__recording__info__LeftOut: {
-            /** What */
+            /**
+             * What
+             * @description Kind of the finding, as a fixed word for programs, such as spikes.
+             */
             what: string;
             /**
              * Channel
+             * @description Column whose readings were left out; empty: the whole rows.
              * @default
              */
             channel?: string;
-            /** N */
+            /**
+             * N
+             * @description Number of readings that were left out.
+             */
             n: number;
-            /** Of */
+            /**
+             * Of
+             * @description Number of readings of the recording.
+             */
             of: number;
-            /** Why */
+            /**
+             * Why
+             * @description What was found, in words.
+             */
             why: string;
         };
     };
@@ -13548,7 +15508,7 @@ export interface operations {
             };
         };
     };
-    resume_api_campaigns__campaign__resume_post: {
+    confirm_api_campaigns__campaign__confirm_post: {
         parameters: {
             query?: never;
             header?: never;
@@ -13559,7 +15519,7 @@ export interface operations {
         };
         requestBody: {
             content: {
-                "application/json": components["schemas"]["ResumeRequest"];
+                "application/json": components["schemas"]["ConfirmRequest"];
             };
         };
         responses: {
@@ -13583,7 +15543,7 @@ export interface operations {
             };
         };
     };
-    confirm_api_campaigns__campaign__confirm_post: {
+    resume_api_campaigns__campaign__resume_post: {
         parameters: {
             query?: never;
             header?: never;
@@ -13594,7 +15554,7 @@ export interface operations {
         };
         requestBody: {
             content: {
-                "application/json": components["schemas"]["ConfirmRequest"];
+                "application/json": components["schemas"]["ResumeRequest"];
             };
         };
         responses: {

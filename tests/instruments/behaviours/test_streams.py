@@ -166,6 +166,7 @@ BROKE = (
 def of_each(driver: str) -> list[Behaviour]:
     """Return what the device of any stream may do."""
     within_ppm, beyond_ppm = (3e3, 2.8e4) if driver == STIM else (3e4, 8e4)  # a crystal, and what a manual allows
+    remedy = "by its own crystal the unit sends 125, 250," if driver == STIM else "set sample_rate_hz"
     mute, strange = (NoReply, WHERE[driver].format(NOTHING)), (NoReply, WHERE[driver].format(STRANGE))
     return [
         Behaviour(driver, "mute", through(lambda data, _: b""), mute),
@@ -182,7 +183,7 @@ def of_each(driver: str) -> list[Behaviour]:
                   changes=clock_off(within_ppm)),
         Behaviour(
             driver, f"clock {beyond_ppm / 1e4:g} % fast", None,
-            (WrongInstrument, r"sends [\d.]+ readings/s on sim://\S+, but the bench file says .*; set sample_rate_hz"),
+            (WrongInstrument, rf"sends [\d.]+ readings/s on sim://\S+, but the bench file says .*; {remedy}"),
             changes=clock_off(beyond_ppm),
         ),
         Behaviour(driver, "switched off for 1.5 s", Reset, gives=told),

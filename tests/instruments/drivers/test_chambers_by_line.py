@@ -182,12 +182,25 @@ def test_the_safe_state_may_be_off(chamber: Callable[..., Any], driver: str) -> 
 
 
 @pytest.mark.parametrize("driver", LINES)
-def test_a_chamber_that_was_switched_off_is_an_alarm(chamber: Callable[..., Any], driver: str) -> None:
+def test_a_chamber_that_was_switched_off_is_a_change_by_others(chamber: Callable[..., Any], driver: str) -> None:
     s = chamber(driver)
-    assert s.driver.read().alarms == ()  # before the first set point it may be off
+    assert s.driver.read().foreign == ()  # before the first set point it may be off
     s.driver.set_temperature_c(80.0)
     s.state.run(s.clock.now_s(), on=False)
-    assert s.driver.read().alarms == ("the chamber does not run",)
+    (said,) = s.driver.read().foreign
+    assert said.startswith("the chamber does not run")
+    s.driver.set_temperature_c(80.0)
+    assert s.state.runs
+    assert s.driver.read().foreign == ()
+
+
+def test_a_binder_that_was_switched_off_is_left_to_the_person(chamber: Callable[..., Any]) -> None:
+    s = chamber("binder", controller="mk53")
+    s.driver.set_temperature_c(80.0)
+    s.simulated.mode = 0
+    assert s.driver.read().foreign == ("the controller is idle (mode neither manual nor basic)",)
+    with pytest.raises(RequestRejected, match=r"is idle .*; switch it on at its panel"):
+        s.driver.set_temperature_c(80.0)
 
 
 @pytest.mark.parametrize(

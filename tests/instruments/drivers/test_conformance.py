@@ -11,8 +11,7 @@ import pytest
 
 from instruments.bench_config import read_bench, shipped_benches
 from instruments.conformance import checks_of, try_driver
-from instruments.conformance.by_kind import OF_KIND
-from instruments.conformance.checks import COMMON, PROTOCOLS
+from instruments.conformance.run import COMMON, OF_KIND, PROTOCOLS
 from instruments.conformance.stand import Stand, open_stand, place_of
 from instruments.drivers.driver import GyroDriver, Trial
 from instruments.drivers.kvh import KVH_DSP3000, KvhGyro

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from instruments.bench_config import BenchFile, read_bench
 from instruments.clock import VirtualClock
-from instruments.drivers.references.library_reference import LibraryReference
+from instruments.drivers.library_reference import LibraryReference
 from instruments.drivers.resolution import resolve
 from instruments.errors import LinkError, MalformedReply, NoReply, RequestRejected, WrongInstrument
 from instruments.transport.factory import Ports
@@ -46,6 +46,16 @@ def thermotron(stand: Callable[..., Any], monkeypatch: pytest.MonkeyPatch) -> Ca
         return s
 
     return make
+
+
+def test_a_chamber_of_a_library_that_was_switched_off_is_a_change_by_others(thermotron: Callable[..., Any]) -> None:
+    s = thermotron(running="mode", running_mask=16)
+    s.driver.set_temperature_c(85.0)
+    assert s.driver.read().foreign == ()
+    s.state.run(s.clock.now_s(), on=False)
+    assert s.driver.read().foreign == ("the chamber does not run",)
+    s.driver.set_temperature_c(85.0)
+    assert (s.state.runs, s.driver.read().foreign) == (True, ())
 
 
 def test_pymeasures_own_class_controls_the_chamber(thermotron: Callable[..., Any]) -> None:

@@ -14,6 +14,7 @@ from instruments.clock import VirtualClock
 from instruments.drivers.resolution import resolve
 from instruments.errors import NoReply, RequestRejected, WrongInstrument
 from instruments.interfaces.table import EncoderTable
+from procedures.execution.safe_state import stop_table
 
 NAMES = ("newport-xps", "aerotech-ensemble")
 
@@ -29,20 +30,28 @@ class Rig:
         }  # fmt: skip
         record["simulation"]["table"] |= simulated
         self.clock = VirtualClock()
-        self.bench = open_bench(resolve(BenchFile.model_validate(record)), self.clock)
+        self.file = resolve(BenchFile.model_validate(record))
+        self.bench = open_bench(self.file, self.clock)
         assert self.bench.simulation is not None
         self.simulation: Any = self.bench.simulation
         self.url = f"sim://{name}"
         self.device: Any = self.simulation.device(self.url)._device
         self.table: Any = self.bench.table
         self.said: list[str] = []
-        receive = self.device.receive
+        self._hear(self.device)
+
+    def _hear(self, link: Any) -> Any:
+        """Note what a link is sent, and what those are sent that are opened after it."""
+        receive, connect = link.receive, getattr(link, "connect", None)
 
         def heard(data: bytes, t_s: float) -> None:
             self.said.append(data.decode())
             receive(data, t_s)
 
-        self.device.receive = heard
+        link.receive = heard
+        if connect is not None:
+            link.connect = lambda: self._hear(connect())
+        return link
 
     @property
     def motion(self) -> Any:
@@ -199,6 +208,50 @@ def test_a_stop_ends_a_home_search_at_once(name: str, stop: str, rig: Callable[.
     assert not s.motion.moving(s.clock.now_s())
 
 
+def test_a_stop_ends_a_home_search_that_another_process_has_begun(rig: Callable[..., Rig]) -> None:
+    """The other process waits for its answer, which is an error then; a move abort alone is refused in a search."""
+    s = rig("newport-xps", home_s=60.0)
+    other: Any = open_bench(s.file, s.clock, s.simulation).table
+    s.motion.move_to(0.0, 170.0, 100.0, 100.0)  # far from its home
+    s.clock.sleep(10.0)
+    begun_s = s.clock.now_s()
+    link = other.dialogue.link
+    link._clock = EndingClock(s.clock, begun_s + 5.0)
+    with pytest.raises(Ended):
+        other.home()
+    assert s.motion.moving(s.clock.now_s())
+    s.said.clear()
+    asked_s = s.clock.now_s()
+    assert stop_table(s.table, s.clock) is None
+    assert s.said[:3] == ["GroupMoveAbort(GROUP1)", "GroupStatusGet(GROUP1,int *)", "GroupKill(GROUP1)"]
+    assert not s.motion.moving(s.clock.now_s())
+    assert s.clock.now_s() - asked_s < 5.0
+    link._clock = s.clock
+    assert link._port.read(20) == b"-27,,EndOfAPI"
+    s.table.home()
+    assert abs(s.table.angle_deg()) < 0.01
+
+
+def test_a_stop_without_a_home_search_keeps_the_power_on(rig: Callable[..., Rig]) -> None:
+    s = rig("newport-xps")
+    s.table.home()
+    s.said.clear()
+    s.table.stop()
+    s.table.spin(30.0, 5.0)
+    s.table.stop()
+    assert not [each for each in s.said if "Kill" in each]
+    assert s.said[-1] == "GroupMoveAbort(GROUP1)"  # its own run: nothing is asked
+
+
+def test_a_controller_that_does_not_say_whether_it_homes_is_stopped_in_both_ways(rig: Callable[..., Rig]) -> None:
+    s = rig("newport-xps")
+    s.table.home()
+    s.simulation.faults(s.url).arm("silence", from_s=s.clock.now_s())
+    s.said.clear()
+    s.table.stop()
+    assert (s.said[0], s.said[-1]) == ("GroupMoveAbort(GROUP1)", "GroupKill(GROUP1)")
+
+
 def test_another_instrument_is_refused(rig: Callable[..., Rig]) -> None:
     s = rig("aerotech-ensemble")
     s.device.number = "7"
@@ -209,6 +262,6 @@ def test_another_instrument_is_refused(rig: Callable[..., Rig]) -> None:
 
 def test_a_group_or_an_axis_that_is_not_there_is_named(rig: Callable[..., Rig]) -> None:
     s = rig("newport-xps")
-    s.device.group = "OTHER"
+    s.device.controller.group = "OTHER"
     with pytest.raises(RequestRejected, match="error -19, no group of this name"):
         s.table.home()

@@ -121,6 +121,22 @@ def test_a_unit_that_does_not_hear_is_told_from_a_silent_one(stand: Make) -> Non
     assert s.gyro.identify().reported == {}
 
 
+def test_answers_to_its_own_questions_are_no_strange_bytes(stand: Make, monkeypatch: pytest.MonkeyPatch) -> None:
+    s = unit(stand)
+    s.gyro.start()
+    wire = s.bench.simulation.device(s.gyro_url)._device
+
+    def answers_only(_: float) -> bytes:
+        said, wire._replies = b"".join(wire._replies.values()), {}
+        return said
+
+    monkeypatch.setattr(wire, "transmit", answers_only)
+    with pytest.raises(
+        NoReply, match=r"within 1\.5 s: the unit answers questions \(\d+ bytes\) but sends no reading; "
+    ):
+        s.gyro.read_latest()
+
+
 def test_a_lost_reply_is_asked_for_again(stand: Make) -> None:
     s = unit(stand)
     s.faults(s.gyro_url).arm("silence", until_s=0.3)

@@ -256,6 +256,29 @@ def test_the_event_that_switches_the_chamber(make_rig: Callable[..., Any]) -> No
     assert bytes.fromhex("01 06 07E4") not in sent(rig)  # it is on: not written again
 
 
+def test_the_event_that_a_person_switches_off_is_in_the_next_reading(make_rig: Callable[..., Any]) -> None:
+    rig = make_rig("f4", enable_event=1)
+    assert rig.driver.read().foreign == ()  # labctl has not switched it on
+    rig.driver.set_temperature_c(40.0)
+    rig.clock.sleep(3600)
+    assert (rig.driver.read().temperature_c, rig.driver.read().foreign) == (pytest.approx(40.0, abs=0.3), ())
+    rig.simulated.switch(1, rig.clock.now_s(), on=False)
+    assert rig.driver.read().foreign == ("event output 1 (register 2000) is off",)
+    rig.clock.sleep(3600)
+    assert rig.driver.read().temperature_c == pytest.approx(25.0, abs=0.5)
+    assert rig.driver.set_temperature_c(40.0) == 40.0
+    assert (rig.simulated.events[0], rig.driver.read().foreign) == (1, ())
+    assert rig.simulated.writes == [400]  # the set point was as it was: its memory is spared
+
+
+def test_an_event_that_stays_off_is_refused(make_rig: Callable[..., Any]) -> None:
+    rig = make_rig("f4", enable_event=1)
+    rig.simulated.switch = lambda *_a, **_k: None
+    with pytest.raises(RequestRejected, match=r"event output 1 \(register 2000\) stays off, .* check enable_event"):
+        rig.driver.set_temperature_c(40.0)
+    assert rig.simulated.writes == []
+
+
 def test_a_controller_that_knows_function_16_only(f4: Any) -> None:
     f4.simulated.functions = frozenset({3, 16})
     assert f4.driver.set_temperature_c(40.0) == 40.0

@@ -109,7 +109,8 @@ def test_control_that_is_switched_off_is_left_to_the_person(f4t: Any, mode: int,
         f4t.driver.set_temperature_c(40.0)
     f4t.simulated.setpoint_c = 80.0
     assert f4t.driver.make_safe() == 25.0
-    assert "control is not in auto" in f4t.driver.read().alarms
+    (said,) = f4t.driver.shortcomings()
+    assert f"control loop 1 is in mode {text}, not auto, so a set point would have no effect" in said
 
 
 @pytest.mark.parametrize("state", [149, 146])
@@ -213,8 +214,24 @@ def test_a_chamber_that_does_not_run_is_seen_by_its_output(make_rig: Callable[..
         RequestRejected, match=r"does not run \(output 1 of module 1 is off\); switch it on at its panel"
     ):
         rig.driver.set_temperature_c(40.0)
-    rig.clock.sleep(ALARMS_EVERY_S)
-    assert rig.driver.read().alarms == ("the chamber does not run",)
+    (said,) = rig.driver.shortcomings()
+    assert said.startswith("the chamber does not run (output 1 of module 1 is off), so a set point would have no")
+
+
+def test_control_that_a_person_switches_off_is_in_the_next_reading(make_rig: Callable[..., Any]) -> None:
+    """Within one poll of 8.5 s, also between two requests of the alarms; only a person can switch it on again."""
+    rig = make_rig("f4t", run_output=(1, 1))
+    rig.driver.set_temperature_c(40.0)
+    rig.clock.sleep(3600)
+    assert (rig.driver.read().foreign, rig.driver.shortcomings()) == ((), ())
+    rig.simulated.switch(rig.clock.now_s(), on=False)
+    assert rig.driver.read().foreign == ("control loop 1 is in mode off, not auto",)
+    rig.simulated.control_mode = 10
+    assert rig.driver.read().foreign == ("the chamber does not run (output 1 of module 1 is off)",)
+    with pytest.raises(RequestRejected, match="switch it on at its panel"):
+        rig.driver.set_temperature_c(40.0)
+    rig.clock.sleep(3600)
+    assert rig.driver.read().temperature_c == pytest.approx(25.0, abs=0.5)
 
 
 def test_closing_twice_is_fine(f4t: Any) -> None:

@@ -16,7 +16,7 @@ from instruments.clock import ScaledClock
 from instruments.errors import LinkError, NoReply
 from instruments.protocols.nidaqmx.service import Status
 from instruments.simulators.server import SimulationServer
-from instruments.transport.rpc.channel import TimedChannel, target
+from instruments.transport.rpc import TimedChannel, target
 
 
 def bench_file(**gyro: Any) -> BenchFile:

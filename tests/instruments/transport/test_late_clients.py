@@ -10,7 +10,7 @@ import pytest
 
 from instruments.clock import ScaledClock, VirtualClock
 from instruments.transport.factory import HardwareLinks
-from instruments.transport.rtu.client import RtuClient
+from instruments.transport.rtu import RtuClient
 from instruments.transport.serial import Line
 from instruments.transport.tcp_client import TcpClient
 

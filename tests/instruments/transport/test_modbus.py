@@ -19,7 +19,7 @@ from instruments.simulators.links.modbus_device import ModbusDevice, constant, i
 from instruments.transport.factory import Ports
 from instruments.transport.modbus import Registers
 from instruments.transport.modbus_link import RETRY_PAUSES_S, Client, RefusedRegister
-from instruments.transport.rtu.line import LEAST_LATENCY_S, SILENCE_FACTOR
+from instruments.transport.rtu import LEAST_LATENCY_S, SILENCE_FACTOR
 
 AIR = Register(100, "air temperature", "int16", "counts")
 SETPOINT = Register(300, "set point", "int16", "counts", low=-400, high=1500, access="rw")

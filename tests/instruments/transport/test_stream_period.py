@@ -9,7 +9,7 @@ import pytest
 
 from instruments.errors import WrongInstrument
 from instruments.transport.sample_timing import StreamTime, refuse_other_rate
-from instruments.transport.stream_period import MEASURED, PeriodLine
+from instruments.transport.stream_period import MEASURED, OF_A_CRYSTAL, PeriodLine
 
 NOMINAL_HZ = 100.0
 
@@ -111,6 +111,15 @@ def test_a_rate_beyond_the_tolerance_is_named(rate_hz: float) -> None:
         r"set sample_rate_hz = ",
     ):
         refuse_other_rate("fog", "/dev/ttyUSB0", stream.line)
+
+
+@pytest.mark.parametrize(("rate_hz", "advice"), [(250.02, "set sample_rate_hz = 250 or"), (128.5, "check whether som")])
+def test_a_rate_that_the_unit_cannot_be_set_to_is_not_advised(rate_hz: float, advice: str) -> None:
+    line = PeriodLine(1 / 125, OF_A_CRYSTAL)
+    for second in range(12):
+        line.add(round(rate_hz * second), round(rate_hz * second) / rate_hz, 0.008)
+    with pytest.raises(WrongInstrument, match=rf"limit \+-0.5 %; .*{advice}"):
+        refuse_other_rate("imu", "/dev/ttyUSB0", line, (125, 250, 500, 1000, 2000))
 
 
 def test_a_period_that_drifts_is_followed() -> None:

@@ -68,8 +68,8 @@ def let_send(unit: Unit, driver: Stim300, clock: VirtualClock, n: int) -> None:
     reader: Any = driver._stream._reader
     for _ in range(n // 10):
         before = len(reader._unread)
-        unit.send(10)
         clock.sleep(10 * PERIOD_S)
+        unit.send(10)
         eventually(lambda: len(reader._unread) == before + 10 * LAYOUTS[0x94].stride)  # noqa: B023  ends in this round
 
 

@@ -13,7 +13,7 @@ from labctl.calibration import read_calibration
 from labctl.compensator import Compensator
 from labctl.recording import Recording, read_recording
 from labctl.recording.checks import checked
-from labctl.services.criticism.by_motion import columns
+from labctl.services.criticism import by_motion as page
 from studies.poses_simulation import Session, simulate_session
 from tests.helpers.paths import EXAMPLES
 from tests.helpers.profiles import profile_recording, sweep
@@ -114,7 +114,7 @@ def test_a_profile_has_delay_and_bandwidth_and_says_how_many_windows_are_drawn(
 ) -> None:
     recording = profile_recording(sweep(30.0, 0.5, 20.0, 100.0, 100.0), delay_s=0.005, bandwidth_hz=40.0, scale=1e-3)
     effects = ["bias", "scale_factor", "time_delay", "bandwidth"]
-    monkeypatch.setattr(columns, "MOST_ROWS", 700)
+    monkeypatch.setattr(page, "MOST_ROWS", 700)
     _, found = by_motion(client, recording, effects=effects, accept_warnings=True)
     assert found["rows"] == 700 == len(found["profile"]["t_s"])
     assert 2900 < found["of"] < 3000

@@ -15,7 +15,7 @@ import pytest
 
 from instruments.bench_config import BenchFile, read_bench
 from instruments.clock import ScaledClock, SystemClock
-from instruments.discovery.find import find_on_port
+from instruments.discovery import find_on_port
 from instruments.simulators.server import SimulationServer
 from tests.helpers.lab import Lab
 

@@ -17,10 +17,16 @@ def lab(tmp_path: Path) -> Lab:
     return Lab(tmp_path)
 
 
+@pytest.fixture(scope="module")
+def imported(tmp_path_factory: pytest.TempPathFactory) -> Lab:
+    made = Lab(tmp_path_factory.mktemp("imported"))
+    made.run("import", str(EXAMPLES / "osu-fog"))
+    return made
+
+
 @pytest.fixture
-def fog(lab: Lab) -> Lab:
-    lab.run("import", str(EXAMPLES / "osu-fog"))
-    return lab
+def fog(imported: Lab, tmp_path: Path) -> Lab:
+    return imported.copy(tmp_path)
 
 
 def test_import_says_what_came_in(lab: Lab) -> None:

@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import json
+import tempfile
 from pathlib import Path
 
+import pytest
+
+from instruments.clock import VirtualClock
+from labctl.services.benches import described_instruments
 from tests.helpers.lab import CliRunner, app
 
 
@@ -47,3 +52,18 @@ def test_what_cannot_be_tried_is_one_line() -> None:
     assert "bench 'single-axis-sim' has no gyro with driver 'stim300'; name a bench that has one" in text
     status, text = run("watlow-f4", "--bench", "example-real")
     assert "CHAMBER1-if00-port0 on bench 'my-bench', but a driver is checked on a simulated instrument only" in text
+
+
+def test_a_description_that_fails_names_its_wire_log(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    monkeypatch.setattr(described_instruments, "SystemClock", VirtualClock)
+    status, text = run("examples/line-instruments/scpi-chamber.toml", "--host", "127.0.0.1:1")
+    (file,) = tmp_path.iterdir()
+    assert status == 1
+    assert f"every byte is in {file}: add this file to a report of a fault" in text
+
+
+def test_a_wire_log_of_a_driver_is_that_of_a_bench() -> None:
+    status, text = run("watlow-f4", "--wire-log", "x.gz")
+    assert status == 2
+    assert "labctl bench check FILE --wire-log" in " ".join(text.replace("│", " ").split())

@@ -12,6 +12,9 @@ from click.testing import Result
 from typer.testing import CliRunner
 
 from labctl.cli.app import app
+from labctl.recording import Recording, write_recording
+from studies.triads import recording_of
+from studies.triads_simulation import TrueTriads, turned_by_hand, vector_of
 from tests.helpers.magnetic_turns import FIELD_UT, HARD_IRON_UT, SOFT_IRON, fields, readings_of
 
 
@@ -68,3 +71,22 @@ def test_a_disturbed_field_is_not_exported(tmp_path: Path) -> None:
     refused = run(path, "--export", "px4", "--out", str(tmp_path / "x"), status=2).stderr
     assert "the readings are not those of a constant field" in refused
     assert not (tmp_path / "x").exists()
+
+
+def test_a_recording_in_poses_gives_the_alignment_too(tmp_path: Path) -> None:
+    unit = TrueTriads.drawn(np.random.default_rng(5))
+    recording = recording_of(*turned_by_hand(5, unit, 14))
+    write_recording(recording, tmp_path / "poses")
+    out = tmp_path / "mag.json"
+    found = answer(str(tmp_path / "poses"), "--export", "json", "--out", str(out))
+    for axis, true in zip("xyz", np.degrees(vector_of(unit.turned)), strict=True):
+        each = found["alignment"]["axes"][axis]
+        assert each["value"] == pytest.approx(true, abs=5 * each["u"])
+    assert "Magnetometer turned from the accelerometer's axes about x, y, z by" in found["text"][0]
+    matrix = np.array(json.loads(out.read_text())["alignment"]["matrix"])
+    assert matrix == pytest.approx(unit.turned, abs=3e-3)
+    said = run(str(tmp_path / "poses"), "--serial", "OTHER", status=2).stderr
+    assert "this recording is of unit TRIADS-1, but --serial is OTHER" in said
+    without = Recording(recording.info, {k: v for k, v in recording.columns.items() if not k.startswith("field")})
+    write_recording(without, tmp_path / "without")
+    assert "this recording has no column field_x_ut" in run(str(tmp_path / "without"), status=2).stderr

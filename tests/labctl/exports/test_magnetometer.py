@@ -2,19 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from labctl.errors import BadInput
 from labctl.exports.flight_controllers.magnetometer import ardupilot, px4
-from labctl.fitting.magnetometer.calibrate import Magnetometer, calibrate_magnetometer
+from labctl.exports.sensors.parameters import MagnetometerParameters
+from labctl.fitting.magnetometer.calibrate import calibrate_magnetometer
 from tests.helpers.magnetic_turns import FIELD_UT, fields, readings_of
 
 
-@pytest.fixture(scope="module")
-def calibrated() -> tuple[np.ndarray, Magnetometer, np.ndarray]:
-    readings = readings_of(fields(600), 1)
+def parameters(readings: np.ndarray) -> MagnetometerParameters:
     found = calibrate_magnetometer("m", readings, FIELD_UT)
+    return MagnetometerParameters(found.hard_iron_ut, found.soft_iron, found.covariance)
+
+
+@pytest.fixture(scope="module")
+def calibrated() -> tuple[np.ndarray, MagnetometerParameters, np.ndarray]:
+    readings = readings_of(fields(600), 1)
+    found = parameters(readings)
     return readings, found, (readings - found.hard_iron_ut) @ found.soft_iron.T
 
 
@@ -22,7 +30,7 @@ def symmetric(diagonal: list[float], xy: float, xz: float, yz: float) -> np.ndar
     return np.array([[diagonal[0], xy, xz], [xy, diagonal[1], yz], [xz, yz, diagonal[2]]])
 
 
-def test_px4_corrects_as_labctl(calibrated: tuple[np.ndarray, Magnetometer, np.ndarray]) -> None:
+def test_px4_corrects_as_labctl(calibrated: tuple[np.ndarray, MagnetometerParameters, np.ndarray]) -> None:
     readings, found, expected = calibrated
     lines = [line.split("\t") for line in px4(found, ["head"], 2, 77).splitlines() if not line.startswith("#")]
     values = {line[2]: float(line[3]) for line in lines}
@@ -38,7 +46,7 @@ def test_px4_corrects_as_labctl(calibrated: tuple[np.ndarray, Magnetometer, np.n
 
 @pytest.mark.parametrize(("instance", "number"), [(1, ""), (3, "3")])
 def test_ardupilot_corrects_as_labctl(
-    calibrated: tuple[np.ndarray, Magnetometer, np.ndarray], instance: int, number: str
+    calibrated: tuple[np.ndarray, MagnetometerParameters, np.ndarray], instance: int, number: str
 ) -> None:
     readings, found, expected = calibrated
     text = ardupilot(found, ["head"], instance, None)
@@ -54,9 +62,18 @@ def test_ardupilot_corrects_as_labctl(
     assert mgauss / 10 == pytest.approx(expected, abs=1e-4)
 
 
-def test_what_an_autopilot_does_not_take_is_refused(calibrated: tuple[np.ndarray, Magnetometer, np.ndarray]) -> None:
+def test_what_an_autopilot_does_not_take_is_refused(
+    calibrated: tuple[np.ndarray, MagnetometerParameters, np.ndarray],
+) -> None:
     with pytest.raises(BadInput, match=r"format px4: --instance 4: give a number from 0 to 3"):
         px4(calibrated[1], [], 4, None)
-    far = calibrate_magnetometer("m", calibrated[0] + 300.0, FIELD_UT)
+    far = parameters(calibrated[0] + 300.0)
     with pytest.raises(BadInput, match=r"mgauss, but ArduPilot takes at most 1800"):
         ardupilot(far, [], 1, None)
+
+
+def test_a_rotation_is_said_to_be_lost(calibrated: tuple[np.ndarray, MagnetometerParameters, np.ndarray]) -> None:
+    turned = replace(calibrated[1], turned_rad=np.radians([3.0, 0.0, 4.0]))
+    for text in (px4(turned, [], 0, None), ardupilot(turned, [], 1, None)):
+        assert "LOST alignment: turned by 5 deg from the accelerometer" in text
+    assert "LOST alignment" not in px4(calibrated[1], [], 0, None)

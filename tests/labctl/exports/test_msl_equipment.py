@@ -15,7 +15,7 @@ from scipy.interpolate import RegularGridInterpolator
 from labctl.calibration import Calibration
 from labctl.compensator import Compensator
 from labctl.errors import BadInput
-from labctl.exports.registers.msl_equipment import FORMAT, NEEDED, write
+from labctl.exports.msl_equipment import FORMAT, NEEDED, write
 from tests.helpers.exported import stated, whole_range
 
 SPACE = "{https://measurement.govt.nz/equipment-register}"

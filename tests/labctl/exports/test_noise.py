@@ -10,7 +10,7 @@ import pytest
 from labctl.calibration import Calibration
 from labctl.errors import BadInput
 from labctl.json_types.noise import AllanJson, NoiseFigure
-from labctl.services.calibrations.exporting import noise_options
+from labctl.services.calibrations.served import noise_options
 from tests.helpers.exported import exported, stated
 
 #: 0.15 deg/sqrt(h) and 6 deg/h/sqrt(h), as of a data sheet, in deg/s/sqrt(Hz) and deg/s^2/sqrt(Hz).

@@ -7,10 +7,12 @@ import shutil
 import subprocess
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 import yaml
+from scipy.spatial.transform import Rotation
 
 from labctl.errors import BadInput
 from labctl.exports.sensors.formats import written
@@ -101,3 +103,20 @@ def test_ros_gets_the_turn_of_the_gyro_triad_and_kalibr_is_told_that_it_is_lost(
     assert yaml.safe_load(ros) == yaml.safe_load(written(ACCELEROMETER, ["head"], "ros", None, None))
     assert "LOST gyroscopes" in written(turned, ["head"], "kalibr", None, None)
     assert "LOST gyro" not in written(ACCELEROMETER, ["head"], "kalibr", None, None)
+
+
+def test_a_magnetometers_alignment_is_in_the_formats_of_programs(tmp_path: Path) -> None:
+    turned = replace(MAGNETOMETER, turned_rad=np.array([0.1, -0.2, 0.05]))
+    matrix = Rotation.from_rotvec(turned.turned_rad).as_matrix()
+    reading = np.array([20.0, -11.0, 31.0])
+    true = matrix @ SOFT_IRON @ (reading - HARD_IRON_UT)
+    document = json.loads(written(turned, [], "json", None, None))
+    field = np.array(document["matrix"]) @ (reading - document["offset"])
+    assert np.array(document["alignment"]["matrix"]) @ field == pytest.approx(true, abs=1e-12)
+    module: dict[str, Any] = {}
+    exec(written(turned, [], "python", None, None), module)
+    assert module["aligned"](reading) == pytest.approx(true, abs=1e-12)
+    header = written(turned, [], "c", None, None)
+    row = header.partition("magnetometer_alignment[3][3] = {{")[2].partition("}")[0]
+    assert [float(value) for value in row.split(",")] == pytest.approx(matrix[0], abs=1e-15)
+    assert "alignment" not in written(MAGNETOMETER, [], "json", None, None)

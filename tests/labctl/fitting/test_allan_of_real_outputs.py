@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 from scipy.signal import butter, lfilter
 
-from labctl.fitting.numeric.allan import Allan, allan
+from labctl.fitting.numeric.allan import Allan, allan, hiding_step
 from labctl.fitting.numeric.allan_bounds import is_filtered_white
-from labctl.fitting.numeric.coarse_output import hiding_step
 
 PERIOD_S = 0.01
 #: White noise, deg/s/sqrt(Hz), and the same in the unit of N.

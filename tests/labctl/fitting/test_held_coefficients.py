@@ -15,7 +15,7 @@ from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.data.joined import joined_recording
 from labctl.fitting.effects import Reference, parse_term
 from labctl.fitting.estimation.axis_solutions import solve_axes
-from labctl.fitting.estimation.held.resolution import Fixed
+from labctl.fitting.estimation.held import Fixed
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.models.held import Held, HeldCoefficient

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -145,18 +144,21 @@ def test_a_time_axis_is_there_only_where_time_is_known() -> None:
     assert {axis.title.text for axis in timed.select_xaxes() if axis.title.text} == {"time, h"}
 
 
-def compared(tmp_path: Path) -> tuple[Recording, dict[str, Any]]:
+@pytest.fixture(scope="module")
+def compared(tmp_path_factory: pytest.TempPathFactory) -> tuple[Recording, dict[str, Any]]:
     """Return the means of a tri-axial recording, and a version fitted to it, as it is, beside it."""
     recording = three_axes(4, scale_factor_odd=3e-9)
-    with open_client(tmp_path / "lab.sqlite") as client:
+    with open_client(tmp_path_factory.mktemp("compared") / "lab.sqlite") as client:
         add_recording(client, recording)
         path = f"/api/units/{recording.info.serial}/calibrations"
         client.post(path, json={"model": "yang2018"})
         return to_points(recording), client.get(f"{path}/1/comparison").json()
 
 
-def test_nine_panels_have_measured_dots_and_model_lines_redder_with_temperature(tmp_path: Path) -> None:
-    points, comparison = compared(tmp_path)
+def test_nine_panels_have_measured_dots_and_model_lines_redder_with_temperature(
+    compared: tuple[Recording, dict[str, Any]],
+) -> None:
+    points, comparison = compared
     figure = error_over_rate(comparison)
     assert figure is not None
     dots = {trace.name: trace for trace in figure.data if trace.mode == "markers"}
@@ -178,8 +180,10 @@ def test_nine_panels_have_measured_dots_and_model_lines_redder_with_temperature(
         assert [r - b for r, _, b in reds] == sorted(r - b for r, _, b in reds)
 
 
-def test_the_error_per_turn_is_drawn_before_and_after_on_the_same_axes(tmp_path: Path) -> None:
-    _, comparison = compared(tmp_path)
+def test_the_error_per_turn_is_drawn_before_and_after_on_the_same_axes(
+    compared: tuple[Recording, dict[str, Any]],
+) -> None:
+    _, comparison = compared
     figure = full_turn(comparison)
     assert figure is not None
     columns = comparison["columns"]

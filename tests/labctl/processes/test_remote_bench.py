@@ -100,7 +100,8 @@ def test_a_campaign_is_started_followed_and_aborted_from_the_web_process(store: 
     service.start()
     try:
         assert rings.acquire(timeout=20.0)
-        from labctl.services.commands.registry import ABORT_CAMPAIGN, START_CAMPAIGN
+        from labctl.services.commands.acts.abort import ABORT_CAMPAIGN
+        from labctl.services.commands.acts.start import START_CAMPAIGN
         from labctl.services.commands.requests import CampaignStart, ToCampaign
         from labctl.services.schemas.campaigns import CampaignRequest, ReasonRequest
 

@@ -13,7 +13,7 @@ from labctl.errors import BadRecording
 from labctl.fitting import fit
 from labctl.fitting.models.temperature import LagrangeTable
 from labctl.recording.files import read_recording, write_recording
-from labctl.recording.parameter_files.flight_controllers import IMPORTER, ParameterOptions, probe, read
+from labctl.recording.parameter_files import IMPORTER, ParameterOptions, probe, read
 from tests.helpers.exported import exported
 
 OPTIONS = ParameterOptions.model_validate(

@@ -34,6 +34,9 @@ from labctl.store import open_store
 from procedures.planning.plan import make_plan
 from procedures.recipe.rules import Verification
 
+#: The same question of the same recording is answered once for the whole run.
+pytestmark = pytest.mark.usefixtures("shared_answers")
+
 AT = datetime(2026, 11, 25, tzinfo=UTC)
 EFFECTS = ["bias", "scale_factor", "misalignment"]
 RECIPE = """format = "labctl-recipe/1"

@@ -14,8 +14,9 @@ from labctl.api import create_app
 from labctl.errors import BadRecording, Conflict
 from labctl.service_connection import ServiceConnection, ServiceRefused
 from labctl.services.campaigns.bench_runner import BenchRunner
+from labctl.services.commands.acts.start import START_CAMPAIGN
 from labctl.services.commands.encoding import json_body, recording_files
-from labctl.services.commands.registry import COMMANDS, FIT, IMPORT_RECORDING, IMPROVE, START_CAMPAIGN
+from labctl.services.commands.registry import COMMANDS, FIT, IMPORT_RECORDING, IMPROVE
 from labctl.services.commands.remote import HttpExecutor
 from labctl.services.commands.requests import CampaignStart, RecordingFolder, ToNewestOrVersion, ToStart, ToUnit
 from labctl.services.lab_service import LabService

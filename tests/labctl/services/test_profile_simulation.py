@@ -7,7 +7,7 @@ import pytest
 
 from instruments.bench_config import SimulationSettings
 from instruments.simulators.hidden import EFFECTS
-from instruments.simulators.physics.profile_motion import ProfileMotion
+from instruments.simulators.physics.world import ProfileMotion
 from labctl.errors import BadInput
 from labctl.fitting import fit
 from labctl.recording import Recording

@@ -19,7 +19,7 @@ from labctl.services.campaigns.preparation import prepare
 from labctl.services.planning.loading import load_bench
 from labctl.services.schemas.campaigns import StartRequest
 from labctl.store import Store, open_store
-from labctl.store.connection.start_check import first_damage
+from labctl.store.connection.sqlite_file import first_damage
 from procedures.execution import safe_state
 from tests.helpers.service import open_client
 

@@ -11,8 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from labctl.store.integrity.backup import copy_database
-from labctl.store.integrity.temporary_copy import COPY, PREFIX
+from labctl.store.integrity.migration import COPY, PREFIX, copy_database
 from tests.helpers.processes import first_line, kill
 
 #: A backup that stands still once its copy is made, before it has its name.

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from instruments.errors import NoReply
 from instruments.interfaces.gyro import Readings
 from instruments.interfaces.self_checks import StreamPeriod
 from procedures.contracts.campaign_state import CampaignState
@@ -97,6 +98,31 @@ def test_what_never_comes_is_lost_is_said_and_the_data_set_is_taken_again() -> N
     )
     assert event.device == "imu"
     assert rig.journal.kinds().count("data_set_repeated") == 1
+
+
+class Ends(Deaf):
+    """A unit whose stream ends in the first data set, which is an error 2 s later."""
+
+    alive, ended_s = 35, 0.0
+
+    def read(self, duration_s: float) -> Readings:
+        found = super().read(duration_s)
+        if len(found) or len(self.bench.journal.headers) != 1:
+            return found
+        self.ended_s = self.ended_s or self.clock.now_s()
+        if self.clock.now_s() > self.ended_s + 2.0:
+            raise NoReply("imu", "no reading for 2.0 s: no bytes arrived; check power and cable")
+        return found
+
+
+def test_what_a_unit_did_not_send_before_its_silence_ended_a_data_set_is_lost() -> None:
+    rig = with_unit(Ends)
+    assert rig.run().state is CampaignState.DONE
+    assert rig.journal.closed[0][1] == "partial"
+    assert 35 <= came(rig, 1) <= 45
+    assert 20 <= lost(rig, 1) <= 45  # until the error
+    assert came(rig, 2) == pytest.approx(100, abs=1)
+    assert lost(rig, 2) == 0
 
 
 def test_where_they_are_lost_each_time_the_campaign_does_not_call_it_complete() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from procedures.contracts.steps import Soak
-from procedures.execution.soak_criterion import SoakCriterion
+from procedures.execution.step_handlers import SoakCriterion
 
 STEP = Soak(temperature_c=20, hold_s=600, band_c=0.5, max_drift_c=0.1, drift_window_s=300, timeout_s=5000)
 

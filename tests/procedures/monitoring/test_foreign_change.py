@@ -71,6 +71,33 @@ def test_it_is_taken_back_where_the_recipe_says_so(rig: Any) -> None:
     assert [state for _, state, _ in rig.journal.closed].count("complete") == 4
 
 
+@pytest.mark.parametrize(
+    ("action", "state"),
+    [("take_back", CampaignState.DONE), ("suspend", CampaignState.FAILED), ("fail", CampaignState.FAILED)],
+)
+def test_a_chamber_that_is_switched_off_in_a_soak_is_seen_within_one_poll(
+    rig: Any, action: str, state: CampaignState
+) -> None:
+    off_s: list[float] = []
+
+    def switch_off() -> None:
+        if not off_s:
+            rig.chamber.runs = False
+            off_s.append(rig.clock.now_s())
+
+    seen = []
+    rig.when_step("soak", switch_off)
+    rig.journal.hooks.append(
+        lambda what, event: seen.append(rig.clock.now_s()) if what == "event" and event.kind == SEEN else None
+    )
+    rules = {"actions": {"foreign_change": action}, "suspend_timeout_s": 600.0}
+    assert rig.run(rig.recipe(guards=rules, acquire={"duration_s": 20.0})).state == state
+    assert 0 <= seen[0] - off_s[0] <= POLL_S + 1.0
+    event = next(event for event in rig.journal.events if event.kind == SEEN)
+    assert "chamber: changed by others (event output 1 is off)" in event.message
+    assert ("taken_back" in rig.journal.kinds()) == (action == "take_back")
+
+
 def test_a_profile_of_somebody_cannot_be_taken_back(rig: Any) -> None:
     rig.when_step("acquire", lambda: setattr(rig.chamber, "hindrance", "a profile is running"))
     outcome = rig.run(rig.recipe(guards={"actions": {"foreign_change": "take_back"}}))

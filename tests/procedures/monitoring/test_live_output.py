@@ -11,8 +11,7 @@ import pytest
 from instruments.clock import VirtualClock
 from instruments.interfaces.gyro import Channel, Readings
 from procedures.monitoring.campaign_time import CampaignTime
-from procedures.monitoring.live_output import LiveOutput, Output
-from procedures.monitoring.progress import Progress
+from procedures.monitoring.progress import LiveOutput, Output, Progress
 from tests.helpers.engine_rig import Rig
 
 UNIT: Any = SimpleNamespace(channels=(Channel("gyro_z", "deg/s", 0.5, 1.0), Channel("temperature_c", "deg C", 1.0)))

@@ -49,6 +49,34 @@ def test_a_drift_is_not_continued_beyond_the_last_run() -> None:
     assert found.ratio(1e6) == found.ratio(max(run.t_s for run in runs))
 
 
+def test_a_drift_that_the_scatter_explains_is_not_applied_and_stays_in_u() -> None:
+    """Runs of a noisy computer: rates must not follow a slope that is none, or temperatures get one."""
+    rng, applied, inside = np.random.default_rng(7), [], []
+    for _ in range(400):
+        runs = drawn(rng, 4, 0.010)
+        found = fitted(runs)
+        assert found is not None
+        applied.append(found.is_drift_applied)
+        ends = [found.ratio(t_s) for t_s in (runs[0].t_s, runs[-1].t_s)]
+        assert (ends[0] == ends[1]) is not found.is_drift_applied
+        assert found.u_ppm(runs[-1].t_s) > 1.2 * found.u_ppm(found.middle_s)
+        inside.append(1e6 * abs(ends[1] - (1 - 350e-6)) <= found.expanded_ppm(runs[-1].t_s))
+    assert 0.025 < np.mean(applied) < 0.08  # of a level of confidence of 95 %
+    assert np.mean(inside) >= 0.94
+
+
+@pytest.mark.parametrize("ppm_per_h", [2.0, 10.0, 20.0, 40.0])
+def test_a_drift_that_is_left_out_is_within_u_at_the_last_run(ppm_per_h: float) -> None:
+    rng, inside = np.random.default_rng(8), []
+    for _ in range(400):
+        runs = drawn(rng, 4, 0.005, ppm_per_h=ppm_per_h)
+        found = fitted(runs)
+        assert found is not None
+        true = 1 + 1e-6 * (-350.0 + ppm_per_h * found.until_s / 3600)
+        inside.append(1e6 * abs(found.ratio(found.until_s) - true) <= found.expanded_ppm(found.until_s))
+    assert np.mean(inside) >= 0.93
+
+
 def test_too_few_runs_give_no_scatter_and_no_clock() -> None:
     runs = drawn(np.random.default_rng(0), 1, 0.001)
     assert fitted([]) is None

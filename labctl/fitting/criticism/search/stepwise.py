@@ -5,20 +5,23 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+from numpy.typing import NDArray
+
 from labctl.fitting.criticism.channel_functions import smooth_channels
 from labctl.fitting.criticism.evidence.design import Discrepancy
+from labctl.fitting.criticism.evidence.gains import solve_option
 from labctl.fitting.criticism.model_comparison import Comparison, compare_beside, on_axis
-from labctl.fitting.criticism.ranking import are_exact
+from labctl.fitting.criticism.ranking import Candidate, are_exact
 from labctl.fitting.criticism.search.discrepancy import discrepancies, drivers, together
 from labctl.fitting.criticism.search.exact_shapes import with_exact_terms
 from labctl.fitting.criticism.search.free_shapes import beside_terms, channels_beside_smooth, channels_of_free_shape
 from labctl.fitting.criticism.search.held_out import held_out_rises
-from labctl.fitting.criticism.search.merging import merged
 from labctl.fitting.criticism.search.refinement import refined_term, with_refined_leaders
 from labctl.fitting.criticism.search.remainder import is_better_than_smooth, is_within_noise, remainder_of
-from labctl.fitting.criticism.search.shape_error import is_shape_error
 from labctl.fitting.criticism.search.steps import may_be_step
 from labctl.fitting.criticism.verdict import (
+    ALIKE,
     ENOUGH,
     FAR,
     LEAD,
@@ -29,12 +32,86 @@ from labctl.fitting.criticism.verdict import (
     axes_of,
     channels_behind,
     confounded_with,
+    is_at_end,
     is_of_another_law,
     judge,
     not_physical_group,
     overlap,
 )
 from labctl.fitting.effects import CATALOGUE, Effect, Term
+
+#: The next effect is only named when its evidence, where it does most, is at least this share of the evidence for the
+#: one before: less is the residue of a wrong shape of the one before.
+NEXT_SHARE = 0.04
+#: The same after effects that could not be distinguished: one of the others may fit better than the one that was added.
+NEXT_SHARE_AMBIGUOUS = 0.08
+#: Least share of an effect that is assumed within data sets, and between them.
+LEAST_PART = 0.05
+
+
+def is_shape_error(before: Comparison, named: Step, after: Comparison, step: Step) -> bool:
+    """Return whether the new leader may be the residue of a wrong shape of the effect that was just added.
+
+    The two are compared where the new leader is largest, within data sets or between them: the wrong shape of a wave
+    within data sets leaves waves, and hardly anything between them. Beside an effect of the temperature, another one
+    of which the shortest time constant fits best is the delay of the first.
+    """
+    if step.leader is None or named.leader is None or are_exact(step.leader, named.leader):
+        return False
+    both = all(leader.id in CATALOGUE and CATALOGUE[leader.id].by_temperature for leader in (named.leader, step.leader))
+    if both and is_at_end(after, step.leader, shortest=True):
+        return True
+    least = NEXT_SHARE if _are_one(before, named) else NEXT_SHARE_AMBIGUOUS
+    of_new, of_old = _within_and_between(after, step.leader), _within_and_between(before, named.leader)
+    there = int(np.argmax(of_new))
+    could = max(float(of_old[there]), LEAST_PART) * named.leader.log_bf
+    return bool(of_new[there] * step.leader.log_bf < least * could)
+
+
+def _are_one(comparison: Comparison, named: Step) -> bool:
+    """Return whether a group is one effect, or several that each reproduce the leader's signal."""
+    others = [c for c in comparison.candidates if not c.smooth and c.id in named.group[1:]]
+    return all(overlap(comparison, named.leader, other) > ALIKE for other in others) if named.leader else False
+
+
+def _within_and_between(comparison: Comparison, candidate: Candidate) -> NDArray[np.float64]:
+    """Return the shares of a candidate's signal beside the base that lie within data sets, and between them."""
+    total = np.zeros(2)
+    for axis, index in candidate.option.items():
+        design, found = comparison.designs[axis], comparison.axes[axis]
+        values, _ = solve_option(found.best, found.slices[index])
+        scale = comparison.scales[axis].copy()
+        scale[0] = np.sqrt(comparison.white_var[axis] + found.best.noise.size_dps**2)
+        kept = design.present
+        base, signal = (rows[kept] / scale[kept][:, None] for rows in (design.base, design.options[index].rows))
+        size = np.maximum(np.linalg.norm(base, axis=0), 1e-300)
+        taken, *_ = np.linalg.lstsq(base / size, signal @ values, rcond=1e-9)
+        left = np.zeros(kept.shape)
+        left[kept] = signal @ values - base / size @ taken
+        total += (np.sum(left[1:] ** 2), np.sum(left[0] ** 2))
+    return np.asarray(total / max(float(total.sum()), 1e-300))
+
+
+def merged(apart: Mapping[str, Verdict], joint: Verdict) -> Verdict:
+    """Return the verdict of the axes, each with causes of its own; the joint one where an axis stays unexplained."""
+    if any(verdict.form == "unexplained" for verdict in apart.values()):
+        return joint
+    axes: dict[tuple[str, ...], tuple[str, ...]] = {}
+    for axis, verdict in apart.items():
+        for group in verdict.groups:
+            same = next((known for known in axes if known[0] == group[0]), group)
+            axes[same] = (*axes.get(same, ()), axis)
+    if not axes:
+        return joint
+    terms = {name: term for verdict in apart.values() for name, term in verdict.terms.items()}
+    remainders = [verdict.remainder for verdict in apart.values() if verdict.remainder is not None]
+    return Verdict(
+        "missing" if all(len(group) == 1 for group in axes) else "ambiguous", tuple(axes), joint.depends_on,
+        terms={group[0]: terms[group[0]] for group in axes if group[0] in terms},
+        remainder=max(remainders, key=lambda each: float(each["share"]), default=None),
+        axes={group[0]: where for group, where in axes.items()},
+    )  # fmt: skip
+
 
 #: How many effects may be found missing one after the other.
 STEPS = 4

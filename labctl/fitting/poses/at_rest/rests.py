@@ -125,6 +125,13 @@ def _density(
     return np.asarray(np.maximum(squares / freedom * size * spacing_s, white / 4))
 
 
+def density_in_rests(channels: NDArray[np.float64], rests: Rests, spacing_s: float) -> Array:
+    """Return the variance of a mean over one second of other channels (n, c) in the same rests, (c,)."""
+    size = max(round(WINDOW_S / spacing_s), LEAST_IN_WINDOW)
+    variances = [channels[a:b].var(axis=0, ddof=1) for a, b in zip(rests.begin, rests.end, strict=True)]
+    return _density(channels, rests.begin, rests.end, size, spacing_s, np.sqrt(np.median(variances, axis=0)))
+
+
 def _require_quiet(serial: str, noise: Array) -> None:
     """Raise NotEnoughData where even the quietest windows scatter as no sensor at rest does."""
     accel, gyro = float(noise[:3].max()), float(noise[3:].max())

@@ -9,21 +9,183 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labctl.json_types.inspection import CourseJson, MarkJson
+from labctl.recording.columns import BY_NAME
+from labctl.recording.points import dataset_starts
 from labctl.recording.recording import Recording
 from labctl.recording.sanity.finding import Finding
 from labctl.recording.sanity.readings.changes import check_noise, check_sampling
 from labctl.recording.sanity.readings.clock import check_clock, check_gaps
 from labctl.recording.sanity.readings.constant import check_frozen, check_repeated
-from labctl.recording.sanity.readings.courses import courses_of, joined_courses, marks_of
 from labctl.recording.sanity.readings.exchanged import check_exchanged
 from labctl.recording.sanity.readings.factors import check_factors
-from labctl.recording.sanity.readings.limits import check_clipped, check_steps
 from labctl.recording.sanity.readings.lines import check_lines
 from labctl.recording.sanity.readings.mixture import check_copies, check_devices, check_units
-from labctl.recording.sanity.readings.series import Marked, Rows, Series, series_of
+from labctl.recording.sanity.readings.series import (
+    Array,
+    Marked,
+    Rows,
+    Series,
+    measured_names,
+    rows_in_words,
+    runs,
+    series_of,
+    spread_of,
+)
 from labctl.recording.sanity.readings.shifted import check_shifted
 from labctl.recording.sanity.readings.sudden import check_moved, check_spikes
 from labctl.recording.sanity.readings.thermometers import check_thermometers
+
+#: Bins of a course, at most; readings below twice as many are drawn one by one.
+BINS = 600
+#: Places of one finding that are drawn, at most: the longest.
+PLACES = 60
+
+
+def courses_of(recording: Recording) -> list[CourseJson]:
+    """Return the course of each measured channel of readings; nothing for means and tables."""
+    if recording.info.kind != "samples" or "t_s" not in recording.columns or not len(recording):
+        return []
+    t_s = np.asarray(recording.columns["t_s"], dtype=np.float64)
+    begins, breaks = _bins(np.asarray(recording.columns["dataset"], dtype=np.int64))
+    channels = [(f"gyro_{axis}", recording.gyro_dps(axis), "deg/s") for axis in recording.info.axes]
+    channels += [
+        (name, np.asarray(recording.columns[name], dtype=np.float64), BY_NAME[name].unit)
+        for name in measured_names(recording.columns)
+    ]
+    return [_course(name, unit, t_s, values, begins, breaks) for name, values, unit in channels]
+
+
+def _bins(dataset: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Return the first row of each bin, (k,), and before which of them a data set ends, (k,)."""
+    n = len(dataset)
+    starts = dataset_starts(dataset)
+    even = np.arange(n) if n <= 2 * BINS else np.linspace(0, n, BINS + 1).astype(np.int64)[:-1]
+    begins = np.union1d(even, starts) if len(starts) <= BINS else even
+    breaks = np.isin(begins, starts[1:])
+    return begins, breaks
+
+
+def _course(
+    name: str, unit: str, t_s: Array, values: Array, begins: NDArray[np.int64], breaks: NDArray[np.bool_]
+) -> CourseJson:
+    low, high = np.fmin.reduceat(values, begins), np.fmax.reduceat(values, begins)
+    at = np.flatnonzero(breaks)
+    times, lows, highs = (np.insert(each.astype(np.float64), at, np.nan) for each in (t_s[begins], low, high))
+    return {
+        "channel": name, "unit": unit, "t_s": _numbers(times), "low": _numbers(lows), "high": _numbers(highs),
+        "readings": int(np.isfinite(values).sum()), "bins": len(begins),
+    }  # fmt: skip
+
+
+def _numbers(values: Array) -> list[float | None]:
+    return [float(value) if np.isfinite(value) else None for value in values.tolist()]
+
+
+def marks_of(recording: Recording, found: Sequence[Marked]) -> list[MarkJson]:
+    """Return where each finding is, by time."""
+    t_s = np.asarray(recording.columns["t_s"], dtype=np.float64) if found else np.zeros(0)
+    return [_mark(each, t_s) for each in found]
+
+
+def _mark(marked: Marked, t_s: Array) -> MarkJson:
+    whole = bool(marked.rows.all())
+    places = [] if whole else list(runs(marked.rows))
+    longest = sorted(sorted(places, key=lambda place: place[0] - place[1])[:PLACES])
+    channel = marked.finding.channel
+    return {
+        "what": marked.finding.what, "channel": "" if channel == "t_s" else channel,
+        "from_s": [float(t_s[max(begin - 1, 0)]) for begin, _ in longest],
+        "until_s": [float(t_s[min(end, len(t_s) - 1)]) for _, end in longest],
+        "places": len(places), "whole": whole,
+    }  # fmt: skip
+
+
+def joined_courses(parts: Sequence[list[CourseJson]]) -> list[CourseJson]:
+    """Return the courses of parts of a recording as one for each channel."""
+    joined: dict[str, CourseJson] = {}
+    for course in (course for part in parts for course in part):
+        known = joined.get(course["channel"])
+        if known is None:
+            joined[course["channel"]] = course
+            continue
+        joined[course["channel"]] = {
+            "channel": course["channel"], "unit": course["unit"], "t_s": [*known["t_s"], None, *course["t_s"]],
+            "low": [*known["low"], None, *course["low"]], "high": [*known["high"], None, *course["high"]],
+            "readings": known["readings"] + course["readings"], "bins": known["bins"] + course["bins"],
+        }  # fmt: skip
+    return list(joined.values())
+
+
+#: An output is coarse whose step is above so many times the noise that its readings have, steps included.
+COARSE_STEP = 1.9
+#: Readings at the end of a range, at least: of an output in fine steps, of any other.
+LEAST_IN_STEPS, LEAST_EQUAL = 30, 8
+#: An output is clipped where so many readings are expected beyond its last code, or the last code has this many times
+#: the readings of the code before. Steps above this many noises leave no shape that could tell.
+BEYOND, PILE, COARSE = 20.0, 2.5, 1.2
+
+
+def check_steps(series: Series) -> Iterator[Marked]:
+    """Yield the outputs whose steps are larger than their noise."""
+    for name, values in series.outputs.items():
+        step, spread = series.code_steps[name], spread_of(values)
+        if not step or step < COARSE_STEP * spread:
+            continue
+        yield Marked(
+            Finding(
+                "quantised", "likely", name,
+                f"the output changes in steps of {step:.4g} deg/s, and its readings differ by {spread:.2g} deg/s from "
+                "one to the next",
+                step, "deg/s", "a step below twice the noise", "log the output with more digits or a finer converter",
+                channel=name, n=len(series),
+            ),
+            np.ones(len(series), dtype=bool),
+        )  # fmt: skip
+
+
+def check_clipped(series: Series, repeated: Rows) -> Iterator[Marked]:
+    """Yield the outputs that pile up at an end of their range."""
+    for name, values in series.outputs.items():
+        step, noise = series.code_steps[name], series.noises[name]
+        ends = []
+        for sign in (1.0, -1.0):
+            turned = sign * values
+            top = float(turned.max())
+            at_end = turned >= top - 0.25 * step if step else turned == top
+            if _is_pile(turned[~repeated], at_end[~repeated], top, step, noise):
+                ends.append((sign * top, at_end))
+        if not ends:
+            continue
+        rows = np.any([at_end for _, at_end in ends], axis=0)
+        shown = " and ".join(f"{top:.5g}" for top, _ in ends)
+        yield Marked(
+            Finding(
+                "clipped", "likely", f"{name}, {rows_in_words(rows)}",
+                f"{int(rows.sum())} readings are exactly at {shown} deg/s, and none beyond",
+                ends[0][0], "deg/s", "readings that thin out towards the ends of their range",
+                "leave out the data sets or readings at the limit, or measure at lower rates or in a larger range: "
+                "means of clipped readings are too small",
+                channel=name, n=int(rows.sum()), may_leave_out=True,
+            ),
+            rows,
+        )  # fmt: skip
+
+
+def _is_pile(values: Array, at_end: Rows, top: float, step: float, noise: float) -> bool:
+    n_end = int(at_end.sum())
+    if n_end == len(values) or (noise == 0 and step):
+        return False
+    if not step:
+        return n_end >= LEAST_EQUAL
+    if n_end < LEAST_IN_STEPS or step > COARSE * noise:
+        return False
+    width = step * max(round(0.5 * noise / step), 1)  # codes that are much finer than the noise hold too few readings
+    below = top - 0.5 * step - width * np.arange(3)
+    before = int(np.sum((values < below[0]) & (values >= below[1])))
+    second = int(np.sum((values < below[1]) & (values >= below[2])))
+    ratio = n_end / max(before, 1)
+    return ratio > PILE or n_end * ratio * min(ratio / max(before / max(second, 1), 1e-9), 1.0) > BEYOND
+
 
 Indices = NDArray[np.int64]
 #: What a finding explains of others: of any rows, or of rows that it covers.

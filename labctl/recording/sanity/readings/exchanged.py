@@ -14,7 +14,6 @@ from labctl.recording.sanity.readings.factors import (
     NOISE_CHANGES,
     U_LOG_NOISE,
     beside,
-    candidates,
     edges_of,
 )
 from labctl.recording.sanity.readings.series import Marked, Series, spread_of
@@ -31,8 +30,8 @@ def check_exchanged(series: Series) -> Iterator[Marked]:
     for one, other in combinations(fine, 2):
         places = (
             part.start + row
-            for part in series.parts
-            for row in sorted({row for name in (one, other) for row in candidates(series.outputs[name][part])})
+            for k, part in enumerate(series.parts)
+            for row in sorted({row for name in (one, other) for row in series.largest_changes[name][k]})
             if _is_exchanged(series, (one, other), part, row)
         )
         first = next(places, None)

@@ -3,16 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from labctl.recording.sanity.finding import Finding
-from labctl.recording.sanity.readings.series import Array, Marked, Series, spread_of
+from labctl.recording.sanity.readings.series import (
+    GUARD,
+    LEAST_BESIDE,
+    MOST_BESIDE,
+    Array,
+    Marked,
+    Series,
+    spread_of,
+)
 
-#: Readings on either side of a row that show level and noise, at least and at most, and those next to it left out.
-LEAST_BESIDE, MOST_BESIDE, GUARD = 12, 120, 3
 DEG_PER_RAD = 180.0 / np.pi
 #: Factors of a range that was switched while the old scale was kept; a gain of any other size is no switch.
 RANGES = (2.0, 4.0, 8.0, 16.0)
@@ -30,8 +37,6 @@ LEVEL_SHARE = 1e-3
 AT_ONCE, AT_ONCE_SHARE, LEVEL_NOISES = 3, 0.35, 3.0
 #: The noise of all readings after a row over that of all before it is the factor, within this, as a logarithm.
 LASTS = 0.4
-#: Rows with the largest changes that are examined in a data set.
-CANDIDATES = 3
 
 
 @dataclass(frozen=True)
@@ -51,69 +56,58 @@ def check_factors(series: Series) -> Iterator[Marked]:
     for name, values in series.outputs.items():
         if series.code_steps[name] > COARSE * series.noises[name]:
             continue
-        changes = [(part.start, change) for part in series.parts if (change := _change(series, values[part]))]
+        changes = [
+            (part.start, change)
+            for part, rows in zip(series.parts, series.largest_changes[name], strict=True)
+            if (change := _change(series, values[part], rows))
+        ]
         if changes:
             found[name] = max(changes, key=lambda each: each[1].size)
     for name, (start, change) in found.items():
         yield _marked(series, name, start + change.row, change)
 
 
-def _change(series: Series, values: Array) -> Change | None:
-    """Return the surest change by a factor within the readings of a data set, (n,)."""
+def _change(series: Series, values: Array, rows: Iterable[int]) -> Change | None:
+    """Return the surest change by a factor at one of some rows within the readings of a data set, (n,)."""
     factors = [DEG_PER_RAD, 1 / DEG_PER_RAD, *RANGES, *(1 / each for each in RANGES)]
     if series.motion == "rates":
         factors.append(-1.0)  # at rest a unit that was turned over shows as much of the Earth's rate
-    changes = [
-        change for row in candidates(values) for factor in factors if (change := _by_factor(values, row, factor))
-    ]
+    changes = [change for row in rows for change in _by_factors(values, row, factors)]
     return max(changes, key=lambda each: each.size, default=None)
 
 
-def candidates(values: Array) -> list[int]:
-    """Return the rows at which the level, or the noise, of (n,) readings changes most; none of too few readings."""
-    n = len(values)
-    if n < 2 * (LEAST_BESIDE + GUARD):
-        return []
-    beside = int(np.clip(n // 8, LEAST_BESIDE, MOST_BESIDE // 2))
-    at = np.arange(LEAST_BESIDE, n - LEAST_BESIDE + 1)
-    low, high = np.maximum(at - beside, 0), np.minimum(at + beside, n)
-    third = np.abs(np.diff(values, 3))
-    jerk = np.log(np.maximum(np.concatenate([third[:1], third, third[-2:]]), 1e-12 + float(np.median(third)) / 100.0))
-    rows: list[int] = []
-    for course in (np.clip(values, *np.percentile(values, [0.5, 99.5])), jerk):
-        total = np.concatenate([[0.0], np.cumsum(course - course.mean())])
-        step = np.abs((total[high] - total[at]) / (high - at) - (total[at] - total[low]) / (at - low))
-        for _ in range(CANDIDATES):
-            best = int(np.argmax(step))
-            rows.append(int(at[best]))
-            step[max(best - beside, 0) : best + beside] = 0.0
-    return rows
-
-
-def _by_factor(values: Array, row: int, factor: float) -> Change | None:
-    """Return the change at a row if level and noise beside it agree with a factor, and not with none."""
-    before, after = beside(values, row)
+def _by_factors(values: Array, row: int, factors: Sequence[float]) -> Iterator[Change]:
+    """Yield the change at a row by each factor that level and noise beside it agree with, and not with none."""
     edges = edges_of(values, row)
-    noises = [spread_of(each) for each in (before, after)] if edges else [0.0]
-    if edges is None or min(noises) <= 0:
-        return None
+    if edges is None:
+        return
     levels, u = edges[::2], edges[1::2]
+    if abs(levels[1] - levels[0]) < LEVEL_CHANGES * math.hypot(*u):
+        return
+    before, after = beside(values, row)
+    noises = [spread_of(each) for each in (before, after)]
+    if min(noises) <= 0:
+        return
+    size = abs(levels[1] - levels[0]) / math.hypot(*u)
     u_noise = U_LOG_NOISE * float(np.hypot(1 / np.sqrt(len(before)), 1 / np.sqrt(len(after))))
     ratio = float(np.log(noises[1] / noises[0]))
-    if abs(ratio - np.log(abs(factor))) > AGREES * u_noise:
-        return None
-    expected = factor * levels[0]
-    u_level = math.hypot(factor * u[0], u[1], LEVEL_SHARE * expected)
-    size = abs(levels[1] - levels[0]) / math.hypot(*u)
-    if abs(levels[1] - expected) > AGREES * u_level or size < LEVEL_CHANGES:
-        return None
-    if factor == -1.0:
-        known = min(abs(level) for level in levels) > LEVEL_NOISES * max(noises)
-        return Change(row, factor, size) if known and _is_at_once(values, row, levels[1] - levels[0]) else None
-    lasts = abs(np.log(spread_of(values[row + GUARD :]) / spread_of(values[: row - GUARD]) / factor)) < LASTS
-    if abs(ratio) < NOISE_CHANGES * u_noise or not lasts:
-        return None
-    return Change(row, factor, size)
+    for factor in factors:
+        expected = factor * levels[0]
+        u_level = math.hypot(factor * u[0], u[1], LEVEL_SHARE * expected)
+        if abs(ratio - math.log(abs(factor))) > AGREES * u_noise or abs(levels[1] - expected) > AGREES * u_level:
+            continue
+        if factor == -1.0:
+            known = min(abs(level) for level in levels) > LEVEL_NOISES * max(noises)
+            agrees = known and _is_at_once(values, row, levels[1] - levels[0])
+        else:
+            agrees = abs(ratio) >= NOISE_CHANGES * u_noise and _lasts(values, row, factor)
+        if agrees:
+            yield Change(row, factor, size)
+
+
+def _lasts(values: Array, row: int, factor: float) -> bool:
+    """Whether the noise of all readings after a row, of (n,), over that of all before it is a factor."""
+    return bool(abs(np.log(spread_of(values[row + GUARD :]) / spread_of(values[: row - GUARD]) / factor)) < LASTS)
 
 
 def beside(values: Array, row: int) -> tuple[Array, Array]:
@@ -141,11 +135,19 @@ def _is_at_once(values: Array, row: int, change: float) -> bool:
 def _at_edge(values: Array, *, last: bool) -> tuple[float, float]:
     """Return the level of (n,) readings that drift evenly at their last or first row, and its uncertainty."""
     n = len(values)
-    x = np.linspace(-0.5, 0.5, n)
-    middle, slope = float(values.mean()), float(values @ x) / float(x @ x)
+    x, squares = _evenly(n)
+    middle, slope = float(values.mean()), float(values @ x) / squares
     residual = values - middle - slope * x
     u = float(np.sqrt(np.sum(residual**2) / max(n - 2, 1)))
     return middle + slope * (0.5 if last else -0.5), 2.0 * u / np.sqrt(n)
+
+
+@lru_cache(maxsize=MOST_BESIDE + 1)
+def _evenly(n: int) -> tuple[Array, float]:
+    """Return n places from -0.5 to 0.5, and the sum of their squares; the same of every stretch that long."""
+    x = np.linspace(-0.5, 0.5, n)
+    x.flags.writeable = False
+    return x, float(x @ x)
 
 
 def _marked(series: Series, name: str, row: int, change: Change) -> Marked:

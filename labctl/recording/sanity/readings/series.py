@@ -20,6 +20,10 @@ ROBUST = 1.4826
 SAME_CODE = 1e-9
 #: Readings that show the steps between the codes of a channel.
 CODE_READINGS = 20_000
+#: Readings on either side of a row that show level and noise, at least and at most, and those next to it left out.
+LEAST_BESIDE, MOST_BESIDE, GUARD = 12, 120, 3
+#: Rows with the largest changes of each kind that are examined in a data set.
+CANDIDATES = 3
 
 
 @dataclass(frozen=True)
@@ -75,6 +79,11 @@ class Series:
     def code_steps(self) -> Mapping[str, float]:
         """Smallest step between two codes of each output, deg/s; 0 where hardly a value comes twice."""
         return {name: code_step(values) for name, values in self.outputs.items()}
+
+    @cached_property
+    def largest_changes(self) -> Mapping[str, list[list[int]]]:
+        """Of each output, and each of `parts`: the rows of the part at which its level or noise changes most."""
+        return {name: [largest_changes(values[part]) for part in self.parts] for name, values in self.outputs.items()}
 
 
 @dataclass(frozen=True)
@@ -166,6 +175,27 @@ def code_step(values: Array) -> float:
     apart = np.diff(codes)
     apart = apart[apart > SAME_CODE * float(np.abs(codes).max())]
     return float(apart.min()) if len(apart) else 0.0
+
+
+def largest_changes(values: Array) -> list[int]:
+    """Return the rows at which the level, or the noise, of (n,) readings changes most; none of too few readings."""
+    n = len(values)
+    if n < 2 * (LEAST_BESIDE + GUARD):
+        return []
+    beside = int(np.clip(n // 8, LEAST_BESIDE, MOST_BESIDE // 2))
+    at = np.arange(LEAST_BESIDE, n - LEAST_BESIDE + 1)
+    low, high = np.maximum(at - beside, 0), np.minimum(at + beside, n)
+    third = np.abs(np.diff(values, 3))
+    jerk = np.log(np.maximum(np.concatenate([third[:1], third, third[-2:]]), 1e-12 + float(np.median(third)) / 100.0))
+    rows: list[int] = []
+    for course in (np.clip(values, *np.percentile(values, [0.5, 99.5])), jerk):
+        total = np.concatenate([[0.0], np.cumsum(course - course.mean())])
+        step = np.abs((total[high] - total[at]) / (high - at) - (total[at] - total[low]) / (at - low))
+        for _ in range(CANDIDATES):
+            best = int(np.argmax(step))
+            rows.append(int(at[best]))
+            step[max(best - beside, 0) : best + beside] = 0.0
+    return list(dict.fromkeys(rows))
 
 
 def gain_of(values: Array, rate: Array | None) -> float:

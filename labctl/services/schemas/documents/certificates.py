@@ -11,10 +11,26 @@ from pydantic import AfterValidator, Field
 from instruments.laboratory import Laboratory
 from labctl.certificates.document import Customer, DecisionRule, Use
 from labctl.services.schemas.base import BY_KEY, LongText, Request, ResponseModel
+from labctl.services.schemas.common_fields import CertificateNumber, Serial, VersionNumber
 
 #: Most characters of a text, and of one that is one line of a certificate.
 TEXT, LINE = 2000, 300
 CertificateState = Literal["valid", "amended", "superseded", "withdrawn"]
+
+# descriptions of the state of a certificate, for those who keep it and for the public
+STATE = (
+    "withdrawn: by its number, or with its version; amended: another certificate of the version replaces it "
+    "(`replaced_by`); superseded: another version was certified later and has a certificate (`superseded_by`); valid: "
+    "none of these."
+)
+STATE_SINCE = "When it came into this state; of a valid certificate the time of issue."
+STATE_REASON = "Why it is in this state; empty for a valid certificate."
+STATE_BY = "Name of the person whose act brought it into this state; of a valid certificate, who issued it."
+REPLACED_BY = "Number of the certificate of the same version that was issued in place of this one; null: none."
+SUPERSEDED_BY = (
+    "Number of the certificate of the version that was certified last; null: it is of this version, or was withdrawn."
+)
+VALID_INSTEAD = "Number of the unit's valid certificate; null: it is this one, or none is valid."
 
 
 def _in_order(given: tuple[float, float]) -> tuple[float, float]:
@@ -26,8 +42,10 @@ def _in_order(given: tuple[float, float]) -> tuple[float, float]:
 class OrderedItem(Request):
     """What the laboratory noted of the item when it came."""
 
-    description: str = Field(default="Gyroscope", max_length=LINE)
-    manufacturer: str = Field(default="", max_length=LINE)
+    description: str = Field(
+        default="Gyroscope", max_length=LINE, description="Kind of item, as the certificate names it."
+    )
+    manufacturer: str = Field(default="", max_length=LINE, description="Manufacturer of the item; empty: not stated.")
     identification: str = Field(default="", max_length=LINE, description="The customer's own number of the item.")
     condition: LongText = Field(default="", max_length=TEXT, description="Condition of the item on receipt.")
     received: date | None = Field(default=None, description="Date of receipt; null: the results do not depend on it.")
@@ -48,14 +66,18 @@ class OrderedMethod(Request):
         default=None,
         description="First day of the measurements; only for an imported recording, since a campaign knows its dates.",
     )
-    performed_until: date | None = None
+    performed_until: date | None = Field(
+        default=None, description="Last day of the measurements; only for an imported recording; null: the same day."
+    )
 
 
 class OrderedConformity(Request):
     """The specification to which conformity is to be stated, and the rule."""
 
-    specification: str = Field(min_length=1, max_length=LINE)
-    limit_dps: float = Field(gt=0, allow_inf_nan=False, description="Largest permitted error of a corrected rate.")
+    specification: str = Field(min_length=1, max_length=LINE, description="Specification, as the certificate names it.")
+    limit_dps: float = Field(
+        gt=0, allow_inf_nan=False, description="Largest permitted error of a corrected rate, deg/s."
+    )
     about: Use = Field(
         default="any axis",
         description="Rotations that the statement holds for. any axis: rate vectors of any direction up to the "
@@ -112,9 +134,11 @@ class OrderedMagnetometer(OrderedSensor):
 class CertificateOrder(Request):
     """The facts of the order: what a campaign cannot know. They are kept with the certificate."""
 
-    customer: Customer = Customer()
-    item: OrderedItem = OrderedItem()
-    method: OrderedMethod = OrderedMethod()
+    customer: Customer = Field(default=Customer(), description="The customer who ordered the calibration.")
+    item: OrderedItem = Field(default=OrderedItem(), description="The item as the laboratory received it.")
+    method: OrderedMethod = Field(
+        default=OrderedMethod(), description="Facts of the method that the recipe does not state."
+    )
     environment: RoomConditions = Field(
         default=RoomConditions(),
         description="Environment of the room where none was recorded (`POST /api/environment`) during the campaign.",
@@ -150,7 +174,9 @@ class CertificateRequest(Request):
     """Issue the certificate of a version, or an amended one."""
 
     by: str = Field(min_length=1, max_length=200, description="Name of the person who issues the certificate.")
-    order: CertificateOrder = CertificateOrder()
+    order: CertificateOrder = Field(
+        default=CertificateOrder(), description="The facts of the order; they are kept with the certificate."
+    )
     amend: str | None = Field(
         default=None,
         min_length=1,
@@ -170,7 +196,7 @@ class SignatoryResponse(ResponseModel):
 class WithdrawRequest(Request):
     """Withdraw a certificate; it stays withdrawn, and its bytes stay what they are."""
 
-    number: str = Field(min_length=1, max_length=100, description="Number of the certificate.")
+    number: CertificateNumber = Field(min_length=1, max_length=100)
     by: str = Field(min_length=1, max_length=200, description="Name of the person who withdraws it.")
     reason: str = Field(min_length=1, max_length=TEXT, description="Why; the list, the file and the page say it.")
 
@@ -178,42 +204,28 @@ class WithdrawRequest(Request):
 class CertificateResponse(ResponseModel):
     """A certificate that was issued, and its state now."""
 
-    serial: str
-    version: int
-    number: str
-    issued_at: datetime
-    by: str
+    serial: Serial
+    version: VersionNumber
+    number: CertificateNumber
+    issued_at: datetime = Field(description="Time of issue.")
+    by: str = Field(description="Name of the person who issued the certificate.")
     by_key: str | None = Field(default=None, description=BY_KEY)
     hash: str = Field(description="SHA-256 of the certificate in its JSON form.")
     replaces: str | None = Field(
         description="Number of the earlier certificate that this certificate replaces; null: none."
     )
     reason: str = Field(description="Why this certificate replaces an earlier one; empty: it replaces none.")
-    replaced_by: str | None = Field(
-        default=None,
-        description="Number of the certificate of the same version that was issued in place of this one; null: none.",
-    )
+    replaced_by: str | None = Field(default=None, description=REPLACED_BY)
     signed_by: SignatoryResponse | None = Field(
         default=None, description="Who signed the PDF (PAdES) and the DCC (XAdES); null: they have no signature."
     )
-    superseded_by: str | None = Field(
-        default=None,
-        description="Number of the certificate of the version that was certified last; null: it is of this version, "
-        "or was withdrawn.",
-    )
-    state: CertificateState = Field(
-        default="valid",
-        description="withdrawn: by its number, or with its version; amended: another certificate of the version "
-        "replaces it (`replaced_by`); superseded: another version was certified later and has a certificate "
-        "(`superseded_by`); valid: none of these.",
-    )
-    state_since: datetime | None = Field(default=None, description="When it came into this state.")
-    state_reason: str = Field(default="", description="Why it is in this state; empty for a valid certificate.")
-    state_by: str = Field(default="", description="Name of the person whose act brought it into this state.")
+    superseded_by: str | None = Field(default=None, description=SUPERSEDED_BY)
+    state: CertificateState = Field(default="valid", description=STATE)
+    state_since: datetime | None = Field(default=None, description=STATE_SINCE)
+    state_reason: str = Field(default="", description=STATE_REASON)
+    state_by: str = Field(default="", description=STATE_BY)
     state_by_key: str | None = Field(default=None, description=BY_KEY)
-    valid_instead: str | None = Field(
-        default=None, description="Number of the unit's valid certificate; null: it is this one, or none is valid."
-    )
+    valid_instead: str | None = Field(default=None, description=VALID_INSTEAD)
     notices: list[str] = Field(
         default_factory=list, description="Findings on the reference standards behind it since it was issued."
     )
@@ -222,20 +234,20 @@ class CertificateResponse(ResponseModel):
 class PublicCertificate(ResponseModel):
     """What the page behind the QR code of a certificate says: its state, and what to compare with the paper."""
 
-    number: str
+    number: CertificateNumber
     hash: str = Field(description="SHA-256 of the certificate in its JSON form.")
     calibration_hash: str = Field(description="SHA-256 of the calibration, as printed on the certificate.")
-    serial: str
-    version: int
-    laboratory: str
-    issued_at: datetime
-    state: CertificateState
-    state_since: datetime | None
-    state_reason: str
-    state_by: str
-    replaced_by: str | None
-    superseded_by: str | None
-    valid_instead: str | None
+    serial: Serial
+    version: VersionNumber
+    laboratory: str = Field(description="Name of the laboratory that issued the certificate.")
+    issued_at: datetime = Field(description="Time of issue.")
+    state: CertificateState = Field(description=STATE)
+    state_since: datetime | None = Field(description=STATE_SINCE)
+    state_reason: str = Field(description=STATE_REASON)
+    state_by: str = Field(description=STATE_BY)
+    replaced_by: str | None = Field(description=REPLACED_BY)
+    superseded_by: str | None = Field(description=SUPERSEDED_BY)
+    valid_instead: str | None = Field(description=VALID_INSTEAD)
     notices: list[str] = Field(
         description="Findings on the reference standards behind it since it was issued; without persons and reasons."
     )

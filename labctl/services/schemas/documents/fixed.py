@@ -28,7 +28,9 @@ Text = Annotated[str, Field(max_length=LONGEST)]
 class FixedCoefficient(Request):
     """A known coefficient: a number, or a list over temperatures."""
 
-    value: Number | Annotated[list[Number], Field(min_length=1, max_length=MOST_TEMPERATURES)]
+    value: Number | Annotated[list[Number], Field(min_length=1, max_length=MOST_TEMPERATURES)] = Field(
+        description="Value of the coefficient, in `unit`; a list: one value for each of `temperature_c`."
+    )
     u: NotNegative | Annotated[list[NotNegative | None], Field(max_length=MOST_TEMPERATURES)] | None = Field(
         default=None, description="Standard uncertainty, in the unit of the value; null: not stated."
     )
@@ -80,9 +82,9 @@ class FixedCoefficients(Request):
     reference_temperature_c: Celsius | None = Field(
         default=None, description="Reference temperature, deg C, from which the temperature terms count."
     )
-    x: AxisCoefficients = Field(default_factory=dict)
-    y: AxisCoefficients = Field(default_factory=dict)
-    z: AxisCoefficients = Field(default_factory=dict)
+    x: AxisCoefficients = Field(default_factory=dict, description="Known coefficients of axis x: name -> value.")
+    y: AxisCoefficients = Field(default_factory=dict, description="Known coefficients of axis y: name -> value.")
+    z: AxisCoefficients = Field(default_factory=dict, description="Known coefficients of axis z: name -> value.")
     file: Text = Field(default="", description="Name of the file that the values are from; used in messages.")
     argument: Literal["rate", "output"] | None = Field(
         default=None, description="`argument` of the model that the values are from; null: that of the fitted model."

@@ -18,7 +18,7 @@ from labctl.services.schemas.documents.certificates import (
 class SigningKeyResponse(SignatoryResponse):
     """The key that signs certificates; the private key is never shown."""
 
-    valid_from: datetime
+    valid_from: datetime = Field(description="First instant at which the key may sign.")
     valid_until: datetime = Field(description="Last instant at which the key may sign.")
     digest: Literal["sha256", "sha384"] = Field(description="Hash that is signed.")
 
@@ -43,7 +43,9 @@ class SignatureResponse(ResponseModel):
 class VerifiedFileResponse(ResponseModel):
     """A file of a certificate, compared with the register of the database, and its signatures."""
 
-    format: Literal["pdf", "xml", "json"]
+    format: Literal["pdf", "xml", "json"] = Field(
+        description="Form of the certificate that the file holds: PDF, XML (DCC) or JSON."
+    )
     sha256: str = Field(description="SHA-256 of the file.")
     number: str | None = Field(description="Number of the certificate that the file states; null: none.")
     in_register: Literal["same", "differs", "unknown"] = Field(
@@ -61,7 +63,7 @@ class VerifiedFileResponse(ResponseModel):
     expected_signers: list[str] = Field(
         description="Signers that were named as expected: subjects or fingerprints; empty: any signer is accepted."
     )
-    signatures: list[SignatureResponse]
+    signatures: list[SignatureResponse] = Field(description="Each signature of the file; empty: it has none.")
     ok: bool = Field(
         description="Whether the file can be relied on: the register or a trusted signature confirms it, no check of "
         "it failed, an expected signer signed it if any is named, and the certificate is not withdrawn."

@@ -8,13 +8,14 @@ from pydantic import Field
 
 from labctl.json_types.poses import AlignmentJson
 from labctl.services.schemas.base import ResponseModel
+from labctl.services.schemas.common_fields import Sentences
 from labctl.services.schemas.reports.magnetometer import Estimate
 
 
 class EarlierVersion(ResponseModel):
     """An earlier version that a calibration by few poses rests on; its bias is not used."""
 
-    version: int
+    version: int = Field(description="Number of that version of the accelerometer.")
     scale_change: float = Field(description="Allowed change of a scale factor since, standard uncertainty.")
     misalignment_change: float = Field(description="Allowed change of a misalignment since, standard uncertainty, rad.")
     p_value: float = Field(
@@ -43,12 +44,14 @@ class AccelerometerResponse(ResponseModel):
         description="adequate: held-out rests are predicted to the noise of their means; unexplained: they are not, "
         "and the uncertainties include what is left."
     )
-    bias_g: dict[str, Estimate]
+    bias_g: dict[str, Estimate] = Field(
+        description="For each axis: bias in units of 9.80665 m/s2, with its standard uncertainty."
+    )
     scale_factor: dict[str, Estimate] = Field(description="Relative errors of the scale factors, by axis.")
     misalignment: dict[str, Estimate] = Field(description="xy, xz, yz: of an axis by the force along another.")
     covariance: list[list[float]] = Field(description="Of bias x, y, z, scale factor x, y, z, misalignment xy, xz, yz.")
     gravity_g: float = Field(description="Local gravity, in units of 9.80665 m/s2.")
-    rests: int
+    rests: int = Field(description="Number of rests, also of those that were left out.")
     left_out: int = Field(description="Rests that do not agree with gravity by five standard deviations.")
     poses: int = Field(description="Different directions among the rests.")
     before_g: float = Field(description="Root mean square by which the raw sizes differ from gravity, g.")
@@ -67,4 +70,4 @@ class AccelerometerResponse(ResponseModel):
         description="Rotation of the gyro triad from the accelerometer triad, deg; null: no gyro, turns that do not "
         "determine it, or a fit over temperature or with an earlier version.",
     )
-    text: list[str]
+    text: Sentences

@@ -7,15 +7,23 @@ from typing import Literal
 from pydantic import Field
 
 from labctl.services.schemas.base import ResponseModel
+from labctl.services.schemas.common_fields import Distribution, DistributionVersion, DriverName, ReadingCount
 
 
 class PromptResponse(ResponseModel):
     """A question to a person; an answer names its id."""
 
-    id: str
-    kind: str
-    text: str
-    position: str | None = None
+    id: str = Field(description="Id of the question, to be named by the answer.")
+    kind: str = Field(
+        description="mount: mount or turn the units; power_on, power_off: switch them; turn: turn them by a known "
+        "angle."
+    )
+    text: str = Field(description="The question in words.")
+    position: str | None = Field(
+        default=None,
+        description="Position to which the units are to be turned; of a turn the axis that points up; null: they "
+        "stay as they are.",
+    )
     turn_deg: float | None = Field(
         default=None,
         description="Only for a turn by hand: angle to turn by, deg, positive counter-clockwise seen from above.",
@@ -45,18 +53,18 @@ class OutputResponse(ResponseModel):
     """What one channel of a unit put out in the last moment, in the channel's unit."""
 
     gyro: str = Field(description="The unit's name on the bench.")
-    channel: str
-    unit: str
-    mean: float
+    channel: str = Field(description="Name of the channel.")
+    unit: str = Field(description="Unit of the channel.")
+    mean: float = Field(description="Mean of the readings, in `unit`.")
     std: float = Field(description="Standard deviation of single readings.")
-    n: int
+    n: ReadingCount
     t_s: float = Field(description="Time of the last reading, s since the campaign began.")
 
 
 class AdviceResponse(ResponseModel):
     """A failed campaign in words: three short sentences."""
 
-    happened: str
+    happened: str = Field(description="What happened.")
     done: str = Field(description="What labctl did.")
     next: str = Field(description="What the operator must do next.")
 
@@ -64,6 +72,6 @@ class AdviceResponse(ResponseModel):
 class DriverResponse(ResponseModel):
     """The driver of an instrument, and the distribution that it came from."""
 
-    driver: str
-    distribution: str
-    version: str
+    driver: DriverName
+    distribution: Distribution
+    version: DistributionVersion

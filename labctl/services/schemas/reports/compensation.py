@@ -5,14 +5,15 @@ from __future__ import annotations
 from pydantic import Field
 
 from labctl.services.schemas.base import ResponseModel
+from labctl.services.schemas.common_fields import FileName
 
 
 class CompensationResponse(ResponseModel):
     """How many rows were corrected, how many of them lay outside the calibration, and where they are."""
 
-    rows: int
+    rows: int = Field(description="Number of rows that were corrected.")
     outside: int = Field(description="Number of rows outside the calibrated rates or temperatures.")
-    file: str
+    file: FileName
     warning: str = Field(
         default="", description="Warning that the calibration is overdue or was revoked; empty: neither."
     )

@@ -7,12 +7,13 @@ from typing import Literal
 from pydantic import Field
 
 from labctl.services.schemas.base import ResponseModel
+from labctl.services.schemas.common_fields import TECHNOLOGY, RecordingNumber, Sentences, Serial, UnitModel
 
 
 class MeasuredUnder(ResponseModel):
     """Conditions of a measured figure."""
 
-    recording: int
+    recording: RecordingNumber
     version: int | None = Field(
         default=None,
         description="Calibration version of which the figure is a coefficient; null: the figure "
@@ -29,8 +30,8 @@ class MeasuredUnder(ResponseModel):
 class Characteristic(ResponseModel):
     """One line of a data sheet."""
 
-    id: str
-    title: str
+    id: str = Field(description="Identifier of the characteristic, for programs.")
+    title: str = Field(description="Name of the characteristic, by IEEE Std 528 or 952.")
     axis: str = Field(description="Output axis, or pair of axes; empty: the figure is of the whole unit.")
     along: str = Field(
         default="", description="Only for the g-sensitivity: the axis along which the specific force acts; else empty."
@@ -40,8 +41,8 @@ class Characteristic(ResponseModel):
     at_most: float | None = Field(
         default=None, description="Upper limit of a figure that cannot be distinguished from zero, in `unit`."
     )
-    unit: str
-    conditions: MeasuredUnder | None
+    unit: str = Field(description="Unit of `value`, `u`, `at_most` and `specified`; 1: a ratio.")
+    conditions: MeasuredUnder | None = Field(description="Conditions of the measurement; null: not measured.")
     specified: float | None = Field(description="Value of the maker's data sheet, in `unit`; null: not stated.")
     specified_as: Literal["at most", "at least"] = Field(
         description="How `specified` limits the figure: its magnitude is at most, or its value is at least, the "
@@ -61,16 +62,16 @@ class Characteristic(ResponseModel):
 class DatasheetResponse(ResponseModel):
     """A unit in the terms of IEEE Std 528 and 952."""
 
-    serial: str
-    model: str
-    technology: str | None
+    serial: Serial
+    model: UnitModel
+    technology: str | None = Field(description=TECHNOLOGY)
     recordings: list[int] = Field(
         description="Ids of the recordings from which the values in this data sheet were computed, ascending."
     )
-    characteristics: list[Characteristic]
+    characteristics: list[Characteristic] = Field(description="Each characteristic, by axis.")
     passed: bool | None = Field(
         description="Whether every figure that is both specified and measured passes; null: there is no such figure."
     )
     not_measured: list[str] = Field(description="Ids of characteristics without a value on any axis.")
-    decision_rule: str
-    text: list[str]
+    decision_rule: str = Field(description="Rule by which `passed` was decided.")
+    text: Sentences

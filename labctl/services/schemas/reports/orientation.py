@@ -7,6 +7,7 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field
 
 from labctl.services.schemas.base import ResponseModel
+from labctl.services.schemas.common_fields import OutputAxis, ReadingCount
 
 #: A declared stop lasts so long, s: 2 s until the offset is learned, and as many readings as make its noise small.
 STOP_S = 10.0
@@ -58,34 +59,37 @@ class OrientationQuery(OrientationOptions):
 class StaticBiasResponse(ResponseModel):
     """The mean output at rest before a mission (Ojeda et al. 2000, eqs. 1, 15 and 16); it contains the Earth's rate."""
 
-    bias_dps: float
+    bias_dps: float = Field(description="Mean output at rest, deg/s.")
     u_dps: float = Field(
         description="Standard uncertainty of the static bias, deg/s, from the white noise of "
         "the mean and the bias instability."
     )
-    readings: int
-    seconds: float
+    readings: ReadingCount
+    seconds: float = Field(description="Duration of the rest, s.")
 
 
 class OrientationResponse(ResponseModel):
     """The angle of one axis, positive counter-clockwise and never wrapped, from its rate."""
 
-    axis: str
+    axis: OutputAxis
     version: int | None = Field(
         description="Version of the calibration by which the rates were corrected; null: no correction."
     )
-    readings: int
+    readings: int = Field(description="Number of valid readings after the warm-up.")
     left_out: int = Field(
         description="Number of readings left out because they were marked invalid or were not numbers."
     )
-    seconds: float
+    seconds: float = Field(description="Time over which the angle was integrated, s.")
     static_bias: StaticBiasResponse | None = Field(
         description="Static bias that was subtracted; null: no rest at the beginning was given."
     )
     angle_deg: float = Field(
         description="Angle at the end, deg; the angle is 0 at the end of the rest at the beginning."
     )
-    drift_between_stops_deg_per_min: list[float] = Field(default_factory=list)  #: with declared stops, of each leg
+    drift_between_stops_deg_per_min: list[float] = Field(
+        default_factory=list,
+        description="For each leg between two declared stops: its drift, deg/min; empty: no stops were declared.",
+    )
     drift_deg_per_min: float | None = Field(
         description="Angle divided by the time, deg/min: the drift if the unit was at rest; null: the time is 0."
     )

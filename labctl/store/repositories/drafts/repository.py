@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from datetime import datetime
+from typing import Literal
 
 import sqlalchemy as sa
 
@@ -12,10 +14,35 @@ from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.manifests.contents import CAMPAIGN
 from labctl.store.repositories.audit import append
-from labctl.store.repositories.drafts.records import OPEN, DraftEvent, DraftRow, DraftState
 from labctl.store.schema import tables
 from labctl.store.sealing.seals import changing
 from procedures.contracts.campaign_state import CampaignState
+
+DraftState = Literal["due", "fitted", "made", "failed"]
+#: States of a draft that still has to be made.
+OPEN: tuple[DraftState, ...] = ("due", "fitted")
+
+
+@dataclass(frozen=True)
+class DraftRow:
+    """The draft of one recording."""
+
+    recording: int
+    campaign: int
+    serial: str
+    state: DraftState
+    version: int | None
+    at: datetime | None
+    reason: str
+    report: JsonObject | None
+
+
+@dataclass(frozen=True)
+class DraftEvent:
+    """What the events of the campaign say of a draft."""
+
+    message: str
+    level: Literal["info", "warning"]
 
 
 class Drafts:

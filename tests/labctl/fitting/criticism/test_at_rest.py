@@ -10,7 +10,7 @@ import pytest
 from labctl.errors import NotEnoughData
 from labctl.fitting.criticism import Criticism, criticise
 from labctl.fitting.criticism.candidates import options_of
-from labctl.fitting.criticism.evidence.plausibility import largest_plausible
+from labctl.fitting.criticism.ranking import largest_plausible
 from labctl.fitting.criticism.reduction import reduce_recording
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.effects import CATALOGUE, Reference

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from labctl.fitting.criticism.diagnostics.thinning import drawn_rows
+from labctl.fitting.criticism.diagnostics.channels import drawn_rows
 from labctl.fitting.data.levels import rate_levels, temperature_rows
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from labctl.fitting.live.calibration import needs_of_turns, next_pose
 from labctl.fitting.live.directions import DIRECTIONS, NEAR_DEG, covered, turn_between
-from labctl.fitting.live.guidance import needs_of_turns, next_pose
 
 
 def test_faces_edges_and_corners_in_this_order() -> None:

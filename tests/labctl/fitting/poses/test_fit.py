@@ -49,7 +49,7 @@ def test_coefficients_cover_the_truth_and_held_out_moves_their_error() -> None:
         figures.append((result.error.rms_dps, result.error.heldout_rms_dps, result.error.noise_floor_dps))
     for kind in ("scale factor", "misalignment", "bias"):
         z = np.array(scores[kind])
-        assert np.mean(np.abs(z) <= 2) > 0.85, kind
+        assert np.mean(np.abs(z) <= 2) > 0.8, kind  # of 30 at least: four standard deviations; the study has more
         assert 0.6 < np.sqrt(np.mean(z**2)) < 1.5, kind
     assert np.mean(within) == pytest.approx(0.955, abs=0.04)
     after, held_out, floor = np.mean(figures, axis=0)

@@ -13,6 +13,7 @@ from labctl.errors import Conflict
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.preparation import prepare
 from labctl.services.campaigns.unattended import abort_abandoned
+from labctl.services.commands.acts.abort import ABORT
 from labctl.services.commands.context import CommandContext
 from labctl.services.commands.requests import ToCampaign
 from labctl.services.commands.service_control import ServiceControl
@@ -41,11 +42,11 @@ def test_a_campaign_that_ended_by_the_stop_is_answered_and_written_down_and_the_
     assert runner.stops.request(StopRequest.new("Ada", "key", "tea", campaign)).campaign == campaign
     runner.close()  # the campaign is over, in the safe state
     asked = ToCampaign(campaign, ReasonRequest(reason="tea"))
-    answer = control.abort(context, asked)
+    answer = control.perform(ABORT, context, asked)
     assert (answer.state, "tea" in answer.reason) == ("aborted", True)
     assert [row.action for row in store.audit.rows()].count("campaign abort") == 1
     with pytest.raises(Conflict, match="has already ended"):
-        control.abort(context, asked)
+        control.perform(ABORT, context, asked)
 
 
 def test_a_stop_that_the_latch_has_is_recorded_once_for_a_campaign_that_no_process_runs(store: Store) -> None:

@@ -23,7 +23,8 @@ from labctl.services.campaigns import preparation, recovery, resume
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.preparation import prepare
 from labctl.services.campaigns.status import campaign_status
-from labctl.services.commands.registry import CANCEL_START, START_CAMPAIGN
+from labctl.services.commands.acts.start import START_CAMPAIGN
+from labctl.services.commands.registry import CANCEL_START
 from labctl.services.commands.requests import CampaignStart, ToStart
 from labctl.services.lab_service import LabService
 from labctl.services.local_bench import LocalBench

@@ -15,6 +15,7 @@ from labctl.services.campaigns import campaign_job
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.preparation import prepare
 from labctl.services.campaigns.status import campaign_status
+from labctl.services.commands.acts.abort import ABORT
 from labctl.services.commands.context import CommandContext
 from labctl.services.commands.requests import ToCampaign
 from labctl.services.commands.service_control import ServiceControl
@@ -174,7 +175,7 @@ def test_an_abort_is_written_down_after_it_is_done(store: Store, monkeypatch: py
     monkeypatch.setattr(store.audit, "record", lambda *given, **who: (done.append(given[1]), real(*given, **who)))
     context = CommandContext(lambda: store, SystemClock(), ServiceControl(runner))
     asked = ToCampaign(prepared.id, ReasonRequest(reason="smoke", by="Ada"))
-    assert context.control.abort(context, asked).unrecorded == ""
+    assert context.control.perform(ABORT, context, asked).unrecorded == ""
     assert done == ["aborted: smoke (Ada)", "campaign abort"]
     last = store.audit.rows()[-1]
     assert (last.action, last.detail["reason"]) == ("campaign abort", "smoke (Ada)")
@@ -183,6 +184,6 @@ def test_an_abort_is_written_down_after_it_is_done(store: Store, monkeypatch: py
         raise StoreError("the disk is full; nothing was stored", cause="the disk is full")
 
     monkeypatch.setattr(store.audit, "record", unwritable)
-    answer = context.control.abort(context, asked)
+    answer = context.control.perform(ABORT, context, asked)
     assert done[-1] == "aborted: smoke (Ada)"
     assert answer.unrecorded == "the campaign was aborted, but that is not in the audit trail: the disk is full"

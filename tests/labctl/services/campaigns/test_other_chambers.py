@@ -52,6 +52,8 @@ def test_a_campaign(store: Store, chamber: str, monkeypatch: pytest.MonkeyPatch)
     prepared = prepare(store, "short", bench, clock, clip=False, opened=open_bench(bench, clock))
     ended = run(store, prepared)
     assert ended.state == "done", ended.reason
+    taken_s = max(step.ended_s or 0.0 for step in store.campaigns.steps(prepared.id))
+    assert taken_s == pytest.approx(prepared.plan.expected_s, rel=0.1)  # as planned, on each of these
     columns = store.recordings.points(ended.recordings["FOG-0001"]).columns
     assert len(columns["dataset"]) == 15
     chamber_c = np.asarray(columns["chamber_c"], dtype=float).reshape(3, 5).mean(axis=1)

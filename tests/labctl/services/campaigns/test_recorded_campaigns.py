@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import json
+import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +12,11 @@ import pytest
 from typer.testing import CliRunner
 
 from instruments.clock import VirtualClock
+from instruments.conformance.described import Tried
 from labctl.cli.app import app
 from labctl.errors import BadInput
 from labctl.processes.settings import ServeRequest
+from labctl.services.benches import described_instruments
 from labctl.services.benches.described_instruments import check_description
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.recorded_campaigns import RecordedCampaigns
@@ -124,6 +127,21 @@ def test_a_description_that_is_tried_on_an_instrument_is_recorded(tmp_path: Path
         replay(file)
     with pytest.raises(BadInput, match="nothing is sent without an instrument"):
         check_description("thermotron", None, None, wire_log=file)
+
+
+def test_a_description_that_fails_leaves_a_log_of_its_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    clock = VirtualClock()
+    answer = check_description("thermotron", None, "127.0.0.1:1", clock=clock)
+    (file,) = tmp_path.iterdir()
+    assert answer.wire_log == str(file)
+    assert lines(file)[0]["session"]["kind"] == "driver test"
+    file.unlink()
+    assert check_description("thermotron", None, None).wire_log is None  # nothing was sent
+    with monkeypatch.context() as patched:
+        patched.setattr(described_instruments, "try_description", lambda *_a, **_k: [Tried("air", "21.0", "")])
+        assert check_description("thermotron", None, "127.0.0.1:1", clock=clock).wire_log is None
+    assert not list(tmp_path.iterdir())
 
 
 def test_lines_of_another_program_are_not_recorded(tmp_path: Path) -> None:

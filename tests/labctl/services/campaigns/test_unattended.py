@@ -25,8 +25,8 @@ from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.execution import run, run_here
 from labctl.services.campaigns.preparation import prepare
 from labctl.services.campaigns.status import campaign_status, list_campaigns
+from labctl.services.commands.acts.abort import ABORT, ABORT_CAMPAIGN
 from labctl.services.commands.context import CommandContext
-from labctl.services.commands.registry import ABORT_CAMPAIGN
 from labctl.services.commands.requests import ToCampaign
 from labctl.services.commands.service_control import ServiceControl
 from labctl.services.lab_service import LabService
@@ -154,7 +154,7 @@ def test_a_campaign_that_waits_to_be_resumed_is_stopped_at_the_bench_and_not_onl
     runner = BenchRunner(store, BENCH, VirtualClock)
     control = ServiceControl(runner)
     asked = ToCampaign(campaign, ReasonRequest(reason="smoke", by="Ada"))
-    answer = control.abort(CommandContext(lambda: store, VirtualClock(), control), asked)
+    answer = control.perform(ABORT, CommandContext(lambda: store, VirtualClock(), control), asked)
     assert (answer.state, answer.reason) == ("aborted", "aborted: smoke (Ada)")
     assert (runner.stops.is_safe, runner.stop_latch.state.open) == (True, ())
     assert [row.detail["reason"] for row in store.audit.rows() if row.action == "campaign abort"] == ["smoke (Ada)"]

@@ -28,6 +28,9 @@ from procedures.planning.plan import make_plan
 from procedures.recipe.rules import Verification
 from tests.helpers.certificates import AT, request
 
+#: The same question of the same recording is answered once for the whole run.
+pytestmark = pytest.mark.usefixtures("shared_answers")
+
 SERIAL = "STIM-0001"
 
 

@@ -14,19 +14,28 @@ from labctl.services.schemas.reports.ladder import LadderResponse
 from tests.helpers.lab import Lab
 from tests.helpers.simulated_recordings import single_axis
 
+#: The same question of the same recording is answered once for the whole run.
+pytestmark = pytest.mark.usefixtures("shared_answers")
+
 FOG = "FOG-0001"
 
 
-@pytest.fixture
-def two_days(tmp_path: Path) -> Lab:
-    """A lab with a recording, a version fitted to it, and a recording of the unit with a 0.1 % higher scale factor."""
-    lab = Lab(tmp_path)
+@pytest.fixture(scope="module")
+def made_once(tmp_path_factory: pytest.TempPathFactory) -> Lab:
+    folder = tmp_path_factory.mktemp("two_days")
+    lab = Lab(folder)
     for day, hidden in ((1, {}), (2, {"scale_factor": 1e-3})):
-        write_recording(single_axis(1, **hidden), tmp_path / f"day-{day}", "parquet")
-        lab.json("import", str(tmp_path / f"day-{day}"))
+        write_recording(single_axis(1, **hidden), folder / f"day-{day}", "parquet")
+        lab.json("import", str(folder / f"day-{day}"))
         if day == 1:
             lab.json("fit", FOG, "--model", "ojeda2000")
     return lab
+
+
+@pytest.fixture
+def two_days(made_once: Lab, tmp_path: Path) -> Lab:
+    """A lab with a recording, a version fitted to it, and a recording of the unit with a 0.1 % higher scale factor."""
+    return made_once.copy(tmp_path)
 
 
 def test_the_figures_are_those_of_the_file_applied_to_the_recording(two_days: Lab, tmp_path: Path) -> None:

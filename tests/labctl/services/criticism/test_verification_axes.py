@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from labctl.recording import Recording, RecordingInfo, write_recording
-from labctl.services.criticism.verification.expectation import (
+from labctl.services.criticism.verification.of_version import (
     FALSE_ALARM,
     OwnError,
     independent_groups,

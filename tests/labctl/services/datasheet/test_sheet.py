@@ -16,10 +16,8 @@ from labctl.cli.app import app
 from labctl.errors import BadInput, NotFound
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.recording import Recording
-from labctl.services.datasheet.catalogue import LINES
-from labctl.services.datasheet.decision import decided
 from labctl.services.datasheet.measured import figures_of
-from labctl.services.datasheet.sheet import datasheet
+from labctl.services.datasheet.sheet import LINES, datasheet, decided
 from labctl.services.schemas.reports.datasheet import Characteristic, DatasheetResponse
 from labctl.store import Store, open_store
 from tests.helpers.recordings import STARTED, Triaxial

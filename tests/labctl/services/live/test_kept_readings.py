@@ -13,9 +13,9 @@ from instruments.clock import VirtualClock
 from labctl.recording import RecordingInfo
 from labctl.recording.files import HEAD
 from labctl.services.live import feeds
+from labctl.services.live.calibrate import Spool
 from labctl.services.live.live_sessions import LiveSessions
 from labctl.services.live.source import Block
-from labctl.services.live.spool import Spool
 from labctl.services.recordings.live_folders import SAMPLES, kept_beside, usual_folder
 from labctl.store import open_store
 from tests.helpers.lab import Lab

@@ -16,9 +16,8 @@ from instruments.clock import VirtualClock
 from labctl.errors import BadInput
 from labctl.recording import RecordingInfo
 from labctl.recording.line_stream import LineDecoder
-from labctl.services.live.feeds import network_feed
+from labctl.services.live.feeds import RosbridgeFeed, network_feed
 from labctl.services.live.line_source import LineSource
-from labctl.services.live.rosbridge_feed import RosbridgeFeed
 from labctl.services.live.source import StreamEnded
 from tests.helpers.waiting import eventually
 

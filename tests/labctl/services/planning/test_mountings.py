@@ -14,7 +14,7 @@ from labctl.recording import to_points
 from labctl.services.calibrations.fitting import fit_unit
 from labctl.services.calibrations.uncertainty import coefficients_at
 from labctl.services.planning.loading import limits_of, load_bench, load_recipe
-from labctl.services.planning.mountings import misalignment_outlook
+from labctl.services.planning.plan_answer import misalignment_outlook
 from labctl.services.schemas.calibrations import FitRequest
 from labctl.services.simulation.plan_simulation import hidden_recording
 from labctl.store import open_store

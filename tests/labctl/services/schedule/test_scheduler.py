@@ -13,7 +13,7 @@ from instruments.clock import SystemClock, VirtualClock
 from labctl.api import create_app
 from labctl.errors import BadInput, BenchBusy, Conflict, DiskFull
 from labctl.services.campaigns.bench_runner import BenchRunner
-from labctl.services.commands.registry import START_CAMPAIGN
+from labctl.services.commands.acts.start import START_CAMPAIGN
 from labctl.services.commands.requests import CampaignStart
 from labctl.services.lab_service import LabService
 from labctl.services.local_bench import LocalBench

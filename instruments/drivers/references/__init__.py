@@ -1,1 +1,0 @@
-"""Drivers of reference thermometers and hygrometers."""

@@ -1,1 +1,0 @@
-"""A simulated device of National Instruments behind NI's gRPC device server."""

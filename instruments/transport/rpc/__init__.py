@@ -1,1 +1,0 @@
-"""Calls of gRPC to a server that has an instrument."""

@@ -1,0 +1,39 @@
+"""The route of an act on a campaign, made from what the act says of itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from fastapi import APIRouter
+
+from labctl.api.dependencies import ControlPoolDep, ServiceDep, command_route
+from labctl.services.commands.acts.campaign_act import BodyT, CampaignAct
+from labctl.services.commands.requests import ToCampaign
+from labctl.services.lab_service import LabService
+from labctl.services.schemas.campaigns import CampaignResponse
+
+
+def add_act_route(router: APIRouter, act: CampaignAct[BodyT]) -> None:
+    """Route an act; one that is urgent is executed in threads that no other requests fill."""
+
+    def perform(campaign: int, request: BodyT, service: LabService) -> CampaignResponse:
+        return service.execute(act.command, ToCampaign(campaign, request))
+
+    if act.is_urgent:
+
+        async def urgent(
+            campaign: int, request: BodyT, service: ServiceDep, control: ControlPoolDep
+        ) -> CampaignResponse:
+            return await control.run(lambda: perform(campaign, request, service))
+
+        endpoint: Callable[..., object] = urgent
+    else:
+
+        def usual(campaign: int, request: BodyT, service: ServiceDep) -> CampaignResponse:
+            return perform(campaign, request, service)
+
+        endpoint = usual
+    endpoint.__name__ = act.name
+    endpoint.__doc__ = act.description
+    endpoint.__annotations__["request"] = act.body
+    command_route(router, act.command, act.summary)(endpoint)

@@ -1,1 +1,0 @@
-"""Registers of equipment that a calibration is entered in."""

@@ -1,0 +1,286 @@
+"""From coefficients that a person gives to what a model holds: each found in the model, its unit and form checked."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag
+
+from labctl.errors import BadInput
+from labctl.fitting.data.channels import Argument, Channels
+from labctl.fitting.data.earth import with_prior
+from labctl.fitting.data.fit_data import FitData
+from labctl.fitting.effects import Reference, kind_of
+from labctl.fitting.estimation.requirements import require_channels
+from labctl.fitting.models.error_model import ErrorModel
+from labctl.fitting.models.held import Held, HeldCoefficient
+from labctl.fitting.models.presets import Preset, holding
+from labctl.fitting.models.temperature import LagrangeTable
+from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.numeric.drift_noise import Scatter
+from labctl.fitting.numeric.least_squares import Considered, Solution, rank_of
+from labctl.recording import OutputUnit, RecordingInfo
+
+# Uncertainty of held coefficients in those that are estimated beside them: consider covariance analysis.
+#
+# Tapley, Schutz and Born 2004, Statistical Orbit Determination, chapter 6. The data y = X f + H c + e are fitted for f
+# with c held at values of covariance U: f = (X'WX)^-1 X'W (y - H c). An error of c moves f by G = -(X'WX)^-1 X'W H, so
+# that f has the covariance (X'WX)^-1 + G U G', and f and c the covariance G U in common.
+
+#: The standard deviation, deg/s, that the row of a prior has in scaled columns: a drift adds nothing to that.
+PRIOR = 1e3
+
+
+@dataclass(frozen=True)
+class HeldPart:
+    """The held coefficients of one axis: h values, for k named coefficients at each temperature node."""
+
+    columns: NDArray[np.float64]  #: (m, h)
+    values: Array  #: (h,)
+    u: Array  #: (h,) standard uncertainties; NaN: not stated
+    spread: NDArray[np.float64]  #: (k * nodes, h): from the values to the coefficients of the table
+
+    @property
+    def error_dps(self) -> Array:
+        """What they add to the output of the data sets, (m,) deg/s."""
+        return np.asarray(self.columns @ self.values)
+
+
+class HeldColumns:
+    """Collects the held part of an axis, coefficient by coefficient; `basis` (m, nodes) is that of the model."""
+
+    def __init__(self, basis: Array) -> None:
+        self._basis = basis
+        self._columns: list[NDArray[np.float64]] = [np.zeros((len(basis), 0))]
+        self._spread: list[NDArray[np.float64]] = []
+        self._held: list[HeldCoefficient] = []
+
+    def add(self, known: HeldCoefficient, spread: NDArray[np.float64], values: Array) -> None:
+        """Add a held coefficient with its regressor (m,) and its `spread` (nodes, p)."""
+        self._columns.append(values[:, None] * (self._basis @ spread))
+        self._spread.append(spread)
+        self._held.append(known)
+
+    def add_none(self) -> None:
+        """Add a coefficient that is estimated."""
+        self._spread.append(np.zeros((self._basis.shape[1], 0)))
+
+    @property
+    def part(self) -> HeldPart:
+        """What was collected."""
+        return HeldPart(
+            np.concatenate(self._columns, axis=1),
+            np.array([value for one in self._held for value in one.value]),
+            np.array([u for one in self._held for u in one.u]),
+            block_diag(*self._spread) if self._spread else np.zeros((0, 0)),
+        )
+
+
+def considered(
+    held: HeldPart, columns: NDArray[np.float64], y: Array, scatter: Scatter
+) -> tuple[NDArray[np.float64], Array, Scatter, Considered | None]:
+    """Return design (n, k), y and scatter of the estimated columns, and what is known beside them; None: nothing.
+
+    What an error of a held coefficient leaves in the data is no noise, so the noise is estimated beside it: with its
+    uncertainty as a prior, a row for each; or freely, where the white noise, and so the weight of that row, is unknown.
+    A coefficient without uncertainty is taken as exact, and what it leaves counts as noise.
+    """
+    if held.columns.shape[1] == 0:
+        return columns, y, scatter, None
+    has_u = (np.nan_to_num(held.u) > 0) & np.any(held.columns, axis=0)
+    uncertain = held.columns[:, has_u] * held.u[has_u] / PRIOR
+    k = columns.shape[1]
+    if scatter.white_var is not None:
+        whole, y, scatter = with_prior(columns, uncertain, y, scatter, np.full(uncertain.shape[1], PRIOR**2))
+        columns, beside = whole[:, :k], whole[:, k:]
+    else:
+        beside = _determined(columns, uncertain)
+    below = np.zeros((len(columns) - len(held.columns), held.columns.shape[1]))
+    return columns, y, scatter, Considered(np.vstack([held.columns, below]), beside)
+
+
+def _determined(columns: NDArray[np.float64], more: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return those of more columns (m, b) that the data determine beside columns (m, k), with a row to spare."""
+    kept = np.zeros((len(columns), 0))
+    for column in more.T:
+        tried = np.column_stack([kept, column])
+        whole = np.column_stack([columns, tried])
+        if len(whole) > whole.shape[1] and rank_of(whole) == whole.shape[1]:
+            kept = tried
+    return kept
+
+
+def joint_covariance(
+    solution: Solution, held: HeldPart, spread: NDArray[np.float64]
+) -> tuple[Array, NDArray[np.float64]]:
+    """Return the coefficients of the table (k * nodes,) and their covariance, of those estimated and held together.
+
+    `spread` (k * nodes, c) is that of the c estimated columns. A held coefficient without uncertainty has NaN in its
+    rows and columns; the others are then as certain as if it were exact.
+    """
+    c = spread.shape[1]
+    values = spread @ solution.values[:c] + held.spread @ held.values
+    covariance = spread @ solution.covariance[:c, :c] @ spread.T
+    h = held.columns.shape[1]
+    if solution.along_held is None or h == 0:
+        return values, covariance
+    root = (spread @ solution.along_held[:c, :h] + held.spread) * np.nan_to_num(held.u)
+    covariance = covariance + root @ root.T
+    unknown = np.any(held.spread[:, np.isnan(held.u)] != 0, axis=1)
+    covariance[unknown, :] = covariance[:, unknown] = np.nan
+    return values, covariance
+
+
+#: Temperatures closer than this are the same level of a table, K.
+SAME_LEVEL_K = 1.0
+#: Step by which it is seen whether a model depends on its reference temperature, K.
+STEP_K = 10.0
+
+
+@dataclass(frozen=True)
+class Fixed:
+    """Coefficients to be held, axis -> name -> coefficient; unit and effect are empty where they are not stated."""
+
+    axes: Mapping[str, Mapping[str, HeldCoefficient]]
+    name: str  #: of the file, in messages
+    source: str = ""  #: where the values are from
+    reference_temperature_c: float | None = None  #: zero point of their temperature terms
+    argument: Argument | None = None  #: of the law that they belong to; None: of the model that is fitted
+    output: Mapping[str, OutputUnit] = field(default_factory=dict)  #: axis -> nominal conversion; {}: the recording's
+    only_of_model: bool = False  #: whether those of effects that the model does not have are left out, or are an error
+
+
+def refuse_fixed(info: RecordingInfo, fixed: Fixed | None) -> None:
+    """Raise BadInput for coefficients to be held where nothing is fitted by data sets of known rate."""
+    if fixed is not None and (info.kind == "coefficients" or info.motion == "poses"):
+        what = "is a table of coefficients" if info.kind == "coefficients" else "is of poses"
+        raise BadInput(
+            f"{fixed.name}: the recording of {info.serial} {what}, beside which no coefficient can be held; leave "
+            "--fixed out, or fit a recording of readings at known rates"
+        )
+
+
+def with_held(data: FitData, preset: Preset, fixed: Fixed | None) -> Preset:
+    """Return a preset that holds coefficients.
+
+    Raises BadInput, naming file, axis, coefficient, value and unit, where one cannot be held; NotEnoughData where the
+    recording lacks a column that the model needs.
+    """
+    if fixed is None:
+        return preset
+    centre = None if fixed.reference_temperature_c is None else Reference(fixed.reference_temperature_c)
+    model, _ = holding(preset, Held(), centre).build(data)
+    require_channels(data, model)
+    return holding(preset, _resolved(data, model, fixed), centre)
+
+
+def _resolved(data: FitData, model: ErrorModel, fixed: Fixed) -> Held:
+    if fixed.argument not in {None, model.argument}:
+        raise BadInput(
+            f"{fixed.name}: its coefficients belong to a law of the {fixed.argument}, but model {model.name} is a law "
+            f"of the {model.argument}, in which they mean something else; fit another model, or give other coefficients"
+        )
+    channels = data.seen_by(model.argument)
+    axes: dict[str, dict[str, HeldCoefficient]] = {}
+    for axis, given in fixed.axes.items():
+        if axis in data.outputs:
+            if held := _of_axis(data, channels, model, axis, fixed):
+                axes[axis] = held
+        elif given and not fixed.only_of_model:
+            raise BadInput(
+                f"{fixed.name}, axis {axis}: the recording has only {', '.join(data.outputs)}; leave axis {axis} out"
+            )
+    if not axes:
+        raise BadInput(
+            f"{fixed.name}: has no coefficient of the effects of model {model.name} "
+            f"({', '.join(model.effect_ids)}); give at least one, or leave --fixed out"
+        )
+    return Held(axes, fixed.source)
+
+
+def _of_axis(
+    data: FitData, channels: Channels, model: ErrorModel, axis: str, fixed: Fixed
+) -> dict[str, HeldCoefficient]:
+    columns = {(effect, column.name): column.unit for effect, column in model.columns(channels, axis)}
+    owners = {name: effect for effect, name in columns}
+    held = {}
+    for name, one in fixed.axes[axis].items():
+        if fixed.only_of_model and one.effect not in model.effect_ids:
+            continue
+        effect = one.effect or owners.get(name, "")
+        what = f"{fixed.name}, axis {axis}: {name} = {_shown(one)}"
+        if (effect, name) not in columns:
+            raise BadInput(
+                f"{what}: model {model.name} has no such coefficient; choose from {', '.join(owners)} (parameters of "
+                "the shape of an effect and derived coefficients cannot be held), or add its effect to the model"
+            )
+        _check(what, replace(one, effect=effect), columns[effect, name], model)
+        held[name] = replace(one, effect=effect, unit=columns[effect, name])
+    if held:
+        _require_same_conversion(data, axis, fixed)
+        _require_reference(channels, model, axis, fixed)
+    if held and len(held) == len(columns):
+        raise BadInput(
+            f"{fixed.name}, axis {axis}: all coefficients of model {model.name} are held ({', '.join(held)}), so "
+            "nothing is left to fit; leave at least one of them out, or add an effect to the model"
+        )
+    return held
+
+
+def _check(what: str, one: HeldCoefficient, unit: str, model: ErrorModel) -> None:
+    if one.unit and one.unit != unit:
+        raise BadInput(f"{what}: the unit of this coefficient is {unit!r}, not {one.unit!r}; write value and u in it")
+    term = next(term for term in model.terms if term.effect == one.effect)
+    if kind_of(term).parameters:
+        shape = ", ".join(parameter.name for parameter in kind_of(term).parameters)
+        raise BadInput(
+            f"{what}: the shape of effect {one.effect} is fitted ({shape}), so a coefficient of it cannot be held; "
+            "leave the coefficient out"
+        )
+    if not one.temperature_c:
+        return
+    nodes = model.temperature.nodes_c if isinstance(model.temperature, LagrangeTable) and not term.steady else ()
+    given = ", ".join(f"{t:.4g}" for t in one.temperature_c)
+    if len(nodes) != len(one.temperature_c) or np.abs(np.subtract(nodes, one.temperature_c)).max() > SAME_LEVEL_K:
+        has = f"the temperatures {', '.join(f'{t:.4g}' for t in nodes)} deg C" if nodes else "one value for all"
+        raise BadInput(
+            f"{what}: a table at {given} deg C, but here the model has {has}; a table is held only at the same "
+            f"temperatures, to {SAME_LEVEL_K:g} K: give a single value, or fit a model with these temperatures"
+        )
+
+
+def _require_same_conversion(data: FitData, axis: str, fixed: Fixed) -> None:
+    """Refuse coefficients of an output that is converted to deg/s by another scale or offset."""
+    if axis not in fixed.output:
+        return
+    here, there = data.info.output.get(axis, OutputUnit()), fixed.output[axis]  # type: ignore[call-overload]
+    if not (math.isclose(here.scale, there.scale) and math.isclose(here.offset, there.offset, abs_tol=1e-12)):
+        raise BadInput(
+            f"{fixed.name}, axis {axis}: its coefficients are of an output of scale {there.scale:g} and offset "
+            f"{there.offset:g} {there.unit}, but the recording has scale {here.scale:g} and offset {here.offset:g} "
+            f"{here.unit}; give coefficients of the same conversion"
+        )
+
+
+def _require_reference(channels: Channels, model: ErrorModel, axis: str, fixed: Fixed) -> None:
+    """Refuse coefficients without a reference temperature beside terms in temperature, which change their meaning."""
+    if fixed.reference_temperature_c is not None:
+        return
+    moved = replace(model, reference=Reference(model.reference.temperature_c + STEP_K))
+    pairs = zip(model.columns(channels, axis), moved.columns(channels, axis), strict=True)
+    centred = [effect for (effect, here), (_, there) in pairs if not np.array_equal(here.values, there.values)]
+    if centred:
+        raise BadInput(
+            f"{fixed.name}: effect {centred[0]} is centred on a reference temperature, on which the other coefficients "
+            "depend; add the one that the values hold for, such as reference_temperature_c = 25.0 (deg C)"
+        )
+
+
+def _shown(one: HeldCoefficient) -> str:
+    values = ", ".join(f"{value:g}" for value in one.value[:3]) + (", ..." if len(one.value) > 3 else "")
+    text = f"[{values}]" if one.temperature_c else values
+    return f"{text} {one.unit}".strip()

@@ -1,1 +1,0 @@
-"""Several recordings fitted together: what they agree on, and how well each is predicted by the others."""

@@ -1,0 +1,208 @@
+"""Alignment of a magnetometer to the axes of a calibrated accelerometer and gyro, from poses: one rotation.
+
+The size of the field tells a magnetometer's hard and soft iron but no rotation. Two things tell it, without knowing the
+local field: in every rest the angle between gravity and the field is the same (Kok and Schoen 2016), and in a
+turn the field goes against the rate of the gyro, dm/dt = -rate x m, integrated from rest to rest (Wu et al. 2018).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag
+
+from labctl.errors import NotEnoughData
+from labctl.fitting.magnetometer.calibrate import Magnetometer
+from labctl.fitting.magnetometer.ellipsoid import PLACES
+from labctl.fitting.numeric.arrays import Array
+from labctl.fitting.poses.at_rest.rests import density_in_rests
+from labctl.fitting.poses.between import components, gls
+from labctl.fitting.poses.covariance import level_by_parameters, level_by_reading, of_each_move, of_readings
+from labctl.fitting.poses.fit import Solved
+from labctl.fitting.poses.readings import AXES, PoseReadings
+from labctl.fitting.poses.rotation import change_of_direction, seen_at_end
+from labctl.fitting.poses.triad import cross_matrix, tangents, unit
+
+#: Steps of the search, and the change of an angle at which it ends, rad.
+STEPS, SMALL = 30, 1e-10
+#: Below this change the variances of the noise are kept, rad.
+SETTLED = 1e-5
+#: An angle that is less certain than this is not determined, rad.
+LARGEST_U = 0.02
+
+
+@dataclass(frozen=True)
+class FieldAlignment:
+    """Rotation of the corrected field's axes from those of the corrected force and rate, and the dip of the field."""
+
+    angles_rad: Array  #: (3,) rotation vector, about the accelerometer's axes, from those axes to the magnetometer's
+    dip_rad: float  #: of the field below the horizontal
+    covariance: NDArray[np.float64]  #: (4, 4) of angles and dip, rad^2
+    place_rad: float  #: standard deviation of a component of the direction from rest to rest, beyond the noise
+    rests: int
+    moves: int
+
+    @property
+    def u_rad(self) -> Array:
+        """Standard uncertainty of each angle and of the dip, (4,)."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """Directions of the field in k rests by the magnetometer alone, in its own corrected axes."""
+
+    solved: Solved
+    direction: NDArray[np.float64]  #: (k, 3)
+    noise: NDArray[np.float64]  #: (k, 3, 3) covariance by the noise of the readings
+    by_parameters: NDArray[np.float64]  #: (k, 3, 9) by hard and soft iron
+    parameters: NDArray[np.float64]  #: (9, 9) their covariance
+    readings_u: Array  #: (m,) what spacing and jitter of the readings leave of the used moves' angles, rad
+
+    @property
+    def across(self) -> NDArray[np.float64]:
+        """Covariance (k, 3, 3) of a direction whose components scatter by 1 rad."""
+        return np.asarray(np.eye(3) - self.direction[:, :, None] * self.direction[:, None, :])
+
+
+def align_field(
+    readings: PoseReadings, solved: Solved, field_ut: NDArray[np.float64], found: Magnetometer
+) -> FieldAlignment:
+    """Return the alignment by a calibration by hand, and by the magnetometer's readings (n, 3), uT, with theirs.
+
+    Raises NotEnoughData where rests and turns do not determine it.
+    """
+    seen = _seen(readings, solved, field_ut, found)
+    turn = _start(seen)
+    dip = float(np.mean(np.sum(solved.accelerometer.up * (seen.direction @ turn.T), axis=1)))
+    change, place, extra = np.inf, 0.0, 0.0
+    for _ in range(STEPS):
+        residual, jacobian, known, by_place = _equations(seen, turn, dip)
+        if change > SETTLED:
+            place, extra = components(
+                jacobian, residual, known, by_place, lambda _: 0.0, float(np.mean(np.diag(known)))
+            )
+        total = known + place * by_place + extra * np.eye(len(known))
+        step, covariance = gls(jacobian, residual, total)
+        turn, dip = _rotation(-step[:3]) @ turn, dip - float(step[3])
+        change = float(np.abs(step).max())
+        if change < SMALL:
+            break
+    freedom = len(residual) - 4
+    covariance = covariance * freedom / (freedom - 2)
+    to_dip = np.diag([1.0, 1.0, 1.0, -1 / np.sqrt(max(1 - dip**2, 1e-12))])
+    result = FieldAlignment(
+        _vector(turn), float(-np.arcsin(np.clip(dip, -1, 1))), to_dip @ covariance @ to_dip.T, float(np.sqrt(place)),
+        int(np.count_nonzero(solved.accelerometer.used)), int(np.count_nonzero(solved.gyro.used)),
+    )  # fmt: skip
+    worst = int(np.argmax(result.u_rad[:3]))
+    if result.u_rad[worst] > LARGEST_U:
+        raise NotEnoughData(
+            f"{readings.info.serial}: rests and turns leave the magnetometer's angle about {AXES[worst]} uncertain "
+            f"by u = {np.degrees(result.u_rad[worst]):.2g} deg (limit {np.degrees(LARGEST_U):.2g} deg): rest in more "
+            "poses in the same place, away from iron"
+        )
+    return result
+
+
+def _seen(readings: PoseReadings, solved: Solved, field_ut: NDArray[np.float64], found: Magnetometer) -> _Seen:
+    rests = solved.rests
+    means = np.array([field_ut[a:b].mean(axis=0) for a, b in zip(rests.begin, rests.end, strict=True)])
+    variance = density_in_rests(field_ut, rests, readings.spacing_s) / rests.duration_s[:, None]
+    away = means - found.hard_iron_ut
+    field = away @ found.soft_iron
+    direction = unit(field)
+    across = (np.eye(3) - direction[:, :, None] * direction[:, None, :]) / np.linalg.norm(field, axis=1)[:, None, None]
+    by_reading = across @ found.soft_iron
+    columns = [-by_reading]
+    for i, j in PLACES:
+        change = np.zeros_like(away)
+        change[:, i] += away[:, j]
+        if i != j:
+            change[:, j] += away[:, i]
+        columns.append(np.einsum("kab,kb->ka", across, change)[:, :, None])
+    noise = np.einsum("kai,ki,kbi->kab", by_reading, variance, by_reading)
+    return _Seen(
+        solved, direction, noise, np.concatenate(columns, axis=2), found.covariance[:9, :9],
+        of_readings(solved.moves.take(solved.gyro.used), solved.bias),
+    )  # fmt: skip
+
+
+def _start(seen: _Seen) -> NDArray[np.float64]:
+    """Return the rotation (3, 3) from the magnetometer's to the body axes by the turns: linear in its elements."""
+    gyro, moves = seen.solved.gyro, seen.solved.moves
+    rows = [
+        np.kron(seen.direction[k], turned.T) - np.kron(seen.direction[k + 1], np.eye(3))
+        for k, turned, used in zip(moves.before, gyro.equations.rotations.matrix, gyro.used, strict=True)
+        if used
+    ]
+    _, _, right = np.linalg.svd(np.vstack(rows))
+    matrix = right[-1].reshape(3, 3).T
+    left, _, last = np.linalg.svd(matrix * np.sign(np.linalg.det(matrix)))
+    return np.asarray(left @ last)
+
+
+def _equations(
+    seen: _Seen, turn: NDArray[np.float64], dip: float
+) -> tuple[Array, NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Return residuals (r,), derivatives (r, 4) by turn and dip, known noise (r, r), and that by 1 rad^2 per rest.
+
+    One residual of each used rest, two of each used move.
+    """
+    solved, k = seen.solved, len(seen.direction)
+    accelerometer, gyro, moves = solved.accelerometer, solved.gyro, solved.moves
+    body = seen.direction @ turn.T
+    rest = np.flatnonzero(accelerometer.used)
+    up = accelerometer.up
+    size = len(rest) + 2 * int(np.count_nonzero(gyro.used))
+    residual, jacobian = np.zeros(size), np.zeros((size, 4))
+    by_seen, by_tilt = np.zeros((size, k, 3)), np.zeros((size, k, 3))
+    by_bias, by_gyro, by_force = np.zeros((size, k, 3)), np.zeros((size, 9)), np.zeros((size, 9))
+    here = np.arange(len(rest))
+    residual[here] = np.sum(up[rest] * body[rest], axis=1) - dip
+    jacobian[here, :3] = -np.einsum("ka,kab->kb", up[rest], cross_matrix(body[rest]))
+    jacobian[here, 3] = -1.0
+    by_seen[here, rest] = up[rest] @ turn
+    by_tilt[here, rest] = np.einsum("ka,kab->kb", body[rest], level_by_reading(accelerometer)[rest])
+    by_force[here] = np.einsum("ka,kab->kb", body[rest], level_by_parameters(accelerometer)[rest])
+    own = np.zeros((size, size))
+    before = moves.before[gyro.used]
+    parts = gyro.equations.take(gyro.used).rotations
+    start, end = body[before], body[before + 1]
+    across, back = tangents(end), parts.matrix.transpose(0, 2, 1)
+    turned = across @ change_of_direction(start, parts.matrix)
+    pairs = len(rest) + np.arange(size - len(rest)).reshape(-1, 2)
+    residual[pairs] = np.einsum("mca,ma->mc", across, seen_at_end(start, parts.matrix) - end)
+    jacobian[pairs, :3] = across @ (cross_matrix(end) - back @ cross_matrix(start))
+    by_seen[pairs, before[:, None]] = across @ back @ turn
+    by_seen[pairs, before[:, None] + 1] = -across @ turn
+    by_bias[pairs, before[:, None]] = turned @ parts.by_bias_before
+    by_bias[pairs, before[:, None] + 1] = turned @ parts.by_bias_after
+    by_gyro[pairs] = turned @ parts.by_error
+    each = of_each_move(moves.take(gyro.used), parts.white, turned, seen.readings_u)
+    own[len(rest) :, len(rest) :] = block_diag(*each)
+
+    flat = by_seen.reshape(size, -1)
+    tilt = (by_tilt * accelerometer.u_rest_g[:, None]).reshape(size, -1)
+    drift = (by_bias * np.radians(solved.bias.u_rest_dps)).reshape(size, -1)
+    iron = np.einsum("rka,kab->rb", by_seen, seen.by_parameters)
+    known = (
+        own + flat @ block_diag(*seen.noise) @ flat.T + tilt @ tilt.T + drift @ drift.T
+        + iron @ seen.parameters @ iron.T + by_gyro @ gyro.covariance @ by_gyro.T
+        + by_force @ accelerometer.covariance @ by_force.T
+    )  # fmt: skip
+    return residual, jacobian, known, flat @ block_diag(*seen.across) @ flat.T
+
+
+def _rotation(vector: Array) -> NDArray[np.float64]:
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_rotvec(vector).as_matrix())
+
+
+def _vector(turn: NDArray[np.float64]) -> Array:
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_matrix(turn).as_rotvec())

@@ -1,2 +1,0 @@
-from labctl.recording.line_stream.decoder import DecodedLines as DecodedLines, LineDecoder as LineDecoder
-from labctl.recording.line_stream.layout import LineLayout as LineLayout, layout_of as layout_of

@@ -1,0 +1,35 @@
+"""An act on one campaign, from which its command and its route are made."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeVar
+
+from labctl.services.commands.command import Command
+from labctl.services.commands.context import BenchAct
+from labctl.services.commands.requests import ToCampaign
+from labctl.services.schemas.base import Request
+from labctl.services.schemas.campaigns import CampaignResponse
+
+BodyT = TypeVar("BodyT", bound=Request)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CampaignAct(BenchAct[ToCampaign[BodyT], CampaignResponse]):
+    """An act on one campaign, which answers how the campaign is then."""
+
+    body: type[BodyT]  #: of the request
+    summary: str  #: in the description of the API
+    description: str
+    is_urgent: bool = False  #: over HTTP it has threads that other requests cannot fill
+
+    @cached_property
+    def command(self) -> Command[ToCampaign[BodyT], CampaignResponse]:
+        """Its command, whose path ends with the name of the act."""
+        return Command(
+            method="POST",
+            path=f"/api/campaigns/{{campaign}}/{self.name}",
+            handler=self.execute,
+            responses={200: CampaignResponse},
+        )

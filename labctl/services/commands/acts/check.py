@@ -1,0 +1,35 @@
+"""Ask every instrument of a bench what it is and how it does; nothing moves."""
+
+from __future__ import annotations
+
+from labctl.errors import NotFound
+from labctl.services.commands.command import Command
+from labctl.services.commands.context import OPENS_BENCH_S, BenchAct, CommandContext, Foreground, ServiceBench
+from labctl.services.commands.requests import ToBench
+from labctl.services.schemas.benches import BenchCheckResponse, CheckRequest
+
+Asked = ToBench[CheckRequest]
+
+
+def _in_service(control: ServiceBench, context: CommandContext, asked: Asked) -> BenchCheckResponse:
+    """Check this service's bench. Raises NotFound for another one, BenchBusy while a campaign runs."""
+    runner = control.bench_runner()
+    if asked.bench != runner.bench.name:
+        raise NotFound(
+            f"this service drives bench {runner.bench.name}, not {asked.bench!r}, and can check "
+            f"only its own bench; name bench {runner.bench.name}, or ask the service of the other bench"
+        )
+    found = runner.check()
+    context.store.audit.record(context.now(), "bench check", f"bench {found.bench}", {"ok": found.ok})
+    return found
+
+
+def _in_foreground(control: Foreground, _: CommandContext, asked: Asked) -> BenchCheckResponse:
+    """Check a bench by its file or its shipped name, in this process."""
+    return control.check(asked.bench)
+
+
+CHECK = BenchAct(name="check", in_service=_in_service, in_foreground=_in_foreground, wait_s=OPENS_BENCH_S)
+CHECK_BENCH = Command(
+    method="POST", path="/api/benches/{bench}/check", handler=CHECK.execute, responses={200: BenchCheckResponse}
+)

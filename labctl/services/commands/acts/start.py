@@ -1,0 +1,55 @@
+"""Start a campaign now, or enter it into the schedule."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from labctl.services.commands.command import Command
+from labctl.services.commands.context import OPENS_BENCH_S, BenchAct, CommandContext, Foreground, ServiceBench
+from labctl.services.commands.requests import CampaignStart
+from labctl.services.planning.fit_rules import check_fit
+from labctl.services.planning.loading import load_recipe
+from labctl.services.schedule import queue
+from labctl.services.schemas.campaigns import CampaignResponse
+from labctl.services.schemas.schedule import ScheduledResponse
+from labctl.services.simulation.effect_sizes import with_sizes
+
+
+def _start_in_service(control: ServiceBench, _: CommandContext, asked: CampaignStart) -> CampaignResponse:
+    return control.bench_runner().start(asked.body)
+
+
+def _start_in_foreground(control: Foreground, _: CommandContext, asked: CampaignStart) -> CampaignResponse:
+    return control.run(asked)
+
+
+def _schedule_in_service(control: ServiceBench, context: CommandContext, asked: CampaignStart) -> ScheduledResponse:
+    return queue.add_start(context.store, asked.body, control.bench_runner().bench, context.now())
+
+
+def _schedule_in_foreground(control: Foreground, context: CommandContext, asked: CampaignStart) -> ScheduledResponse:
+    return control.schedule(context, asked)
+
+
+#: Raises Conflict where the service has no bench, BenchBusy while another campaign runs.
+START = BenchAct(name="start", in_service=_start_in_service, in_foreground=_start_in_foreground, wait_s=OPENS_BENCH_S)
+SCHEDULE = BenchAct(name="schedule", in_service=_schedule_in_service, in_foreground=_schedule_in_foreground)
+
+
+def _start_campaign(context: CommandContext, asked: CampaignStart) -> CampaignResponse | ScheduledResponse:
+    """Start a campaign now, or enter it into the schedule: the only place where that is decided."""
+    if asked.body.fit:
+        check_fit(load_recipe(asked.body.recipe))
+    if asked.body.hide:
+        asked = replace(asked, body=with_sizes(asked.body, context.control.bench_of(asked)))
+    if queue.is_scheduled(asked.body):
+        return SCHEDULE.execute(context, asked)
+    return START.execute(context, asked)
+
+
+START_CAMPAIGN: Command[CampaignStart, CampaignResponse | ScheduledResponse] = Command(
+    method="POST",
+    path="/api/campaigns",
+    handler=_start_campaign,
+    responses={201: CampaignResponse, 202: ScheduledResponse},
+)

@@ -1,0 +1,94 @@
+"""Fields that many requests and responses have in common: one declaration, with one description, of each quantity."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Annotated
+
+from pydantic import Field
+
+# descriptions of quantities whose types differ
+MOTION = (
+    "How the unit was moved: at constant table rates, at rest, turned by known angles, along a rate profile, or by "
+    "hand between poses."
+)
+POSITION = "Position of the unit: the body axis that points up, such as z or -x."
+KIND = "Kind of data: samples (every reading), points (one mean per data set) or coefficients (a published table)."
+TECHNOLOGY = "Technology of the gyro: fog (fibre-optic), mems or piezo; null: not known."
+ROOM_UNIT = "Unit of the quantity: deg C for temperature, % for relative humidity, hPa for air pressure."
+
+# who and what
+Serial = Annotated[str, Field(description="Serial number of the unit.")]
+UnitModel = Annotated[str, Field(description="Model of the unit, as its manufacturer names it; empty: not stated.")]
+VersionNumber = Annotated[int, Field(description="Number of the calibration version, counted from 1 for each unit.")]
+VersionTime = Annotated[datetime, Field(description="Time at which the version was stored.")]
+InForce = Annotated[bool, Field(description="Whether this version is in force: certified last, and not revoked.")]
+ParentVersion = Annotated[
+    int | None,
+    Field(description="Version of which a change of effects made this version; null: it is from a fit."),
+]
+RecordingNumber = Annotated[int, Field(description="Number of the recording.")]
+CampaignNumber = Annotated[int, Field(description="Number of the campaign.")]
+BenchName = Annotated[str, Field(description="Name of the bench.")]
+RecipeName = Annotated[str, Field(description="Name of the recipe.")]
+ModelName = Annotated[str, Field(description="Name of the error model.")]
+EffectIds = Annotated[list[str], Field(description="Ids of the effects in the model, as the catalogue names them.")]
+CoefficientName = Annotated[str, Field(description="Name of the coefficient.")]
+CoefficientUnit = Annotated[str, Field(description="Unit of the coefficient.")]
+OutputAxis = Annotated[str, Field(description="Output axis of the unit: x, y or z.")]
+CalibrationHash = Annotated[str, Field(description="SHA-256 of the calibration as it was stored.")]
+ScheduleHash = Annotated[
+    str, Field(description="SHA-256 of the steps in their order; it is equal for two plans of the same steps.")
+]
+StandardLabel = Annotated[str, Field(description="Name of the reference standard in the register.")]
+CertificateNumber = Annotated[str, Field(description="Number of the certificate.")]
+LabctlVersion = Annotated[str, Field(description="Version of labctl that the service runs.")]
+FileName = Annotated[str, Field(description="Path of the file.")]
+FileSize = Annotated[int, Field(description="Size of the file in bytes.")]
+FileHash = Annotated[str, Field(description="SHA-256 of the file's content, as `sha256sum` prints it.")]
+FormatTitle = Annotated[str, Field(description="Title of the format for a person, such as in a list.")]
+DriverName = Annotated[str, Field(description="Name of the driver of the instrument.")]
+Distribution = Annotated[str, Field(description="Python distribution (installed package) that provides the driver.")]
+DistributionVersion = Annotated[str, Field(description="Version of that distribution.")]
+
+# an act of a person
+Person = Annotated[str, Field(description="Name of the person who acted, as typed.")]
+Reason = Annotated[str, Field(description="Reason for the act, as typed.")]
+ActTime = Annotated[datetime, Field(description="Time of the act.")]
+
+# options of a campaign and of a plan
+Clip = Annotated[
+    bool, Field(description="Whether to leave out points that are beyond the limits of the bench or of a unit.")
+]
+EndsInDraft = Annotated[bool, Field(description="Whether the campaign ends in a draft if its recipe has [fit].")]
+
+# counts, times and sentences
+DatasetCount = Annotated[int, Field(description="Number of data sets.")]
+ReadingCount = Annotated[int, Field(description="Number of readings.")]
+StepCount = Annotated[int, Field(description="Number of steps of the plan.")]
+ExpectedDuration = Annotated[float, Field(description="Expected duration of the campaign, s.")]
+Sentences = Annotated[list[str], Field(description="The result in sentences.")]
+
+# errors of a version on a recording
+RmsError = Annotated[float, Field(description="Root mean square of the error (corrected minus true rate), deg/s.")]
+MaxError = Annotated[float, Field(description="Largest magnitude of the error (corrected minus true rate), deg/s.")]
+MeanError = Annotated[float, Field(description="Mean of the error (corrected minus true rate), deg/s.")]
+
+# errors that a fit states: root mean square over data sets and axes
+RawRms = Annotated[float | None, Field(description="RMS error before any compensation, deg/s; null: not known.")]
+FittedRms = Annotated[
+    float | None,
+    Field(description="RMS error after compensation, on the data that were fitted, deg/s; null: not known."),
+]
+HeldoutRms = Annotated[
+    float | None,
+    Field(description="RMS error on data that were left out of the fit, deg/s; null: not known."),
+]
+NoiseFloor = Annotated[
+    float | None,
+    Field(description="RMS error of data-set means due to noise and drift alone, deg/s; null: not known."),
+]
+
+# columns, one value for each row
+DatasetNumbers = Annotated[list[int], Field(description="Number of the data set in its recording.")]
+TableRates = Annotated[list[float], Field(description="Rate of the table, deg/s.")]

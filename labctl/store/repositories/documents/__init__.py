@@ -1,1 +1,0 @@
-"""Documents of a laboratory, as they were issued."""

@@ -1,0 +1,69 @@
+"""Alignment of a magnetometer by rests and turns: against known turns, and beside a linear solution by NumPy alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from labctl.errors import NotEnoughData
+from labctl.fitting.magnetometer.alignment import FieldAlignment, align_field
+from labctl.fitting.magnetometer.calibrate import Magnetometer, calibrate_magnetometer
+from labctl.fitting.poses.fit import Solved, solve
+from labctl.fitting.poses.readings import PoseReadings, readings_of
+from studies.triads import recording_of, scores
+from studies.triads_simulation import DIP_DEG, TrueTriads, turned_by_hand, vector_of
+
+Session = tuple[PoseReadings, Solved, np.ndarray, Magnetometer, TrueTriads]
+
+
+@pytest.fixture(scope="module")
+def session() -> Session:
+    unit = TrueTriads.drawn(np.random.default_rng(3))
+    parts = turned_by_hand(3, unit, 16, place_ut=0.1)
+    readings = readings_of(recording_of(*parts))
+    return readings, solve(readings), parts[3], calibrate_magnetometer("m", parts[3][::10]), unit
+
+
+def aligned(session: Session) -> FieldAlignment:
+    return align_field(*session[:4])
+
+
+def test_the_uncertainty_covers_known_turns() -> None:
+    z = np.array([scores(seed, 14)[1] for seed in range(40, 46)])
+    assert np.mean(np.abs(z) <= 2) > 0.8
+    assert 0.6 < np.sqrt(np.mean(z**2)) < 1.5
+
+
+def test_it_is_the_turn_of_the_corrected_fields_axes_and_the_dip(session: Session) -> None:
+    found, unit = aligned(session), session[4]
+    assert found.u_rad.max() < 2e-3
+    assert found.angles_rad == pytest.approx(vector_of(unit.turned), abs=float(4 * found.u_rad.max()))
+    assert np.degrees(found.dip_rad) == pytest.approx(DIP_DEG, abs=float(np.degrees(4 * found.u_rad[3])))
+    assert found.place_rad * 49 == pytest.approx(0.1, rel=0.6)
+
+
+def test_the_rests_alone_say_the_same_by_a_linear_solution(session: Session) -> None:
+    _, solved, field, magnetometer, _ = session
+    seen = np.array([
+        magnetometer.soft_iron @ (field[a:b].mean(axis=0) - magnetometer.hard_iron_ut)
+        for a, b in zip(solved.rests.begin, solved.rests.end, strict=True)
+    ])  # fmt: skip
+    products = np.einsum("ka,kb->kab", solved.accelerometer.up, seen).reshape(-1, 9)
+    _, _, right = np.linalg.svd(np.column_stack([products, -np.ones(len(products))]))
+    matrix = right[-1, :9].reshape(3, 3)
+    left, _, last = np.linalg.svd(matrix * np.sign(np.linalg.det(matrix)))
+    assert vector_of(left @ last) == pytest.approx(aligned(session).angles_rad, abs=np.radians(1.0))
+
+
+def test_a_field_that_changes_from_rest_to_rest_is_refused_with_what_to_do(session: Session) -> None:
+    readings, solved, field, magnetometer, _ = session
+    rng = np.random.default_rng(1)
+    moved = field.copy()
+    for a, b in zip(solved.rests.begin, solved.rests.end, strict=True):
+        moved[a:b] += rng.normal(0, 8.0, 3)
+    with pytest.raises(
+        NotEnoughData, match=r"uncertain by u = .* rest in more poses in the same place, away from iron"
+    ):
+        align_field(replace(readings), solved, moved, magnetometer)
