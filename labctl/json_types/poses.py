@@ -71,7 +71,7 @@ class AlignmentJson(TypedDict):
     axes: dict[str, AccelerometerCoefficient]
     """Axis -> component of the rotation vector, deg."""
     covariance_deg2: list[list[float]]
-    """Covariance of the components, (3, 3), deg^2."""
+    """Covariance of the components, (3, 3), deg2."""
     definition: str
     """How the rotation is defined."""
 
@@ -82,17 +82,17 @@ class FieldAlignmentJson(TypedDict):
     axes: dict[str, AccelerometerCoefficient]
     """Axis -> component of the rotation vector, deg."""
     dip: AccelerometerCoefficient
-    """Angle of the field below the horizontal, deg."""
+    """Angle of the field below the horizontal, deg, -90 to 90."""
     covariance_deg2: list[list[float]]
-    """Covariance of the three components and the dip, (4, 4), deg^2."""
+    """Covariance of the three components and the dip, (4, 4), deg2."""
     place_deg: float
-    """Standard deviation of a component of the direction from rest to rest, beyond the noise, deg."""
+    """Standard deviation of a component of the field's direction from rest to rest, beyond the noise, deg."""
     rests: int
     """Number of rests that were used."""
     moves: int
-    """Number of moves between rests that were used."""
+    """Number of moves that were used."""
     definition: str
-    """How rotation and dip are defined."""
+    """How the rotation is defined."""
 
 
 class MoveLeftOutJson(TypedDict):

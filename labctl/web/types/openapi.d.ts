@@ -2489,7 +2489,7 @@ export interface components {
             };
             /**
              * Covariance Deg2
-             * @description Covariance of the components, (3, 3), deg^2.
+             * @description Covariance of the components, (3, 3), deg2.
              */
             covariance_deg2: number[][];
             /**
@@ -6841,16 +6841,16 @@ export interface components {
             axes: {
                 [key: string]: components["schemas"]["AccelerometerCoefficient"];
             };
-            /** @description Angle of the field below the horizontal, deg. */
+            /** @description Angle of the field below the horizontal, deg, -90 to 90. */
             dip: components["schemas"]["AccelerometerCoefficient"];
             /**
              * Covariance Deg2
-             * @description Covariance of the three components and the dip, (4, 4), deg^2.
+             * @description Covariance of the three components and the dip, (4, 4), deg2.
              */
             covariance_deg2: number[][];
             /**
              * Place Deg
-             * @description Standard deviation of a component of the direction from rest to rest, beyond the noise, deg.
+             * @description Standard deviation of a component of the field's direction from rest to rest, beyond the noise, deg.
              */
             place_deg: number;
             /**
@@ -6860,12 +6860,12 @@ export interface components {
             rests: number;
             /**
              * Moves
-             * @description Number of moves between rests that were used.
+             * @description Number of moves that were used.
              */
             moves: number;
             /**
              * Definition
-             * @description How rotation and dip are defined.
+             * @description How the rotation is defined.
              */
             definition: string;
         };

@@ -17,7 +17,7 @@ import labctl.json_types
 import labctl.services.schemas
 from instruments.laboratory import Contact, Laboratory
 from labctl.api import create_app
-from labctl.api.app import typed_dictionaries
+from labctl.api.descriptions import typed_dictionaries
 from labctl.certificates.document import Customer
 from labctl.recording.info import LeftOut, OutputUnit
 
