@@ -217,7 +217,7 @@ class ResidualMap(TypedDict):
     temperature_level_c: list[float]
     """Centre of the temperature level that the data set belongs to, deg C; the same in all maps of an axis."""
     level_width_c: float
-    """Largest difference of the temperatures in one level, K."""
+    """Largest difference of the temperatures in one level, deg C."""
     residual_dps: list[float]
     """Mean residual, measured minus modelled error, deg/s."""
     over_floor: list[float]

@@ -101,8 +101,8 @@ def align_field(
     if result.u_rad[worst] > LARGEST_U:
         raise NotEnoughData(
             f"{readings.info.serial}: rests and turns leave the magnetometer's angle about {AXES[worst]} uncertain "
-            f"by u = {np.degrees(result.u_rad[worst]):.2g} deg (limit {np.degrees(LARGEST_U):.2g} deg); record rests in more "
-            "poses in the same place, away from iron"
+            f"by u = {np.degrees(result.u_rad[worst]):.2g} deg (limit {np.degrees(LARGEST_U):.2g} deg); record rests "
+            "in more poses in the same place, away from iron"
         )
     return result
 

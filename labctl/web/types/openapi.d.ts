@@ -11126,7 +11126,7 @@ export interface components {
             temperature_level_c: number[];
             /**
              * Level Width C
-             * @description Largest difference of the temperatures in one level, K.
+             * @description Largest difference of the temperatures in one level, deg C.
              */
             level_width_c: number;
             /**

@@ -1,22 +1,88 @@
-"""Every field of the HTTP interface is described where it is declared."""
+"""Each field of requests, responses and results says what it is, and in which unit."""
 
 from __future__ import annotations
 
+import importlib
 import pkgutil
+import re
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cache
-from importlib import import_module
 from typing import Any
 
 import pytest
 from pydantic import BaseModel
 from typing_extensions import is_typeddict
 
-from labctl import json_types
+import labctl.json_types
+import labctl.services.schemas
+from instruments.laboratory import Contact, Laboratory
 from labctl.api import create_app
 from labctl.api.descriptions import typed_dictionaries
+from labctl.certificates.document import Customer
+from labctl.recording.info import LeftOut, OutputUnit
 
-#: Packages of which every field has a description.
-DESCRIBED = ("labctl.json_types",)
+#: Models of other packages that requests and responses contain.
+ELSEWHERE: tuple[type[BaseModel], ...] = (Contact, Customer, Laboratory, LeftOut, OutputUnit)
+#: Schemas of the document that FastAPI declares.
+OF_FASTAPI = {"HTTPValidationError", "ValidationError"}
+#: Ends of names that are units, and how a description writes them.
+UNITS = {
+    "_dps": r"deg/s", "_c": r"deg C", "_s": r"\bs\b", "_deg": r"\bdeg\b", "_hz": r"\bHz\b", "_ut": r"\buT\b",
+    "_dps2": r"\(deg/s\)\^2", "_m_s2": r"m/s2", "_pct": r"%", "_hpa": r"hPa", "_per_min": r"deg/min",
+}  # fmt: skip
+
+
+def modules(package: str, path: Iterable[str]) -> Iterator[str]:
+    """Yield the names of a package's modules."""
+    return (each.name for each in pkgutil.walk_packages(path, f"{package}."))
+
+
+def models() -> list[type[BaseModel]]:
+    """Return the models of requests and responses, each once."""
+    found = dict.fromkeys(ELSEWHERE)
+    for name in modules("labctl.services.schemas", labctl.services.schemas.__path__):
+        for value in vars(importlib.import_module(name)).values():
+            if isinstance(value, type) and issubclass(value, BaseModel) and value.__module__ == name:
+                found[value] = None
+    return list(found)
+
+
+def typed_dicts() -> list[type]:
+    """Return the typed dictionaries of results, each once."""
+    found = dict.fromkeys(
+        kind
+        for name in modules("labctl.json_types", labctl.json_types.__path__)
+        for kind in vars(importlib.import_module(name)).values()
+        if is_typeddict(kind)
+    )
+    return list(found)
+
+
+def without_unit(described: Mapping[str, str | None]) -> dict[str, str | None]:
+    """Return field -> description of the fields that a name gives a unit, and whose description does not state it."""
+    missing = {}
+    for name, description in described.items():
+        suffix = max((end for end in UNITS if name.endswith(end)), key=len, default="")
+        if suffix and not re.search(UNITS[suffix], description or ""):
+            missing[name] = description
+    return missing
+
+
+@pytest.mark.parametrize("model", models(), ids=lambda model: f"{model.__module__}.{model.__name__}")
+def test_each_field_of_a_model_has_a_description(model: type[BaseModel]) -> None:
+    assert [name for name, field in model.model_fields.items() if not field.description] == []
+
+
+@pytest.mark.parametrize("model", models(), ids=lambda model: f"{model.__module__}.{model.__name__}")
+def test_a_field_named_with_a_unit_states_this_unit(model: type[BaseModel]) -> None:
+    assert without_unit({name: field.description for name, field in model.model_fields.items()}) == {}
+
+
+@pytest.mark.parametrize("kind", typed_dicts(), ids=lambda kind: f"{kind.__module__}.{kind.__name__}")
+def test_each_field_of_a_typed_dictionary_has_a_docstring_with_its_unit(kind: type) -> None:
+    described = typed_dictionaries()[kind.__name__]
+    assert [name for name in kind.__annotations__ if name not in described] == []
+    assert without_unit(described) == {}
 
 
 @cache
@@ -24,48 +90,20 @@ def properties() -> dict[tuple[str, str], dict[str, Any]]:
     """Return (schema, field) -> property of the OpenAPI document."""
     schemas = create_app(None).openapi()["components"]["schemas"]
     return {
-        (name, field): found
+        (name, key): value
         for name, schema in schemas.items()
-        for field, found in schema.get("properties", {}).items()
+        if name not in OF_FASTAPI
+        for key, value in schema.get("properties", {}).items()
     }
 
 
-def declared_in(package: str) -> set[str]:
-    """Return the names under which classes of a package may stand in the OpenAPI document."""
-    folder = import_module(package)
-    modules = [folder, *(import_module(each.name) for each in pkgutil.walk_packages(folder.__path__, f"{package}."))]
-    kinds = {
-        kind
-        for module in modules
-        for kind in vars(module).values()
-        if isinstance(kind, type) and (is_typeddict(kind) or issubclass(kind, BaseModel))
-    }
-    own = {(kind.__module__, kind.__name__) for kind in kinds if f"{kind.__module__}.".startswith(f"{package}.")}
-    names = {name for _, name in own} | {f"{module.replace('.', '__')}__{name}" for module, name in own}
-    return names | {f"{name}-{direction}" for name in names for direction in ("Input", "Output")}
+def test_each_property_in_the_description_of_the_api_has_a_description() -> None:
+    assert [f"{name}.{key}" for (name, key), value in properties().items() if "description" not in value] == []
 
 
-@pytest.mark.parametrize("package", DESCRIBED)
-def test_every_field_of_the_openapi_document_is_described(package: str) -> None:
-    names = declared_in(package)
-    own = {where: found for where, found in properties().items() if where[0] in names}
-    assert len(own) > 100
-    missing = [f"{schema}.{field}" for (schema, field), found in own.items() if not found.get("description")]
-    assert not missing, f"fields of {package} without a description: {', '.join(missing)}"
-
-
-def test_every_field_of_a_typed_dictionary_is_described() -> None:
-    described, missing = typed_dictionaries(), []
-    for module in pkgutil.walk_packages(json_types.__path__, f"{json_types.__name__}."):
-        for name, kind in vars(import_module(module.name)).items():
-            if is_typeddict(kind):
-                missing += [f"{name}.{field}" for field in kind.__annotations__ if field not in described[name]]
-    assert not missing, f"fields without a docstring below them: {', '.join(missing)}"
-
-
-def test_a_keyword_as_a_field_is_described_in_the_functional_syntax() -> None:
-    assert properties()["FailingRange", "from"]["description"].endswith("in the unit of the channel.")
-
-
-def test_an_inherited_field_is_described() -> None:
-    assert properties()["CataloguedEffect", "id"]["description"]
+def test_fields_of_typed_dictionaries_are_described_by_their_docstrings() -> None:
+    described = properties()
+    assert described["Suspect", "effect"]["description"] == "Id of the effect."
+    assert described["FailingRange", "from"]["description"].endswith("in the unit of the channel.")  # a keyword
+    assert described["CataloguedEffect", "id"]["description"].startswith("Id by which")  # inherited
+    assert described["labctl__json_types__models__LeftOut", "effect"]["description"] == "Id of the effect."  # two names
