@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from instruments.errors import LinkError
 from instruments.interfaces.gyro import Gyro, Readings
 from procedures.contracts.errors import BadData
@@ -75,10 +77,12 @@ def read_round(
     """Read every unit once and write down what falls into the gate."""
     for name, gyro in context.bench.gyros.items():
         readings = gyro.read(max(slice_s, 1.5 / gyro.sample_rate_hz))
+        kept = cut(readings, gate, context.recorder.time)
         if len(readings):
+            room = late_readings.room(gyro, readings, gate, counts[name])
+            kept = replace(kept, lost=min(kept.lost, max(room - len(kept), 0)))
             context.monitor.add_readings(name, gyro, readings)
             counts[name].note(readings.t_s, gate[0])
-        kept = cut(readings, gate, context.recorder.time)
         if len(kept) or kept.lost or kept.damaged:
             counts[name].add(kept)
             context.response.add(name, kept)

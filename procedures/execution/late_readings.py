@@ -66,6 +66,18 @@ def _periods(gyro: Gyro, duration_s: float) -> float:
     return duration_s / measured_s if measured_s else duration_s * gyro.sample_rate_hz
 
 
+def room(gyro: Gyro, readings: Readings, gate: tuple[float, float], count: ReadingCounts) -> int:
+    """Return how many readings fall into a gate, clock time, from the newest known one to the last of these, n >= 1.
+
+    Readings may be lost from inside a gate to beyond its end: only those of the gate are its own.
+    """
+    newest_s = count.newest_s if math.isfinite(count.newest_s) else float(readings.t_s[0])
+    until_s = min(float(readings.t_s[-1]), gate[1])
+    if newest_s >= gate[0]:
+        return math.floor(_periods(gyro, max(until_s - newest_s, 0.0)) + 0.5)
+    return math.floor(_periods(gyro, max(until_s - gate[0], 0.0)) + 0.5) + 1  # one may be at its very beginning
+
+
 def pending(gyro: Gyro, gate: tuple[float, float], count: ReadingCounts) -> int:
     """Return how many readings of the end of a gate, clock time, have not come yet; 0 where the last one has."""
     periods = _periods(gyro, gate[1] - max(count.newest_s, gate[0]))

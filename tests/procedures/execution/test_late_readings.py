@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -123,6 +124,35 @@ def test_what_a_unit_did_not_send_before_its_silence_ended_a_data_set_is_lost() 
     assert 20 <= lost(rig, 1) <= 45  # until the error
     assert came(rig, 2) == pytest.approx(100, abs=1)
     assert lost(rig, 2) == 0
+
+
+class Gap(FakeGyro):
+    """A unit that loses readings from the last second of the first data set to 2 s later, and counts them."""
+
+    lost_until_s = 0.0
+
+    def read(self, duration_s: float) -> Readings:
+        found = super().read(duration_s)
+        came = sum(len(block[2]) for block in self.bench.journal.blocks if block[0] == 1)
+        if len(self.bench.journal.headers) == 1 and came >= 90 and not self.lost_until_s:
+            self.lost_until_s = self.clock.now_s() + 2.0
+        if not self.lost_until_s or not len(found):
+            return found
+        kept = found.t_s >= self.lost_until_s
+        self.missing = getattr(self, "missing", 0) + int((~kept).sum())
+        if not kept.any():
+            return replace(found.only(kept), lost=0)
+        lost, self.missing, self.lost_until_s = self.missing, 0, self.lost_until_s if not kept.all() else -1.0
+        return replace(found.only(kept), lost=lost)
+
+
+def test_of_readings_lost_across_the_end_of_a_data_set_it_counts_its_own() -> None:
+    rig = with_unit(Gap)
+    assert rig.run().state is CampaignState.DONE
+    assert came(rig, 1) + lost(rig, 1) == pytest.approx(100, abs=1)
+    assert came(rig, 1) < 98
+    assert came(rig, 2) + lost(rig, 2) == pytest.approx(100, abs=1)  # those lost before it are not its own
+    assert came(rig, 2) >= 99
 
 
 def test_where_they_are_lost_each_time_the_campaign_does_not_call_it_complete() -> None:
