@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -12,6 +12,9 @@ from labctl.cli.import_dialogue import Acceptance, named, print_template, read_g
 from labctl.cli.options import Beside, Database, ImporterName, ImporterOptions, Json, MapFile
 from labctl.cli.output import console, print_json, print_warnings
 from labctl.cli.printing.inspection import print_left_out
+
+if TYPE_CHECKING:
+    from labctl.services.schemas.recordings import ImportResponse
 
 export_app = typer.Typer(no_args_is_help=True, help="Export recordings from the database to files.")
 
@@ -63,7 +66,6 @@ def import_(
     database: Database = None,
 ) -> None:
     """Import data made on any bench: in the interchange format, or a log, whose columns a map names."""
-    from labctl.recording.info import GIVE_DATE
     from labctl.services.commands.open import execute
     from labctl.services.commands.registry import IMPORT_RECORDING
     from labctl.services.commands.requests import RecordingFolder
@@ -83,6 +85,13 @@ def import_(
     if as_json:
         print_json(answer)
         return
+    _print_imported(answer)
+
+
+def _print_imported(answer: ImportResponse) -> None:
+    """Print what was imported, what is doubtful of it, and what comes next."""
+    from labctl.recording.info import GIVE_DATE
+
     print_warnings(answer.warnings)
     print_left_out(answer.left_out)
     if any(warning.n is not None for warning in answer.warnings):
@@ -94,6 +103,12 @@ def import_(
     console.print(
         f"recording {answer.recording} of {answer.serial}: {answer.datasets} data sets, {answer.readings} readings"
     )
+    if answer.similar_unit is not None:
+        console.print(
+            f"unit {answer.serial} is new here; unit {answer.similar_unit} is there too: if that is the one that was "
+            "measured, import the file again with its serial number",
+            style="yellow",
+        )
     console.print(f"next: labctl fit {answer.serial} --model {answer.suggested_model}", style="dim")
 
 

@@ -31,6 +31,7 @@ EFFORT = 1
 def import_folder(store: Store, folder: Path, at: datetime) -> ImportResponse:
     """Import a recording from a folder; all of it or nothing. Raises BadRecording."""
     recording = _ordered(read_recording(folder), at)
+    is_new = not store.units.has(recording.info.serial)
     number = store.recordings.add_import(recording, at)
     row = store.recordings.get(number)
     readings = row.readings if recording.info.kind == "samples" else len(recording)
@@ -44,6 +45,8 @@ def import_folder(store: Store, folder: Path, at: datetime) -> ImportResponse:
         measured_at=recording.info.measured_at,
         warnings=inspect_stored(store, row, recording).warnings,
         left_out=list(recording.info.left_out),
+        new_unit=is_new,
+        similar_unit=store.units.most_similar(row.serial) if is_new else None,
     )
 
 

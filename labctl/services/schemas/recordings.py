@@ -77,6 +77,12 @@ class ImportResponse(ResponseModel):
     left_out: list[LeftOut] = Field(
         default_factory=list, description="Readings that were left out by choice, with how many and why."
     )
+    new_unit: bool = Field(default=False, description="Whether this is the first recording of its unit.")
+    similar_unit: str | None = Field(
+        default=None,
+        description="Of a new unit: serial number of the known unit that differs from it by least, as if mistyped; "
+        "null: none is nearly the same.",
+    )
 
 
 class SimulatedRecordingResponse(ImportResponse):

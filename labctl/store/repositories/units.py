@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
 from datetime import datetime
+from itertools import zip_longest
 from typing import Any
 
 import sqlalchemy as sa
@@ -19,6 +21,12 @@ def _measured() -> sa.ColumnElement[bool]:
     return sa.or_(whole, sa.exists().where(s.serial == tables.units.c.serial))
 
 
+#: Serial numbers that begin or end with so many equal characters are compared whole.
+ALIKE = 3
+#: So many of them at most, which takes some milliseconds.
+MOST_COMPARED = 1000
+#: The least similarity (difflib) of serial numbers that may be one number mistyped: one character of seven.
+SIMILARITY = 0.85
 #: A unit that only an import under way has brought in is not there yet.
 SEEN = _measured()
 
@@ -59,6 +67,26 @@ class Units:
         if row is None:
             raise NotFound(f"unit {serial!r} is not in this database; `labctl import DIR` or a campaign adds it")
         return Unit(*row)
+
+    def has(self, serial: str) -> bool:
+        """Return whether a unit is there."""
+        wanted = sa.select(tables.units.c.serial).where(tables.units.c.serial == serial, SEEN)
+        with self._database.reading() as connection:
+            return connection.scalar(wanted) is not None
+
+    def most_similar(self, serial: str) -> str | None:
+        """Return the serial number of the unit that differs from this one by least, such as by one digit; None: none.
+
+        Compared are those of nearly the same length that begin or end alike.
+        """
+        known, k = tables.units.c.serial, min(ALIKE, len(serial))
+        begins = sa.func.substr(known, 1, k) == serial[:k]
+        ends = sa.func.substr(known, sa.func.length(known) - k + 1) == serial[-k:]
+        near = sa.func.abs(sa.func.length(known) - len(serial)) <= 1
+        wanted = sa.select(known).where(SEEN, near, begins | ends, known != serial).limit(MOST_COMPARED)
+        with self._database.reading() as connection:
+            near_by = difflib.get_close_matches(serial, list(connection.scalars(wanted)), n=10, cutoff=SIMILARITY)
+        return min(near_by, key=lambda each: sum(a != b for a, b in zip_longest(each, serial)), default=None)
 
     def count(self) -> int:
         """Return how many units there are."""

@@ -7480,6 +7480,17 @@ export interface components {
              * @description Readings that were left out by choice, with how many and why.
              */
             left_out: components["schemas"]["labctl__recording__info__LeftOut"][];
+            /**
+             * New Unit
+             * @description Whether this is the first recording of its unit.
+             * @default false
+             */
+            new_unit: boolean;
+            /**
+             * Similar Unit
+             * @description Of a new unit: serial number of the known unit that differs from it by least, as if mistyped; null: none is nearly the same.
+             */
+            similar_unit: string | null;
         };
         /**
          * ImproveRequest
@@ -11874,6 +11885,17 @@ export interface components {
              * @description Readings that were left out by choice, with how many and why.
              */
             left_out: components["schemas"]["labctl__recording__info__LeftOut"][];
+            /**
+             * New Unit
+             * @description Whether this is the first recording of its unit.
+             * @default false
+             */
+            new_unit: boolean;
+            /**
+             * Similar Unit
+             * @description Of a new unit: serial number of the known unit that differs from it by least, as if mistyped; null: none is nearly the same.
+             */
+            similar_unit: string | null;
             /**
              * Recipe
              * @description Name of the recipe.
