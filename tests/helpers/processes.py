@@ -116,6 +116,11 @@ class ServiceProcess:
                 os.kill(pid, signal.SIGKILL)
         kill(self.process)
 
+    @property
+    def bench_was_replaced(self) -> bool:
+        """Whether the supervisor has ended the bench process of the start, or started another."""
+        return self._bench_pid_now() != self.bench_pid or not Path(f"/proc/{self.bench_pid}").exists()
+
     def _bench_pid_now(self) -> int:
         """Return the bench process, which may be another than at the start."""
         location = str(self.database)

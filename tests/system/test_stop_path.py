@@ -220,10 +220,15 @@ def test_instruments_that_do_not_answer_a_stop_are_named_until_they_do(
         assert "Use the stop switch" in asked.text
         while "table" not in (bench := service.http.get("/api/benches").json()[0])["unconfirmed"]:
             before_next_request()
-        assert bench["stop"]["phase"] in {"asked", "stopping"}
-        while not status(service.url, campaign)["step_text"].startswith("stopping: table"):
-            before_next_request()  # the bench is marked before the step's text is
         assert service.http.get("/health").json()["status"] == "look at the bench"
+        # on a busy computer the supervisor may have replaced a bench process that was late to answer: the stop is then
+        # over, and the bench marked
+        if not service.bench_was_replaced:
+            assert bench["stop"]["phase"] in {"asked", "stopping"}
+        while not service.bench_was_replaced and not status(service.url, campaign)["step_text"].startswith(
+            "stopping: table"
+        ):
+            before_next_request()  # the bench is marked before the step's text is
     finally:
         simulator.process.send_signal(signal.SIGCONT)
     assert "a hand in the bench" in ended(service.url, campaign)["reason"]
