@@ -156,8 +156,8 @@ def test_ports_are_listed_with_the_name_for_a_bench_file(lab: Lab, monkeypatch: 
             return False
 
     monkeypatch.setattr("serial.tools.list_ports.comports", lambda: [Port()])
-    monkeypatch.setattr("instruments.discovery.ports.stable_name", lambda _: "/dev/serial/by-id/usb-A9")
-    monkeypatch.setattr("instruments.discovery.ports.users_of", lambda _: ["process 8 (minicom)"])
+    monkeypatch.setattr("instruments.discovery.stable_name", lambda _: "/dev/serial/by-id/usb-A9")
+    monkeypatch.setattr("instruments.discovery.users_of", lambda _: ["process 8 (minicom)"])
     (port,) = lab.json("bench", "ports")
     assert port == {
         "device": "/dev/null", "path": "/dev/serial/by-id/usb-A9", "adapter": "A9", "product": "FT232R",

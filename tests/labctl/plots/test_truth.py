@@ -120,7 +120,7 @@ def test_scatters_draw_every_data_set_where_it_was_measured() -> None:
 
 @pytest.mark.parametrize("draw", [channels, previous_rate, time])
 def test_a_thinned_picture_says_n_of_how_many(draw: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("labctl.fitting.criticism.diagnostics.thinning.drawn_rows.__defaults__", (60,))
+    monkeypatch.setattr("labctl.fitting.criticism.diagnostics.channels.drawn_rows.__defaults__", (60,))
     found = views(single_axis(5))
     assert {rate > 0 for rate in found["sets"]["channels"]["table_rate_dps"]} == {True, False}
     figure = draw({"views": found})

@@ -162,7 +162,7 @@ def test_a_malformed_database_is_refused_before_it_is_written_to(
         prepared = prepare(store, "short", BENCH, VirtualClock(), clip=False)
         prepared.bench.close()
     if not whole:
-        monkeypatch.setattr("labctl.store.connection.start_check.WHOLE_UP_TO_BYTES", 0)
+        monkeypatch.setattr("labctl.store.connection.sqlite_file.WHOLE_UP_TO_BYTES", 0)
     spoil(Path(location))
     before = Path(location).read_bytes()
     refused = CliRunner().invoke(app, ["import", "nowhere", "--database", location])
@@ -181,7 +181,7 @@ def test_a_page_that_fits_nowhere_is_found(location: str, monkeypatch: pytest.Mo
         connection.exec_driver_sql("PRAGMA writable_schema=ON")
         connection.exec_driver_sql("UPDATE sqlite_schema SET rootpage = 3 WHERE name = 'audit'")
     if size == "large":
-        monkeypatch.setattr("labctl.store.connection.start_check.WHOLE_UP_TO_BYTES", 0)
+        monkeypatch.setattr("labctl.store.connection.sqlite_file.WHOLE_UP_TO_BYTES", 0)
     with pytest.raises(StoreError, match="damaged"), open_store(location, write=True):
         pass
 
@@ -191,9 +191,9 @@ def test_blocks_of_readings_of_a_large_database_are_left_to_the_check(
 ) -> None:
     with open_store(location, write=True) as store:
         asked: list[str] = []
-        monkeypatch.setattr("labctl.store.connection.start_check.WHOLE_UP_TO_BYTES", 0)
+        monkeypatch.setattr("labctl.store.connection.sqlite_file.WHOLE_UP_TO_BYTES", 0)
         monkeypatch.setattr(
-            "labctl.store.connection.start_check._damage", lambda _connection, text: asked.append(text) or ""
+            "labctl.store.connection.sqlite_file._damage", lambda _connection, text: asked.append(text) or ""
         )
         with store.audit._database.reading() as connection:
             assert first_damage(connection) == ""
