@@ -29,7 +29,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 #: In memory, for this process and its workers; before anything asks where temporary files go.
 IN_MEMORY = memory_folder.enter()
 # `labctl stop` finds benches by what is kept here: those of the tests are no benches of the user.
-os.environ["XDG_STATE_HOME"] = str(Path(tempfile.gettempdir()) / f"labctl-tests-state-{os.getuid()}-{os.getpid()}")
+os.environ["XDG_STATE_HOME"] = str(Path(tempfile.gettempdir()) / f"tests-of-labctl-state-{os.getuid()}-{os.getpid()}")
 # The processes that tests start would each compile all modules again.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False

@@ -13,7 +13,7 @@ from contextlib import suppress
 from pathlib import Path
 
 MEMORY = Path("/dev/shm")
-PREFIX = f"labctl-tests-{os.getuid()}-"
+PREFIX = f"tests-of-labctl-{os.getuid()}-"
 #: What must be free: a run writes 0.5 GB, of which it removes most as it goes.
 ROOM_BYTES = 4 * 2**30
 

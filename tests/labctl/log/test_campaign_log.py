@@ -90,7 +90,7 @@ def test_a_campaign_that_fails(tmp_path: Path) -> None:
     attempts = [each["message"] for each in reported if each["kind"] == "link.retry"]
     assert [text.split(" failed: ")[0] for text in attempts] == [f"attempt {n} of 5" for n in (1, 2, 3)]
     assert [each["kind"] for each in reported if each["kind"] != "link.retry"] == [
-        "link.degraded", "link.lost", "guard.stale",
+        "readings_lost", "link.degraded", "readings_lost", "link.lost", "guard.stale",
     ]  # fmt: skip
     assert reported[-1]["limit"] < reported[-1]["value"]
     ended = [each for each in records.named("step.ended") if each["outcome"] != "done"]
