@@ -3,8 +3,6 @@
 import os
 import sys
 
-from labctl.lazy_imports import install
-
 # Fits are many small solves, for which threads only get in each other's way; to be set before numpy is loaded.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
@@ -30,5 +28,7 @@ def main() -> None:
     except ModuleNotFoundError as error:  # labctl was installed as a library for robots
         if str(error.name).startswith("labctl"):
             raise
+        from labctl.lazy_imports import install
+
         sys.exit(f"labctl: the command line needs {error.name}, which is not installed; run {install('lab')}")
     run()

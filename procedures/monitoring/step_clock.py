@@ -4,7 +4,7 @@ A run of N steps at the nominal step rate f takes T = a + (N/f)(1 + x), where 1 
 a what ramps and replies take, equal in all runs of one session at one step rate. Least squares over all runs of a
 campaign give x and its drift; the standard uncertainty is that of their scatter with its degrees of freedom (GUM 4.2,
 G.3): how late replies are need not be known. A drift is applied where it differs from 0 by more than its expanded
-uncertainty; one that is not applied is less than that, which u contains at every time.
+uncertainty; one that is not applied is part of u, which contains it in full at the level of confidence.
 """
 
 from __future__ import annotations
@@ -49,7 +49,8 @@ class ClockFit:
     def u_ppm(self, t_s: float) -> float:
         """Return the standard uncertainty of the ratio at campaign time `t_s`, ppm."""
         at = np.array([1.0, self._hours(t_s)])
-        return 1e6 * self.ratio(t_s) ** 2 * math.sqrt(max(float(at @ self.covariance @ at), 0.0))
+        left_out = 0.0 if self.is_drift_applied else self.x_per_h * self._hours(t_s) / coverage_factor(self.freedom)
+        return 1e6 * self.ratio(t_s) ** 2 * math.sqrt(max(float(at @ self.covariance @ at), 0.0) + left_out**2)
 
     def expanded_ppm(self, t_s: float) -> float:
         """Return the expanded uncertainty at a level of confidence of 95 %, ppm."""

@@ -91,7 +91,7 @@ def test_a_driver_that_is_registered_needs_no_other_list(monkeypatch: pytest.Mon
 
 
 #: What every chamber has.
-KNOWN = "driver, port, host, tcp_port, adapter, min_c, max_c, safe_c, ramp_c_per_min"
+KNOWN = "driver, port, host, tcp_port, adapter, min_c, max_c, safe_c, ramp_c_per_min, air_tau_s"
 
 
 class HeaterSettings(ChamberSettings):

@@ -31,6 +31,9 @@ class Tap:
         self.said += data
         return data
 
+    def connect(self) -> Tap:
+        return self
+
     def __getattr__(self, name: str) -> Any:
         return getattr(self._device, name)
 

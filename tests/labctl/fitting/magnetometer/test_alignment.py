@@ -64,6 +64,6 @@ def test_a_field_that_changes_from_rest_to_rest_is_refused_with_what_to_do(sessi
     for a, b in zip(solved.rests.begin, solved.rests.end, strict=True):
         moved[a:b] += rng.normal(0, 8.0, 3)
     with pytest.raises(
-        NotEnoughData, match=r"uncertain by u = .* rest in more poses in the same place, away from iron"
+        NotEnoughData, match=r"uncertain by u = .* record rests in more poses in the same place, away from iron"
     ):
         align_field(replace(readings), solved, moved, magnetometer)
