@@ -79,8 +79,9 @@ def read_round(
         readings = gyro.read(max(slice_s, 1.5 / gyro.sample_rate_hz))
         kept = cut(readings, gate, context.recorder.time)
         if len(readings):
-            room = late_readings.room(gyro, readings, gate, counts[name])
-            kept = replace(kept, lost=min(kept.lost, max(room - len(kept), 0)))
+            if counts[name].newest_s < gate[0] or readings.t_s[-1] >= gate[1]:  # some may be lost outside the gate
+                room = late_readings.room(gyro, readings, gate, counts[name])
+                kept = replace(kept, lost=min(kept.lost, max(room - len(kept), 0)))
             context.monitor.add_readings(name, gyro, readings)
             counts[name].note(readings.t_s, gate[0])
         if len(kept) or kept.lost or kept.damaged:

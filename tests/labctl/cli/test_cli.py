@@ -32,7 +32,7 @@ def fog(imported: Lab, tmp_path: Path) -> Lab:
 def test_import_says_what_came_in(lab: Lab) -> None:
     assert lab.json("import", str(EXAMPLES / "osu-fog")) == {
         "serial": "OSU-FOG-2024", "recording": 1, "datasets": 695, "readings": 695, "suggested_model": "ojeda2000",
-        "measured_at": "2024-08-01T00:00:00Z", "warnings": [], "left_out": [],
+        "measured_at": "2024-08-01T00:00:00Z", "warnings": [], "left_out": [], "new_unit": True, "similar_unit": None,
     }  # fmt: skip
 
 
