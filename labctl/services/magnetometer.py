@@ -107,7 +107,7 @@ def _with_alignment(
         return answer.model_copy(update={"text": [said, *answer.text]})
     angles = ", ".join(
         f"{value:.2f} +- {2 * u:.2f}"
-        for value, u in zip(np.degrees(aligned.angles_rad), np.degrees(aligned.u_rad), strict=False)
+        for value, u in zip(np.degrees(aligned.angles_rad), np.degrees(aligned.u_rad[:3]), strict=True)
     )
     said = (
         f"Magnetometer turned from the accelerometer's axes about x, y, z by {angles} deg (U, k = 2); the field dips "

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 import serial
 
-from instruments.simulators.links.device import SimulatedDevice
+from instruments.simulators.links.device import SimulatedDevice, connected
 
 FaultKind = Literal[
     "silence",  # nothing comes out
@@ -143,8 +143,8 @@ class FaultyWire:
 
     def connect(self) -> FaultyWire:
         """Return a further link to the instrument: one of its own where each connection has one, else this wire."""
-        own = getattr(self._device, "connect", None)
-        return self if own is None else FaultyWire(own(), self.faults)
+        own = connected(self._device)
+        return self if own is self._device else FaultyWire(own, self.faults)
 
     @property
     def is_rpc(self) -> bool:

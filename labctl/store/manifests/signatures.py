@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from labctl.errors import BadInput
+from labctl.extras import needs_extra
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ec import EllipticCurvePublicKey
@@ -15,7 +16,6 @@ if TYPE_CHECKING:
 
 #: What is signed, before the hash: a signature over a manifest is none over anything else.
 CONTEXT = b"labctl-manifest/1\n"
-NEEDS = "pip install 'labctl[seal]'"
 
 
 def signed_text(digest: str) -> bytes:
@@ -53,7 +53,7 @@ class PublicKey:
 
 def public_key(content: bytes, where: str) -> PublicKey:
     """Read a public key in PEM form. Raises BadInput."""
-    try:
+    with needs_extra("seal", f"{where}: a signature"):
         from cryptography.hazmat.primitives.asymmetric.ec import (  # noqa: PLC0415  as above
             SECP256R1,
             EllipticCurvePublicKey,
@@ -64,8 +64,6 @@ def public_key(content: bytes, where: str) -> PublicKey:
             PublicFormat,
             load_pem_public_key,
         )
-    except ModuleNotFoundError as error:
-        raise BadInput(f"{where}: signatures need {error.name}, which is not installed; run {NEEDS}") from error
     try:
         key = load_pem_public_key(content)
     except (ValueError, TypeError) as error:

@@ -24,7 +24,7 @@ def _measured() -> sa.ColumnElement[bool]:
 #: Serial numbers that begin or end with so many equal characters are compared whole.
 ALIKE = 3
 #: So many of them at most, which takes some milliseconds.
-MOST_COMPARED = 1000
+MAX_COMPARED = 1000
 #: The least similarity (difflib) of serial numbers that may be one number mistyped: one character of seven.
 SIMILARITY = 0.85
 #: A unit that only an import under way has brought in is not there yet.
@@ -83,7 +83,7 @@ class Units:
         begins = sa.func.substr(known, 1, k) == serial[:k]
         ends = sa.func.substr(known, sa.func.length(known) - k + 1) == serial[-k:]
         near = sa.func.abs(sa.func.length(known) - len(serial)) <= 1
-        wanted = sa.select(known).where(SEEN, near, begins | ends, known != serial).limit(MOST_COMPARED)
+        wanted = sa.select(known).where(SEEN, near, begins | ends, known != serial).limit(MAX_COMPARED)
         with self._database.reading() as connection:
             near_by = difflib.get_close_matches(serial, list(connection.scalars(wanted)), n=10, cutoff=SIMILARITY)
         return min(near_by, key=lambda each: sum(a != b for a, b in zip_longest(each, serial)), default=None)

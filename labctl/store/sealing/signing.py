@@ -18,13 +18,14 @@ import sqlalchemy as sa
 
 from labctl.config import SEAL_KEY_VARIABLE
 from labctl.errors import BadInput, LabctlError, StoreError
+from labctl.extras import needs_extra
 from labctl.log import get_logger
 from labctl.private_keys import SCHEME, KeyUse, TokenUri, open_session, refuse_open_key, token_uri
 from labctl.store.connection.database import Database
 from labctl.store.connection.private_files import FILE
 from labctl.store.manifests import chain
 from labctl.store.manifests.chain import ChainHead
-from labctl.store.manifests.signatures import NEEDS, PublicKey, public_key, signed_text
+from labctl.store.manifests.signatures import PublicKey, public_key, signed_text
 from labctl.store.schema import tables
 
 if TYPE_CHECKING:
@@ -56,10 +57,8 @@ class Signer(Protocol):
 
 def signer_of(setting: str) -> Signer:
     """Open the key that a setting names: a PEM file, or a PKCS#11 URI. Raises BadInput."""
-    try:
+    with needs_extra("seal", "the seal key"):
         return _token_signer(setting) if setting.startswith(SCHEME) else _file_signer(Path(setting))
-    except ModuleNotFoundError as error:
-        raise BadInput(f"the seal key needs {error.name}, which is not installed; run {NEEDS}") from error
 
 
 @dataclass(frozen=True)
@@ -108,15 +107,13 @@ def _public_pem(key: Ed25519PrivateKey | EllipticCurvePrivateKey) -> bytes:
 
 def create_key(path: Path) -> FileSigner:
     """Make an Ed25519 key in a new private file, with its public key beside it (.pub). Raises BadInput, OSError."""
-    try:
+    with needs_extra("seal", "a seal key"):
         from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey  # noqa: PLC0415
         from cryptography.hazmat.primitives.serialization import (  # noqa: PLC0415
             Encoding,
             NoEncryption,
             PrivateFormat,
         )
-    except ModuleNotFoundError as error:
-        raise BadInput(f"a seal key needs {error.name}, which is not installed; run {NEEDS}") from error
     beside = Path(f"{path}.pub")
     for each in (path, beside):
         if each.exists() or each.is_symlink():
