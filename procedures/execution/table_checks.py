@@ -136,6 +136,7 @@ def _figures(found: MeasuredClock) -> dict[str, float]:
         "u_ppm": found.u_ppm,
         "freedom": float(found.fit.freedom),
         "expanded_ppm": found.expanded_ppm,
+        "deviation_expanded_ppm": found.deviation_expanded_ppm,
         "limit_ppm": found.limit_ppm,
         "drift_ppm_per_h": found.fit.drift_ppm_per_h,
         "drift_u_ppm_per_h": found.fit.drift_u_ppm_per_h,

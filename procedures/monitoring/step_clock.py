@@ -91,9 +91,14 @@ class MeasuredClock:
         return coverage_factor(self.fit.freedom) * self.u_ppm
 
     @property
+    def deviation_expanded_ppm(self) -> float:
+        """Expanded uncertainty of the deviation at the last run, ppm: there a drift counts more than on average."""
+        return self.fit.expanded_ppm(self.fit.until_s)
+
+    @property
     def limit_ppm(self) -> float:
         """Largest deviation from the nominal clock that both uncertainties explain, ppm."""
-        return math.hypot(self.expanded_ppm, 3.0 * self.nominal.u_ppm)
+        return math.hypot(self.deviation_expanded_ppm, 3.0 * self.nominal.u_ppm)
 
 
 def coverage_factor(freedom: int, confidence: float = CONFIDENCE) -> float:
