@@ -62,8 +62,8 @@ class Heard:
         return whole
 
 
-def listen(unit: Unit, period_s: float, until_s: float, wrap: int = 0) -> Heard:
-    """Poll three times and read for six seconds, again and again, as a campaign does."""
+def listen(unit: Unit, period_s: float, until_s: float, wrap: int = 0, further_s: int = 0) -> Heard:
+    """Poll three times and read for six seconds, again and again, as a campaign does; read `further_s` at the end."""
     heard = Heard(StreamTime(period_s, 0.0))
     device_time = DeviceTime(period_s, wrap) if wrap else None
     position, now_s = 0, 0.0
@@ -100,6 +100,9 @@ def listen(unit: Unit, period_s: float, until_s: float, wrap: int = 0) -> Heard:
         for _ in range(6):
             now_s += 1.0
             take()
+    for _ in range(further_s):
+        now_s += 1.0
+        take()
     return heard
 
 
@@ -136,7 +139,13 @@ def test_what_never_comes_is_lost_and_the_times_after_it_are_right(missing: int,
         assert ticks == pytest.approx(later.raw["n"] - later.raw["n"][0], abs=1e-6)
 
 
-def test_the_readings_of_a_data_set_that_ends_while_it_is_open_come_later() -> None:
+def test_readings_are_kept_back_while_it_is_open_whether_some_are_lost_and_come_once_it_is_decided() -> None:
     unit = Unit.make(101.0, 60.0, lost=(44.8, 8))
     heard = listen(unit, 0.01, 44.0)
-    assert heard.stream.is_late or heard.joined().lost == 8
+    assert heard.stream.is_late
+    assert (heard.joined().lost, heard.joined().raw["n"][-1] < 44.8 * 101.0) == (0, True)
+    found = listen(unit, 0.01, 44.0, further_s=2).joined()
+    assert found.lost == 8
+    number = found.raw["n"][found.raw["n"] > 44.2 * 101.0]
+    assert list(number) == [n for n in unit.number if number[0] <= n <= number[-1]]
+    assert number[-1] > 46.0 * 101.0
