@@ -98,7 +98,7 @@ from labctl.store.repositories.standards import (
     Standards as Standards,
 )
 from labctl.store.repositories.units import Units as Units
-from labctl.store.sealing.signing import (
+from labctl.store.sealing.signers import (
     SEAL_KEY as SEAL_KEY,
     Signer as Signer,
     create_key as create_key,

@@ -8,15 +8,16 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.errors import BadInput, NotEnoughData
+from labctl.errors import NotEnoughData
 from labctl.fitting.data.earth import turning_columns, turning_size_dps, with_known_size, with_prior
 from labctl.fitting.data.fit_data import FitData
-from labctl.fitting.data.mean_noise import response_dps
 from labctl.fitting.data.mounting_angles import leaning_rates
-from labctl.fitting.data.rate_profile import DELAY, TIME_CONSTANT
+from labctl.fitting.data.rate_profile import TIME_CONSTANT
 from labctl.fitting.data.shifts import KINDS, shifts_of
 from labctl.fitting.estimation.axis_design import AxisDesign, axis_design
+from labctl.fitting.estimation.common_turn_error import with_common_error
 from labctl.fitting.estimation.held import considered, joint_covariance
+from labctl.fitting.estimation.reference_time import TimeErrors, time_errors
 from labctl.fitting.estimation.response import (
     first_response,
     next_response,
@@ -30,87 +31,8 @@ from labctl.fitting.models.error_part import ErrorPart
 from labctl.fitting.models.fitted_model import AxisFit, FittedModel
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.drift_noise import Scatter
-from labctl.fitting.numeric.least_squares import Considered, Solution, rank_of, solve
+from labctl.fitting.numeric.least_squares import Solution, rank_of, solve
 from labctl.fitting.numeric.variance_components import RandomEffects
-from labctl.recording.columns import TIME_COMMON_U_S, TIME_U_S
-
-# The time of a reference rate that changes: an error of it moves a delay in full, and others by what it does to them.
-#
-# An encoder is read by request and reply. When in between the angle was taken is not known, so the whole course is
-# early or late, and no number of readings averages that out: a consider covariance, as of coefficients that are held.
-
-
-@dataclass(frozen=True)
-class TimeErrors:
-    """Errors of the time of the reference: one that all data sets have in common, then one of each data set's own."""
-
-    columns: NDArray[np.float64]  #: (m, 1 + j) change of the output, deg/s, by one standard uncertainty of each
-    common_u_s: float
-    own_u_s: float  #: root mean square over the data sets
-
-    def beside(self, known: Considered | None, rows: int) -> Considered:
-        """Return these as considered columns behind those that are; a design has `rows`, priors below the data."""
-        more = np.vstack([self.columns, np.zeros((rows - len(self.columns), self.columns.shape[1]))])
-        if known is None:
-            return Considered(more, np.zeros((rows, 0)))
-        return replace(known, columns=np.column_stack([known.columns, more]))
-
-    def parts(self, along: NDArray[np.float64]) -> tuple[ErrorPart, ...]:
-        """Return the parts of a covariance; `along` (k, 1 + j) is the change of the coefficients by each."""
-        found = (
-            ErrorPart(TIME_COMMON_U_S.removesuffix("_u_s"), self.common_u_s, "s", along[:, :1]),
-            ErrorPart(TIME_U_S.removesuffix("_u_s"), self.own_u_s, "s", along[:, 1:]),
-        )
-        return tuple(part for part in found if part.u > 0)
-
-
-def time_errors(data: FitData, axis: str) -> TimeErrors | None:
-    """Return the errors of the reference's time in one output; None where the rate is constant or nothing states them.
-
-    Raises BadInput for an uncertainty below 0.
-    """
-    profile = data.channels.profile
-    if profile is None or not (TIME_U_S in data.channels or TIME_COMMON_U_S in data.channels):
-        return None
-    own_s, common_s = (_stated(data, name) for name in (TIME_U_S, TIME_COMMON_U_S))
-    slope = data.channels.up(axis) * profile.slope(DELAY, data.channels.response)
-    sets = np.asarray(data.channels["dataset"], dtype=np.int64)
-    here = [sets == number for number in np.unique(sets[own_s > 0])]
-    columns = np.column_stack([slope * common_s, *(slope * own_s * rows for rows in here)])
-    return TimeErrors(columns, _rms(common_s[common_s > 0]), _rms(np.array([own_s[rows].mean() for rows in here])))
-
-
-def _stated(data: FitData, name: str) -> Array:
-    """Return a column of uncertainties (m,) s, 0 where none is stated: of a rate that is constant no time matters."""
-    if name not in data.channels:
-        return np.zeros(len(data))
-    values = np.asarray(data.channels[name], dtype=np.float64)
-    if np.any(values < 0) or np.any(np.isinf(values)):
-        worst = float(values[(values < 0) | np.isinf(values)][0])
-        raise BadInput(
-            f"{data.info.serial}: column {name!r} has {worst:g} s; give a standard uncertainty of at least 0 s, or "
-            "leave the column out where none is known"
-        )
-    return np.nan_to_num(values)
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2))) if len(values) else 0.0
-
-
-def with_common_error(data: FitData, axis: str, columns: NDArray[np.float64], solution: Solution) -> Solution:
-    """Return a solution whose covariance holds the turns' common error, `turn_common_u` of recording.toml.
-
-    All angles too large by a share make the fitted response to the rate too small by that share, in scale factor and
-    misalignment together (GUM F.1.2.3). `columns` (m, k) are the model's, the first k of the solution's.
-    """
-    share = data.info.turn_common_u
-    if not share or data.info.motion != "turns":
-        return solution
-    along, *_ = np.linalg.lstsq(columns, response_dps(data.channels.rates, data.outputs[axis]), rcond=None)
-    along = np.concatenate([along, np.zeros(len(solution.values) - columns.shape[1])])
-    return replace(solution, covariance=solution.covariance + share**2 * np.outer(along, along))
-
 
 #: Steps after which a nonlinear coefficient is taken as it is.
 GAUSS_NEWTON_STEPS = 30

@@ -12,7 +12,8 @@ from instruments.clock import VirtualClock
 from instruments.drivers.unit_handlers import ManualUnitHandler, RemoteUnitHandler
 from instruments.errors import LinkError, RequestRejected
 from instruments.protocols.simulator_control import turn_line
-from instruments.simulators.server import LOCALHOST, RealPorts, SimulationServer
+from instruments.simulators.links.real_ports import LOCALHOST, RealPorts
+from instruments.simulators.server import SimulationServer
 
 
 @pytest.fixture

@@ -23,7 +23,7 @@ from instruments.drivers.chambers.watlow_f4t import WatlowF4T
 from instruments.drivers.gyrostar import Gyrostar
 from instruments.drivers.resolution import resolve
 from instruments.errors import LinkError
-from instruments.simulators.server import RealPorts
+from instruments.simulators.links.real_ports import RealPorts
 from instruments.transport.factory import Ports
 
 #: modbus_tk asks its thread by the old name of the method.

@@ -10,9 +10,10 @@ import pytest
 
 from instruments.drivers.can_bus import TRIAL
 from instruments.protocols.can.cycles import CycleDecoder
+from instruments.protocols.can.database import frame_id_of
 from instruments.protocols.can.frames import BUS_OFF, ERROR, CanFrame, packed
 from instruments.protocols.can.settings import CanSettings
-from instruments.protocols.can.signals import COUNTER, frame_id_of
+from instruments.protocols.can.signals import COUNTER
 from instruments.simulators.devices.can_bus import read_messages
 
 HEAD = 'VERSION ""\n\nBU_: X\n\n'

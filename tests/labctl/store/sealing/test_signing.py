@@ -21,7 +21,7 @@ from labctl.store import Store, check, open_store, read_public_key, signer_of
 from labctl.store.connection.database import Database
 from labctl.store.manifests.signatures import public_key
 from labctl.store.sealing import signing
-from labctl.store.sealing.signing import SEAL_KEY, Signer
+from labctl.store.sealing.signers import SEAL_KEY, Signer
 
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
 MODULES = ("/usr/lib/softhsm/libsofthsm2.so", "/usr/lib/x86_64-linux-gnu/softhsm/libsofthsm2.so")
