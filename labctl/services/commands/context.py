@@ -96,11 +96,11 @@ class ServiceBench(Protocol):
 class Foreground(Protocol):
     """What an act may use in a process without a service: a campaign runs here and now, until it is over."""
 
-    def run(self, asked: CampaignStart) -> CampaignResponse:
+    def run_campaign(self, asked: CampaignStart) -> CampaignResponse:
         """Run a campaign."""
         ...
 
-    def run_on(self, asked: CampaignResume) -> CampaignResponse:
+    def resume_campaign(self, asked: CampaignResume) -> CampaignResponse:
         """Resume a campaign and run it."""
         ...
 

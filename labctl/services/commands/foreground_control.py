@@ -60,7 +60,7 @@ class ForegroundControl:
         """Carry out an act in this process."""
         return act.in_foreground(self, context, asked)
 
-    def run(self, asked: CampaignStart) -> CampaignResponse:
+    def run_campaign(self, asked: CampaignStart) -> CampaignResponse:
         """Run a campaign in this process until it is over."""
         request = StartRequest(
             recipe=asked.body.recipe, bench=asked.bench, clip=asked.body.clip, hide=asked.body.hide, fit=asked.body.fit,
@@ -105,7 +105,7 @@ class ForegroundControl:
         note = "; ".join(filter(None, (queue.NO_SERVICE.format(bench=bench.name), answer.note)))
         return answer.model_copy(update={"note": note})
 
-    def run_on(self, asked: CampaignResume) -> CampaignResponse:
+    def resume_campaign(self, asked: CampaignResume) -> CampaignResponse:
         """Resume a campaign in this process and run it until it is over."""
         with self._open_terminal() as terminal:
             answer = resume_here(

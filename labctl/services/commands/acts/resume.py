@@ -21,7 +21,7 @@ def _in_service(control: ServiceBench, context: CommandContext, asked: CampaignR
 
 
 def _in_foreground(control: Foreground, _: CommandContext, asked: CampaignResume) -> CampaignResponse:
-    return control.run_on(asked)
+    return control.resume_campaign(asked)
 
 
 RESUME = BenchAct(name="resume", in_service=_in_service, in_foreground=_in_foreground, wait_s=OPENS_BENCH_S)

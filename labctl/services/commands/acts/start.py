@@ -20,7 +20,7 @@ def _start_in_service(control: ServiceBench, _: CommandContext, asked: CampaignS
 
 
 def _start_in_foreground(control: Foreground, _: CommandContext, asked: CampaignStart) -> CampaignResponse:
-    return control.run(asked)
+    return control.run_campaign(asked)
 
 
 def _schedule_in_service(control: ServiceBench, context: CommandContext, asked: CampaignStart) -> ScheduledResponse:
