@@ -11,7 +11,6 @@ import logging
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
-from importlib import metadata
 from typing import Generic, TypeVar
 
 #: Entry-point groups of labctl begin with this.
@@ -59,6 +58,8 @@ class Plugin:
 
     def load(self) -> object:
         """Import it and return the object; raises whatever the import raises."""
+        from importlib import metadata  # noqa: PLC0415  see `installed`
+
         return metadata.EntryPoint(self.name, self.target, self.group).load()
 
 
@@ -81,6 +82,8 @@ def installed() -> tuple[Plugin, ...]:
     Of two distributions of one name the first on the path counts, as for imports. Metadata that cannot be read is
     logged and left out.
     """
+    from importlib import metadata  # noqa: PLC0415  a tenth of the start of a robot's program, which asks for no plug-in
+
     found: dict[str, list[Plugin]] = {}
     for distribution in metadata.distributions():
         try:

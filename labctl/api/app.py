@@ -13,6 +13,7 @@ from starlette.routing import BaseRoute
 from labctl import web
 from labctl.api import problems
 from labctl.api.access_policy import DECLARES_KEY, AccessPolicy
+from labctl.api.compression import CompressionMiddleware
 from labctl.api.dependencies import ControlPool
 from labctl.api.descriptions import DescribedAPI
 from labctl.api.middleware import AccessMiddleware
@@ -108,6 +109,7 @@ def create_app(service: LabService, access: AccessPolicy | None = None, keys: Ke
     problems.install(app)
     app.router.routes.extend(api_routes())
     web.install(app)
+    app.add_middleware(CompressionMiddleware)
     app.add_middleware(AccessMiddleware, service=service, access=access or AccessPolicy(), keys=keys)
     app.state.request_figures = RequestFigures()
     app.add_middleware(RequestLogMiddleware, figures=app.state.request_figures)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 import plotly
-from fastapi import FastAPI
-from fastapi.responses import FileResponse
-from fastapi.staticfiles import StaticFiles
+from fastapi import FastAPI, HTTPException, Request, Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from labctl.web.assets import IMMUTABLE, REVALIDATED, Asset, Assets, accepted_codings
 
 FOLDER = Path(__file__).parent / "static"
 PLOTLY = Path(str(plotly.__file__)).parent / "package_data" / "plotly.min.js"
@@ -29,24 +30,48 @@ HEADERS = {
     b"content-security-policy": POLICY.encode(),
     b"x-content-type-options": b"nosniff",
     b"referrer-policy": b"no-referrer",
-    b"cache-control": b"no-cache",  # revalidated on each request, answered 304 while unchanged
 }
 
 
 def install(app: FastAPI) -> None:
     """Add the routes of the pages, the static files and the security headers to an application."""
+    assets = _assets()
+    document = (FOLDER / "index.html").read_text(encoding="utf-8")
 
-    def index() -> FileResponse:
-        return FileResponse(FOLDER / "index.html", media_type="text/html")
+    def index(request: Request) -> Response:
+        """Return the document of every page, which names the files of this release."""
+        body = document.replace(STATIC, f"{STATIC}{assets.release()}/").encode()
+        return _response(request, Asset.of(body, "text/html"), REVALIDATED)
 
-    def plotly_script() -> FileResponse:
-        return FileResponse(PLOTLY, media_type="text/javascript")
+    def static(request: Request, address: str) -> Response:
+        """Return a file, compressed as the browser takes it."""
+        name, is_released = assets.split(address)
+        asset = assets.get(name, accepted_codings(request.headers.get("accept-encoding", "")))
+        if asset is None:
+            raise HTTPException(404, f"no file {name!r} of the pages; reload the page")
+        return _response(request, asset, IMMUTABLE if is_released else REVALIDATED)
 
-    app.add_api_route(f"{STATIC}plotly.js", plotly_script, include_in_schema=False)
-    app.mount(STATIC.rstrip("/"), StaticFiles(directory=FOLDER))
     for path in ("/", *PAGES, *(f"{page}/{{rest:path}}" for page in PAGES)):
-        app.add_api_route(path, index, include_in_schema=False)
+        app.add_api_route(path, index, methods=["GET", "HEAD"], include_in_schema=False)
+    app.add_api_route(f"{STATIC}{{address:path}}", static, methods=["GET", "HEAD"], include_in_schema=False)
     app.add_middleware(_SecurityHeaders)
+
+
+@cache
+def _assets() -> Assets:
+    """Return the files, compressed once per process."""
+    return Assets(FOLDER, {"plotly.js": PLOTLY})
+
+
+def _response(request: Request, asset: Asset, cache_control: str) -> Response:
+    """Return an asset with its validator, or 304 without a body where the browser has it (RFC 9110, 13.1.2)."""
+    headers = {"cache-control": cache_control, "etag": asset.etag, "vary": "Accept-Encoding"}
+    if asset.coding:
+        headers["content-encoding"] = asset.coding
+    known = {tag.strip().removeprefix("W/") for tag in request.headers.get("if-none-match", "").split(",")}
+    if asset.etag in known:
+        return Response(status_code=304, headers=headers)
+    return Response(asset.body, media_type=asset.media_type, headers=headers)
 
 
 def is_page(path: str) -> bool:

@@ -3,6 +3,7 @@
 import { saveBlob } from "./http/api.js";
 import { csvText, fileName, traceRows } from "./csv.js";
 import { h, whenNearViewport } from "./elements.js";
+import { staticUrl } from "./static_url.js";
 
 /** @import { CsvRows, Figure, Picture, Plot, PlotLayout, Plotly, PlotTrace } from "../../../types/pages.js" */
 
@@ -22,7 +23,7 @@ export function loadPlotly() {
       reject(new Error("the plotting library could not be loaded; reload the page"));
     };
     document.head.append(
-      h("script", { src: "/static/plotly.js", onload: () => resolve(window.Plotly), onerror: failed }),
+      h("script", { src: staticUrl("plotly.js"), onload: () => resolve(window.Plotly), onerror: failed }),
     );
   });
   return script;

@@ -5,6 +5,7 @@ import { setChildren, h, svg } from "./elements.js";
 import { dialog } from "./dialog.js";
 import { freshnessLine } from "./freshness/line.js";
 import { show } from "./router.js";
+import { staticUrl } from "./static_url.js";
 
 const NAVIGATION = [
   ["/bench", "Bench", "M4 20h16M6 20V9l6-5 6 5v11M10 20v-5h4v5"],
@@ -106,7 +107,7 @@ export function buildLayout() {
     h(
       "div",
       { class: "sidebar" },
-      h("a", { class: "brand", href: "/" }, h("img", { src: "/static/mark.svg", alt: "" }), "labctl"),
+      h("a", { class: "brand", href: "/" }, h("img", { src: staticUrl("mark.svg"), alt: "" }), "labctl"),
       h("nav", { "aria-label": "Pages" }, links),
       h("div", { class: "sidebar-footer" }, controls()),
     ),

@@ -1,0 +1,59 @@
+"""Answers travel compressed where the client takes it, and files keep the bytes that their ETag stands for."""
+
+from __future__ import annotations
+
+import gzip
+import json
+
+import httpx
+import pytest
+from fastapi import FastAPI, Response
+from starlette.responses import StreamingResponse
+from starlette.testclient import TestClient
+
+from labctl.api.compression import CompressionMiddleware
+
+ROWS = [{"serial": f"A{number}", "rate_dps": number / 7} for number in range(500)]
+BODY = json.dumps(ROWS).encode()
+
+
+@pytest.fixture
+def client() -> TestClient:
+    app = FastAPI()
+    app.add_middleware(CompressionMiddleware)
+    app.add_api_route("/rows", lambda: ROWS)
+    app.add_api_route("/short", lambda: ROWS[:2])
+    app.add_api_route(
+        "/file", lambda: Response(BODY, media_type="application/json", headers={"ETag": '"1"'}), methods=["GET"]
+    )
+    app.add_api_route(
+        "/events", lambda: StreamingResponse(iter(["data: 1\n\n"] * 500), media_type="text/event-stream")
+    )
+    return TestClient(app)
+
+
+def sent(client: TestClient, path: str, accepted: str) -> tuple[httpx.Headers, bytes]:
+    """Return the headers of an answer and the bytes that travelled."""
+    with client.stream("GET", path, headers={"accept-encoding": accepted}) as answer:
+        return answer.headers, b"".join(answer.iter_raw())
+
+
+def test_an_answer_is_compressed_for_a_client_that_takes_it(client: TestClient) -> None:
+    headers, raw = sent(client, "/rows", "gzip, deflate, br, zstd")
+    assert headers["content-encoding"] == "gzip"
+    assert headers["vary"] == "Accept-Encoding"
+    assert int(headers["content-length"]) == len(raw) < len(BODY) / 3
+    assert json.loads(gzip.decompress(raw)) == ROWS
+
+
+@pytest.mark.parametrize(("path", "accepted"), [("/rows", "identity"), ("/short", "gzip"), ("/file", "gzip")])
+def test_what_gains_nothing_or_is_a_file_passes_as_it_is(client: TestClient, path: str, accepted: str) -> None:
+    headers, raw = sent(client, path, accepted)
+    assert "content-encoding" not in headers
+    assert json.loads(raw) == ROWS[: len(json.loads(raw))]
+
+
+def test_events_are_sent_one_by_one(client: TestClient) -> None:
+    headers, raw = sent(client, "/events", "gzip")
+    assert "content-encoding" not in headers
+    assert raw == b"data: 1\n\n" * 500
