@@ -1,4 +1,4 @@
-"""Answers of the API travel compressed where the client takes it; files with a validator keep the bytes it stands for."""
+"""Answers of the API travel compressed where the client takes it; files keep the bytes that their ETag stands for."""
 
 from __future__ import annotations
 

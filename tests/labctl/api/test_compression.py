@@ -26,9 +26,7 @@ def client() -> TestClient:
     app.add_api_route(
         "/file", lambda: Response(BODY, media_type="application/json", headers={"ETag": '"1"'}), methods=["GET"]
     )
-    app.add_api_route(
-        "/events", lambda: StreamingResponse(iter(["data: 1\n\n"] * 500), media_type="text/event-stream")
-    )
+    app.add_api_route("/events", lambda: StreamingResponse(iter(["data: 1\n\n"] * 500), media_type="text/event-stream"))
     return TestClient(app)
 
 
