@@ -33,6 +33,10 @@ WireLogOnly = Annotated[
         "--wire-log", metavar="FILE", help="File for every byte between labctl and the instruments, compressed."
     ),
 ]
+Search = Annotated[
+    str, typer.Option("--search", metavar="TEXT", help="Only rows that hold this text, in any case; default: all rows.")
+]
+Limit = Annotated[int | None, typer.Option("--limit", min=1, metavar="N", help="Largest number of rows; default: all.")]
 Serial = Annotated[str, typer.Argument(metavar="SERIAL", help="Serial number of the unit.")]
 AcceptWarnings = Annotated[
     bool,

@@ -48,6 +48,12 @@ def print_warnings(warnings: Iterable[DataWarning]) -> None:
         console.print(f"{word}: {warning.text}", style="bold red", soft_wrap=True)
 
 
+def print_part(shown: int, total: int, what: str) -> None:
+    """Print that a list is not whole, and how to see more of it; nothing where it is."""
+    if shown < total:
+        console.print(f"{shown} of {total} {what}; a larger --limit lists more, --search TEXT lists fewer")
+
+
 def print_json(answer: BaseModel | Sequence[BaseModel] | Mapping[str, JsonValue], *, one_line: bool = False) -> None:
     """Print one JSON document on standard output; on one line and at once where a program waits for it."""
     document: object = answer

@@ -42,6 +42,7 @@ from labctl.services.schemas.service import HealthResponse, HeartbeatResponse, P
 from labctl.services.standards.register import count_by_state
 from labctl.services.units import count_due
 from labctl.store import Store
+from labctl.store.paging import Page, PageRequest
 from procedures.contracts.campaign_state import ENDED
 from procedures.execution.signals import shutdown_hook
 
@@ -162,10 +163,11 @@ class LabService:
             return answer.model_copy(update={"resumable": False, "resume_reason": NO_BENCH})
         return with_resume(self.store, answer, access.bench, lambda: access.running)
 
-    def campaigns(self) -> list[CampaignResponse]:
-        """Return every campaign, newest first."""
-        stored = statuses_of(self.store, self.store.campaigns.all())
-        return [self._as_it_runs(each) for each in stored]
+    def campaigns(self, request: PageRequest[int]) -> Page[CampaignResponse, int]:
+        """Return campaigns, newest first, as many as are asked for."""
+        page = self.store.campaigns.page(request)
+        answers = [self._as_it_runs(stored) for stored in statuses_of(self.store, page.rows)]
+        return Page(answers, page.total, page.next_after)
 
     def _as_it_runs(self, stored: CampaignResponse) -> CampaignResponse:
         if stored.state in ENDED:

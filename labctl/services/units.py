@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from datetime import datetime, timedelta
+from functools import cache
 
 from labctl.exports import export_formats
 from labctl.services.calibrations.due import campaign_of
@@ -11,29 +12,57 @@ from labctl.services.drafts.answers import newest_draft
 from labctl.services.schemas.units import ExportFormatResponse, RecalibrationResponse, UnitResponse
 from labctl.services.standards.usage import Notices
 from labctl.store import CertificationRow, Store, Unit
+from labctl.store.paging import Page, PageRequest
+from labctl.store.records import UnitHoldings
+
+#: Every unit, in one part.
+ANY_UNIT: PageRequest[str] = PageRequest()
 
 
-def list_units(store: Store, now: datetime, due_within: timedelta | None = None) -> list[UnitResponse]:
-    """Return every unit; with a span those whose certification ends within it, or has ended: the earliest date first.
+def page_of_units(store: Store, now: datetime, request: PageRequest[str]) -> Page[UnitResponse, str]:
+    """Return units by serial number, as many as are asked for."""
+    page = store.units.page(request)
+    serials = [unit.serial for unit in page.rows]
+    held, in_force, notices = store.units.holdings(serials), store.certifications.in_force(serials), Notices.of(store)
+    answers = [
+        _answer(
+            unit, held[unit.serial], in_force.get(unit.serial), now, _notices(store, notices, in_force.get(unit.serial))
+        )
+        for unit in page.rows
+    ]
+    return Page(answers, page.total, page.next_after)
+
+
+def units_due(
+    store: Store, now: datetime, within: timedelta, request: PageRequest[str] = ANY_UNIT
+) -> Page[UnitResponse, str]:
+    """Return the units whose certification ends within a span, or has ended: the earliest date first.
 
     A unit without a date, or without a version in force, is never due.
     """
-    in_force = store.certifications.in_force()
-    if due_within is None:
-        return [_answer(store, found, in_force.get(found.serial), now) for found in store.units.all()]
-    near = {
-        serial: act for serial, act in in_force.items() if act.due_at is not None and act.due_at <= now + due_within
-    }
-    found = [
-        _answer(store, each, near[each.serial], now, whole=True) for each in store.units.all() if each.serial in near
+    matching = {unit.serial for unit in store.units.page(PageRequest(request.search)).rows}
+    due = [
+        serial
+        for _, serial in sorted(
+            (act.due_at, act.serial)
+            for act in store.certifications.in_force().values()
+            if act.due_at is not None and act.due_at <= now + within and act.serial in matching
+        )
     ]
-    return sorted(found, key=lambda unit: (unit.due or now, unit.serial))
+    first = due.index(request.after) + 1 if request.after in due else 0
+    last = None if request.limit is None else first + request.limit + 1
+    page = Page.of(due[first:last], str, request, len(due))
+    return Page([unit(store, serial, now) for serial in page.rows], page.total, page.next_after)
 
 
 def unit(store: Store, serial: str, now: datetime) -> UnitResponse:
     """Return one unit; raises NotFound."""
     found = store.units.get(serial)
-    return _answer(store, found, store.certifications.in_force().get(found.serial), now, whole=True)
+    held, act = store.units.holdings([serial])[serial], store.certifications.in_force([serial]).get(serial)
+    answer = _answer(found, held, act, now, _notices(store, Notices.of(store), act))
+    return answer.model_copy(
+        update={"recalibration": _recalibration(store, act) if act else None, "draft": newest_draft(store, serial)}
+    )
 
 
 def count_due(store: Store, now: datetime, within: timedelta) -> tuple[int, int]:
@@ -43,29 +72,35 @@ def count_due(store: Store, now: datetime, within: timedelta) -> tuple[int, int]
 
 
 def _answer(
-    store: Store, found: Unit, act: CertificationRow | None, now: datetime, *, whole: bool = False
+    found: Unit, held: UnitHoldings, act: CertificationRow | None, now: datetime, notices: list[str]
 ) -> UnitResponse:
     return UnitResponse(
         serial=found.serial,
         model=found.model,
         technology=found.technology,
-        recordings=[row.id for row in store.recordings.of_unit(found.serial)],
-        calibrations=store.calibrations.versions(found.serial),
+        recordings=held.recordings,
+        calibrations=held.versions,
         certified_version=act.version if act else None,
         due=act.due_at if act else None,
         overdue=bool(act and act.due_at and act.due_at <= now),
-        notices=_notices(store, act),
-        recalibration=_recalibration(store, act) if act and whole else None,
-        draft=newest_draft(store, found.serial) if whole else None,
-        formats=[
-            ExportFormatResponse(id=name, title=each.title, suffix=each.suffix, options=dict(each.options))
-            for name, each in export_formats().items()
-        ],
+        notices=notices,
+        recalibration=None,
+        draft=None,
+        formats=_formats(),
     )
 
 
-def _notices(store: Store, act: CertificationRow | None) -> list[str]:
-    if act is None or not (notices := Notices.of(store)).bad:
+@cache
+def _formats() -> list[ExportFormatResponse]:
+    """Return what a calibration can be exported as: the same for every unit."""
+    return [
+        ExportFormatResponse(id=name, title=each.title, suffix=each.suffix, options=dict(each.options))
+        for name, each in export_formats().items()
+    ]
+
+
+def _notices(store: Store, notices: Notices, act: CertificationRow | None) -> list[str]:
+    if act is None or not notices.bad:
         return []
     return notices.of_recordings(store.calibrations.get(act.serial, act.version).recordings)
 

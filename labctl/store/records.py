@@ -26,6 +26,14 @@ class Unit:
 
 
 @dataclass(frozen=True)
+class UnitHoldings:
+    """What there is of a unit: numbers of recordings, newest first, and of versions of its calibration, rising."""
+
+    recordings: list[int]
+    versions: list[int]
+
+
+@dataclass(frozen=True)
 class NewUnit:
     """A unit that a campaign is about to measure: how it is called on the bench, and what its recording will say."""
 

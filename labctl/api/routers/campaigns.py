@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import AsyncIterator
 from typing import Annotated
 
-from fastapi import APIRouter, Header, Response
+from fastapi import APIRouter, Header, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
 from labctl.api.act_routes import add_act_route
 from labctl.api.computation import execute
 from labctl.api.dependencies import ServiceDep, command_route
 from labctl.api.event_stream import EventStream
+from labctl.api.paging import AfterNumber, Limit, Search, in_parts
 from labctl.services.campaigns.plan_view import campaign_plan
 from labctl.services.commands.acts.catalogue import CAMPAIGN_ACTS
 from labctl.services.commands.acts.resume import RESUME_CAMPAIGN
@@ -27,6 +28,7 @@ from labctl.services.schemas.campaigns import (
 from labctl.services.schemas.plans import CampaignPlanResponse
 from labctl.services.schemas.reports.drafts import DraftsRequest, DraftsResponse
 from labctl.services.schemas.schedule import ScheduledResponse
+from labctl.store.paging import PageRequest
 
 router = APIRouter(prefix="/api/campaigns", tags=["campaigns"])
 
@@ -43,9 +45,19 @@ def start(request: CampaignRequest, service: ServiceDep, response: Response) -> 
 
 
 @router.get("", summary="All campaigns")
-def campaigns(service: ServiceDep) -> list[CampaignResponse]:
-    """Every campaign, newest first."""
-    return service.campaigns()
+def campaigns(
+    request: Request,
+    response: Response,
+    service: ServiceDep,
+    search: Search = "",
+    limit: Limit = None,
+    after: AfterNumber = None,
+) -> list[CampaignResponse]:
+    """Every campaign, newest first; `search` in recipe, bench, state and serial numbers.
+
+    `X-Total-Count` is how many match; `Link` with rel="next" names the next part of a list that `limit` has cut.
+    """
+    return in_parts(request, response, service.campaigns(PageRequest(search, limit, after)))
 
 
 @router.get("/{campaign}", summary="One campaign")

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from fastapi import APIRouter, File, Form, Query, Request, UploadFile
+from fastapi import APIRouter, File, Form, Query, Request, Response, UploadFile
 from fastapi import Path as PathParameter
 from fastapi.responses import PlainTextResponse, StreamingResponse
 
 from labctl.api.computation import execute, while_connected, with_files
 from labctl.api.dependencies import ServiceDep, command_route
+from labctl.api.paging import AfterNumber, Limit, Search, in_parts
 from labctl.recording.column_map.templates import template
 from labctl.recording.info import Motion
 from labctl.services.calibrations.orientation import orientation_of_recording
@@ -39,6 +40,7 @@ from labctl.services.schemas.recordings import (
     TraceResponse,
 )
 from labctl.services.schemas.reports.orientation import OrientationQuery, OrientationResponse
+from labctl.store.paging import PageRequest
 
 MapField = Annotated[
     str,
@@ -177,9 +179,23 @@ async def example(request: ExampleRequest, service: ServiceDep) -> ImportRespons
 
 
 @router.get("", summary="All recordings")
-def all_recordings(service: ServiceDep) -> list[RecordingResponse]:
-    """Every recording, newest first."""
-    return catalogue.list_recordings(service.store)
+def all_recordings(
+    request: Request,
+    response: Response,
+    service: ServiceDep,
+    unit: Annotated[
+        str | None, Query(max_length=200, description="Only recordings of the unit of this number.")
+    ] = None,
+    search: Search = "",
+    limit: Limit = None,
+    after: AfterNumber = None,
+) -> list[RecordingResponse]:
+    """Every recording, newest first; `search` in serial numbers and notes.
+
+    `X-Total-Count` is how many match; `Link` with rel="next" names the next part of a list that `limit` has cut.
+    """
+    page = catalogue.page_of_recordings(service.store, PageRequest(search, limit, after), unit)
+    return in_parts(request, response, page)
 
 
 @router.get("/{recording}", summary="One recording")

@@ -7,8 +7,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from labctl.cli.error_reporting import one_clear_line
-from labctl.cli.options import BenchName, CampaignId, Database, Json, SimulatedStart, WireLog, simulated_start
-from labctl.cli.output import console, print_json, table
+from labctl.cli.options import (
+    BenchName,
+    CampaignId,
+    Database,
+    Json,
+    Limit,
+    Search,
+    SimulatedStart,
+    WireLog,
+    simulated_start,
+)
+from labctl.cli.output import console, print_json, print_part, table
 from labctl.cli.printing.campaigns import print_campaign, print_plan, print_started
 
 if TYPE_CHECKING:
@@ -174,13 +184,15 @@ def start(
 
 
 @app.command("list")
-def list_(as_json: Json = False, database: Database = None) -> None:
-    """List all campaigns, newest first."""
-    from labctl.services.campaigns.status import list_campaigns
+def list_(search: Search = "", limit: Limit = None, as_json: Json = False, database: Database = None) -> None:
+    """List the campaigns, newest first."""
+    from labctl.services.campaigns.status import page_of_campaigns
     from labctl.services.commands.open import open_readonly
+    from labctl.store.paging import PageRequest
 
     with one_clear_line(), open_readonly(database) as store:
-        answers = list_campaigns(store)
+        page = page_of_campaigns(store, PageRequest(search, limit))
+    answers = page.rows
     if as_json:
         print_json(answers)
         return
@@ -191,6 +203,7 @@ def list_(as_json: Json = False, database: Database = None) -> None:
             str(answer.id), answer.recipe, answer.bench, answer.state, started, f"{100 * answer.progress:.0f} %"
         )
     console.print(rows)
+    print_part(len(answers), page.total, "campaigns")
 
 
 @app.command("status")

@@ -8,8 +8,8 @@ import typer
 from rich.text import Text
 
 from labctl.cli.error_reporting import one_clear_line
-from labctl.cli.options import Database, Json, Serial
-from labctl.cli.output import console, format_number, print_heading, print_json, table
+from labctl.cli.options import Database, Json, Limit, Search, Serial
+from labctl.cli.output import console, format_number, print_heading, print_json, print_part, table
 
 if TYPE_CHECKING:
     from labctl.services.schemas.units import AppliedVersion, TrendResponse
@@ -20,6 +20,8 @@ def units(
         str | None,
         typer.Option("--due-within", metavar="SPAN", help="Only units that are due within 30d, 12h, 2w, or overdue."),
     ] = None,
+    search: Search = "",
+    limit: Limit = None,
     as_json: Json = False,
     database: Database = None,
 ) -> None:
@@ -27,17 +29,22 @@ def units(
     from instruments.clock import SystemClock
     from labctl.services.calibrations.due import span
     from labctl.services.commands.open import open_readonly
-    from labctl.services.units import list_units
+    from labctl.services.units import page_of_units, units_due
+    from labctl.store.paging import PageRequest
 
     with one_clear_line():
         within = None if due_within is None else span(due_within)
+        now = SystemClock().utc()
         with open_readonly(database) as store:
-            found = list_units(store, SystemClock().utc(), within)
+            wanted: PageRequest[str] = PageRequest(search, limit)
+            page = page_of_units(store, now, wanted) if within is None else units_due(store, now, within, wanted)
+    found = page.rows
     if as_json:
         print_json(found)
         return
     if not found:
-        console.print("no unit is due" if due_within else "no unit has been measured or imported yet")
+        nothing = "no unit has been measured or imported yet" if not (due_within or search) else "no such unit is there"
+        console.print("no unit is due" if due_within else nothing)
         return
     rows = table("", "unit", "model", "in force", "due", "")
     for each in found:
@@ -45,6 +52,7 @@ def units(
         due = "–" if each.due is None else f"{each.due:%Y-%m-%d}"
         rows.add_row(each.serial, each.model or "–", version, due, Text("overdue" if each.overdue else "", "bold red"))
     console.print(rows)
+    print_part(len(found), page.total, "units")
 
 
 def trend(

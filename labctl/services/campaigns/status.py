@@ -21,6 +21,7 @@ from labctl.services.schemas.reports.campaign_parts import (
     TurnResponse,
 )
 from labctl.store import CampaignRow, CampaignSummary, EventRow, Store
+from labctl.store.paging import Page, PageRequest
 from procedures.contracts.campaign_state import ENDED, CampaignState
 from procedures.contracts.control import ControlRequest
 from procedures.monitoring.progress import Progress
@@ -122,9 +123,16 @@ def _from_summary(row: CampaignRow, seen: CampaignSummary) -> CampaignResponse:
     )
 
 
-def list_campaigns(store: Store) -> list[CampaignResponse]:
-    """Return every campaign, newest first."""
-    return _statuses(store, store.campaigns.all)
+def page_of_campaigns(store: Store, request: PageRequest[int]) -> Page[CampaignResponse, int]:
+    """Return campaigns, newest first, as many as are asked for."""
+    pages: list[Page[CampaignRow, int]] = []
+
+    def read() -> list[CampaignRow]:
+        pages.append(store.campaigns.page(request))
+        return pages[-1].rows
+
+    answers = _statuses(store, read)
+    return Page(answers, pages[-1].total, pages[-1].next_after)
 
 
 def campaign_status(store: Store, campaign: int | None) -> CampaignResponse:

@@ -65,7 +65,7 @@ def _row(location: str, campaign: int) -> tuple[bool, CampaignRow | None]:
 
     def read() -> None:
         with suppress(LabctlError), open_store(location, write=False) as store:
-            found.append(next((row for row in store.campaigns.all() if row.id == campaign), None))
+            found.append(next(iter(store.campaigns.some([campaign])), None))
 
     thread = threading.Thread(target=read, name="campaign-row", daemon=True)
     thread.start()

@@ -19,20 +19,22 @@ from labctl.services.schemas.recordings import (
     SamplesResponse,
 )
 from labctl.store import MeanRow, RecordingRow, Store
+from labctl.store.paging import Page, PageRequest
 
 
-def list_recordings(store: Store) -> list[RecordingResponse]:
-    """Return every recording, newest first."""
-    rows = store.recordings.all()
-    simulated = _of_simulated_time(store, rows)
-    return [_line(row, row.campaign in simulated) for row in rows]
+def page_of_recordings(
+    store: Store, request: PageRequest[int], serial: str | None = None
+) -> Page[RecordingResponse, int]:
+    """Return recordings, newest first, as many as are asked for."""
+    page = store.recordings.page(request, serial)
+    simulated = _of_simulated_time(store, page.rows)
+    return Page([_line(row, row.campaign in simulated) for row in page.rows], page.total, page.next_after)
 
 
 def _of_simulated_time(store: Store, rows: Sequence[RecordingRow]) -> set[int | None]:
-    """Return all campaigns whose times are of a simulated clock; none where no recording is of a campaign."""
-    if all(row.campaign is None for row in rows):
-        return set()
-    return {campaign.id for campaign in store.campaigns.all() if has_simulated_time(campaign.bench)}
+    """Return those campaigns of the recordings whose times are of a simulated clock."""
+    campaigns = sorted({row.campaign for row in rows if row.campaign is not None})
+    return {number for number, bench in store.campaigns.benches(campaigns).items() if has_simulated_time(bench)}
 
 
 def _line(row: RecordingRow, simulated_time: bool) -> RecordingResponse:

@@ -112,13 +112,9 @@ class Scheduler:
         """Conclude what an earlier process claimed: begun if there is a campaign of it, else due again."""
         now = self._clock.utc()
         for event in self._store.starts.open_claims(self._bench):
-            came = [
-                row.id
-                for row in self._store.campaigns.all()
-                if row.id > event.after_campaign and row.bench_name == self._bench
-            ]
-            if came:
-                self._store.starts.conclude(event, now, "started", f"campaign {min(came)} began", min(came))
+            began = self._store.campaigns.first_after(event.after_campaign, self._bench)
+            if began is not None:
+                self._store.starts.conclude(event, now, "started", f"campaign {began} began", began)
             else:
                 self._store.starts.put_back(event)
 

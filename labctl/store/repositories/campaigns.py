@@ -10,11 +10,12 @@ from typing import Literal
 import sqlalchemy as sa
 
 from labctl.errors import NotFound
-from labctl.json_types import JsonObject
+from labctl.json_types import JsonDocument, JsonObject
 from labctl.json_types.steps import StepJson
 from labctl.recording import RecordingInfo
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
+from labctl.store.paging import Page, PageRequest, rows_to_read
 from labctl.store.records import CampaignRow, EventRow, NewUnit, StepRow
 from labctl.store.repositories.audit import append
 from labctl.store.repositories.campaign_journal import StoreJournal
@@ -161,6 +162,38 @@ class Campaigns:
     def all(self) -> list[CampaignRow]:
         """Return every campaign, newest first."""
         return self._rows(sa.true())
+
+    def page(self, request: PageRequest[int]) -> Page[CampaignRow, int]:
+        """Return campaigns, newest first; searched are recipe, bench, state and the units' serial numbers."""
+        c, r = tables.campaigns.c, tables.recordings.c
+        state = sa.cast(c.state, sa.String)
+        of_unit = sa.select(r.campaign_id).where(request.matching((r.serial,)))
+        matching = request.matching((c.recipe_name, c.bench_name, state)) | (
+            c.id.in_(of_unit) if request.search else sa.false()
+        )
+        chosen = sa.select(c.id).where(matching).order_by(c.id.desc()).limit(rows_to_read(request))
+        if request.after is not None:
+            chosen = chosen.where(c.id < request.after)
+        with self._database.reading() as connection:
+            total = connection.scalar(sa.select(sa.func.count()).select_from(tables.campaigns).where(matching)) or 0
+        return Page.of(self._rows(c.id.in_(chosen)), lambda row: row.id, request, total)
+
+    def some(self, campaigns: Sequence[int]) -> list[CampaignRow]:
+        """Return campaigns by their numbers, newest first; those that are not there are left out."""
+        return self._rows(tables.campaigns.c.id.in_(campaigns))
+
+    def first_after(self, campaign: int, bench: str) -> int | None:
+        """Return the number of the first campaign on a bench that is newer than another campaign; None for none."""
+        c = tables.campaigns.c
+        with self._database.reading() as connection:
+            return connection.scalar(sa.select(sa.func.min(c.id)).where(c.id > campaign, c.bench_name == bench))
+
+    def benches(self, campaigns: Sequence[int]) -> dict[int, JsonDocument]:
+        """Return the bench file of each of some campaigns."""
+        c = tables.campaigns.c
+        with self._database.reading() as connection:
+            rows = connection.execute(sa.select(c.id, c.bench).where(c.id.in_(campaigns)))
+            return {row.id: row.bench for row in rows}
 
     def _rows(self, condition: sa.ColumnElement[bool]) -> list[CampaignRow]:
         c, r = tables.campaigns.c, tables.recordings.c

@@ -21,6 +21,7 @@ from labctl.recording import Recording, RecordingInfo, refuse_too_many_data_sets
 from labctl.recording.columns import RATE_TIME_U, READING_TIMES, VERIFICATION
 from labctl.store.connection.database import Database
 from labctl.store.import_parts import WHOLE_TABLE, import_parts
+from labctl.store.paging import Page, PageRequest, rows_to_read
 from labctl.store.records import DataSetRow, MeanRow, RecordingRow
 from labctl.store.repositories.recording_writer import Imports
 from labctl.store.repositories.sample_blocks import (
@@ -125,18 +126,29 @@ class Recordings:
         """Return every recording, newest first."""
         return self._heads(sa.true())
 
+    def page(self, request: PageRequest[int], serial: str | None = None) -> Page[RecordingRow, int]:
+        """Return recordings, newest first, of one unit with `serial`; searched are serial numbers and notes."""
+        r = tables.recordings.c
+        matching = sa.and_(
+            request.matching((r.serial, r.info["notes"].as_string())),
+            sa.true() if serial is None else r.serial == serial,
+            r.importing.is_(None),
+        )
+        chosen = sa.select(r.id).where(matching).order_by(r.id.desc()).limit(rows_to_read(request))
+        if request.after is not None:
+            chosen = chosen.where(r.id < request.after)
+        with self._database.reading() as connection:
+            total = connection.scalar(sa.select(sa.func.count()).select_from(tables.recordings).where(matching)) or 0
+        return Page.of(self._heads(r.id.in_(chosen)), lambda row: row.id, request, total)
+
     def _heads(self, condition: sa.ColumnElement[bool]) -> list[RecordingRow]:
+        r, d = tables.recordings.c, tables.data_sets.c
         counts = (
-            sa.select(
-                tables.data_sets.c.recording_id,
-                sa.func.count().label("datasets"),
-                sa.func.sum(tables.data_sets.c.n).label("readings"),
-            )
-            .where(tables.data_sets.c.state == "complete")
-            .group_by(tables.data_sets.c.recording_id)
+            sa.select(d.recording_id, sa.func.count().label("datasets"), sa.func.sum(d.n).label("readings"))
+            .where(d.state == "complete", d.recording_id.in_(sa.select(r.id).where(condition)))
+            .group_by(d.recording_id)
             .subquery()
         )
-        r = tables.recordings.c
         query = (
             sa.select(
                 r.id,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Sequence
 from datetime import datetime
 from itertools import zip_longest
 from typing import Any
@@ -11,7 +12,8 @@ import sqlalchemy as sa
 
 from labctl.errors import NotFound
 from labctl.store.connection.database import Database
-from labctl.store.records import CertificationRow, ServedCalibration, Unit, Withdrawal
+from labctl.store.paging import Page, PageRequest, parts_of, rows_to_read
+from labctl.store.records import CertificationRow, ServedCalibration, Unit, UnitHoldings, Withdrawal
 from labctl.store.schema import tables
 
 
@@ -99,6 +101,33 @@ class Units:
             rows = connection.execute(sa.select(tables.units).where(SEEN).order_by(tables.units.c.serial))
             return [Unit(*row) for row in rows]
 
+    def page(self, request: PageRequest[str]) -> Page[Unit, str]:
+        """Return units by serial number; searched are serial number, model and technology."""
+        c = tables.units.c
+        matching = sa.and_(SEEN, request.matching((c.serial, c.model, c.technology)))
+        query = sa.select(tables.units).where(matching).order_by(c.serial).limit(rows_to_read(request))
+        if request.after is not None:
+            query = query.where(c.serial > request.after)
+        with self._database.reading() as connection:
+            total = connection.scalar(sa.select(sa.func.count()).select_from(tables.units).where(matching)) or 0
+            units = [Unit(*row) for row in connection.execute(query)]
+        return Page.of(units, lambda unit: unit.serial, request, total)
+
+    def holdings(self, serials: Sequence[str]) -> dict[str, UnitHoldings]:
+        """Return what there is of each of some units: numbers of recordings, newest first, and versions, rising."""
+        r, v = tables.recordings.c, tables.calibrations.c
+        held = {serial: UnitHoldings([], []) for serial in serials}
+        some_of: sa.BindParameter[Sequence[str]] = sa.bindparam("serials", expanding=True)
+        recordings = sa.select(r.serial, r.id).where(r.serial.in_(some_of), r.importing.is_(None)).order_by(r.id.desc())
+        versions = sa.select(v.serial, v.version).where(v.serial.in_(some_of)).order_by(v.version)
+        with self._database.reading() as connection:
+            for some in parts_of(serials):
+                for serial, recording in connection.execute(recordings, {"serials": some}):
+                    held[serial].recordings.append(recording)
+                for serial, version in connection.execute(versions, {"serials": some}):
+                    held[serial].versions.append(version)
+        return held
+
 
 _C, _X = tables.calibrations.c, tables.certifications.c
 _ACT = (_X.version.label("act_version"), _X.act, _X.by, _X.reason, _X.at, _X.due_at)
@@ -174,12 +203,22 @@ class Certifications:
             gone = Withdrawal(row.w_by, row.w_key, row.w_reason, row.w_at, row.w_act)
         return ServedCalibration(bytes(row.document), str(row.hash), act, in_force, row.certificate, gone, row.act_id)
 
-    def in_force(self) -> dict[str, CertificationRow]:
-        """Return serial number -> the act that put its version in force, for every unit that has a version in force."""
+    def in_force(self, serials: Sequence[str] | None = None) -> dict[str, CertificationRow]:
+        """Return serial number -> the act that put its version in force, for every unit that has a version in force.
+
+        With `serials` of those units alone.
+        """
         last = sa.select(sa.func.max(_X.id)).group_by(_X.serial)
         query = sa.select(_X.serial, *_ACT).where(_X.id.in_(last), _X.act == "certify")
+        some_of = sa.select(_X.serial, *_ACT).where(
+            _X.id.in_(last.where(_X.serial.in_(sa.bindparam("serials", expanding=True)))), _X.act == "certify"
+        )
         with self._database.reading() as connection:
-            return {row.serial: _act(row.serial, row) for row in connection.execute(query)}
+            if serials is None:
+                rows = list(connection.execute(query))
+            else:
+                rows = [row for some in parts_of(serials) for row in connection.execute(some_of, {"serials": some})]
+        return {row.serial: _act(row.serial, row) for row in rows}
 
 
 def _act(serial: str, row: sa.Row[*tuple[Any, ...]]) -> CertificationRow:

@@ -549,9 +549,10 @@ export interface paths {
         };
         /**
          * All units
-         * @description Every unit that was measured or imported, by serial number.
+         * @description Every unit that was measured or imported, by serial number; `search` in serial number, model and technology.
          *
          *     With `due_within` those whose certification ends within that span or has ended, the earliest date first.
+         *     `X-Total-Count` is how many match; `Link` with rel="next" names the next part of a list that `limit` has cut.
          */
         get: operations["units_api_units_get"];
         put?: never;
@@ -896,7 +897,9 @@ export interface paths {
         };
         /**
          * All campaigns
-         * @description Every campaign, newest first.
+         * @description Every campaign, newest first; `search` in recipe, bench, state and serial numbers.
+         *
+         *     `X-Total-Count` is how many match; `Link` with rel="next" names the next part of a list that `limit` has cut.
          */
         get: operations["campaigns_api_campaigns_get"];
         put?: never;
@@ -1237,7 +1240,9 @@ export interface paths {
         };
         /**
          * All recordings
-         * @description Every recording, newest first.
+         * @description Every recording, newest first; `search` in serial numbers and notes.
+         *
+         *     `X-Total-Count` is how many match; `Link` with rel="next" names the next part of a list that `limit` has cut.
          */
         get: operations["all_recordings_api_recordings_get"];
         put?: never;
@@ -14824,6 +14829,12 @@ export interface operations {
             query?: {
                 /** @description Only units that are due within this span: 30d, 12h, 2w. */
                 due_within?: string | null;
+                /** @description Only rows that hold this text, in any case; empty: all rows. */
+                search?: string;
+                /** @description Largest number of rows; default: all. The header Link names the next part. */
+                limit?: number | null;
+                /** @description Serial number of the last row of the part before. */
+                after?: string | null;
             };
             header?: never;
             path?: never;
@@ -15338,7 +15349,14 @@ export interface operations {
     };
     campaigns_api_campaigns_get: {
         parameters: {
-            query?: never;
+            query?: {
+                /** @description Only rows that hold this text, in any case; empty: all rows. */
+                search?: string;
+                /** @description Largest number of rows; default: all. The header Link names the next part. */
+                limit?: number | null;
+                /** @description Number of the last row of the part before; default: from the newest row. */
+                after?: number | null;
+            };
             header?: never;
             path?: never;
             cookie?: never;
@@ -15352,6 +15370,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["CampaignResponse"][];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
                 };
             };
         };
@@ -15890,7 +15917,16 @@ export interface operations {
     };
     all_recordings_api_recordings_get: {
         parameters: {
-            query?: never;
+            query?: {
+                /** @description Only recordings of the unit of this number. */
+                unit?: string | null;
+                /** @description Only rows that hold this text, in any case; empty: all rows. */
+                search?: string;
+                /** @description Largest number of rows; default: all. The header Link names the next part. */
+                limit?: number | null;
+                /** @description Number of the last row of the part before; default: from the newest row. */
+                after?: number | null;
+            };
             header?: never;
             path?: never;
             cookie?: never;
@@ -15904,6 +15940,15 @@ export interface operations {
                 };
                 content: {
                     "application/json": components["schemas"]["RecordingResponse"][];
+                };
+            };
+            /** @description Validation Error */
+            422: {
+                headers: {
+                    [name: string]: unknown;
+                };
+                content: {
+                    "application/json": components["schemas"]["HTTPValidationError"];
                 };
             };
         };

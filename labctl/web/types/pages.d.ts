@@ -22,6 +22,7 @@ type Names =
   | "id"
   | "list"
   | "max"
+  | "maxlength"
   | "method"
   | "min"
   | "minlength"

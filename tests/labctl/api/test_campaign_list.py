@@ -12,9 +12,10 @@ import pytest
 import sqlalchemy as sa
 
 from instruments.clock import VirtualClock
-from labctl.services.campaigns.status import campaign_status, list_campaigns
+from labctl.services.campaigns.status import campaign_status, page_of_campaigns
 from labctl.services.lab_service import LabService
 from labctl.store import NewCampaign, Store, open_store
+from labctl.store.paging import PageRequest
 from labctl.store.repositories import campaign_summaries
 from labctl.store.schema import tables
 from procedures.contracts.journal import Event
@@ -65,9 +66,9 @@ def counted() -> Iterator[list[str]]:
 def statements_of_a_list(store: Store) -> int:
     service = LabService(store, VirtualClock())
     with counted() as found:
-        service.campaigns()
+        service.campaigns(PageRequest())
     with counted() as from_the_command_line:
-        list_campaigns(store)
+        page_of_campaigns(store, PageRequest())
     assert 0 < len(from_the_command_line) <= len(found) + 2  # campaigns without a process are read twice
     return len(found)
 

@@ -25,7 +25,7 @@ from labctl.services.calibrations.served import calibration_file
 from labctl.services.recordings.transfer import import_folder
 from labctl.services.schemas.calibrations import FitRequest as ServiceFit
 from labctl.services.schemas.certification import CertifyRequest, RevokeRequest
-from labctl.services.units import list_units
+from labctl.services.units import units_due
 from labctl.store import Store, copy_database, open_store
 from tests.helpers.certifying import OVERRIDE
 from tests.helpers.lab import Lab
@@ -82,7 +82,7 @@ def test_a_date_is_never_invented(store: Store) -> None:
     assert "X-Labctl-Due" not in headers(store, START + 40_000 * DAY)
     assert "Warning" not in headers(store, START + 40_000 * DAY)
     assert read_calibration(calibration_file(store, FOG, None, "json").content).certification.due is None  # type: ignore[union-attr]
-    assert list_units(store, START, 36_500 * DAY) == []
+    assert units_due(store, START, 36_500 * DAY).rows == []
 
 
 def test_the_users_interval_goes_before_the_recipes_and_that_before_the_configured(

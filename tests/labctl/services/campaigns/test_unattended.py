@@ -24,7 +24,7 @@ from labctl.services.campaigns import recovery, resume
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.execution import run, run_here
 from labctl.services.campaigns.preparation import prepare
-from labctl.services.campaigns.status import campaign_status, list_campaigns
+from labctl.services.campaigns.status import campaign_status, page_of_campaigns
 from labctl.services.commands.acts.abort import ABORT, ABORT_CAMPAIGN
 from labctl.services.commands.context import CommandContext
 from labctl.services.commands.requests import ToCampaign
@@ -35,6 +35,7 @@ from labctl.services.recordings.loading import newest_row
 from labctl.services.schemas.campaigns import CampaignRequest, ReasonRequest, StartRequest
 from labctl.store import Store, open_store
 from labctl.store.connection.database import Database
+from labctl.store.paging import PageRequest
 from procedures.contracts.campaign_state import CampaignState
 from procedures.contracts.control import Control
 from procedures.contracts.journal import NOT_SAFE, Event
@@ -295,7 +296,9 @@ def left(tmp_path: Path) -> str:
     return location
 
 
-@pytest.mark.parametrize("look", [lambda store: campaign_status(store, 1), lambda store: list_campaigns(store)[0]])
+@pytest.mark.parametrize(
+    "look", [lambda store: campaign_status(store, 1), lambda store: page_of_campaigns(store, PageRequest()).rows[0]]
+)
 def test_a_campaign_that_ends_while_it_is_looked_at_was_not_left(
     left: str, monkeypatch: pytest.MonkeyPatch, look: Any
 ) -> None:

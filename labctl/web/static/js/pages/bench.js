@@ -19,20 +19,22 @@ import { canResume, isRunning } from "../campaigns/states.js";
 
 const POLL_MS = 5000;
 const AFTER_END_MS = 1500;
+/** Campaigns among which the last one on this bench is looked for. */
+const NEWEST = 50;
 
 /** @param {PageContext} context */
 export async function page({ signal }) {
   const [benches, states, campaigns, schedule] = await Promise.all([
     get("/api/benches", { signal }),
     get("/api/benches/status", { signal }),
-    get("/api/campaigns", { signal }),
+    get("/api/campaigns", { query: { limit: NEWEST }, signal }),
     get("/api/schedule", { signal }),
   ]);
   const bench = benches[0];
   if (!bench) return h("div", { class: "page" }, pageHeader("Bench"), noBenchCard());
-  const now =
-    campaigns.find((campaign) => campaign.id === bench.campaign) ??
-    campaigns.find((campaign) => campaign.bench === bench.name && isRunning(campaign));
+  const now = bench.campaign
+    ? await get("/api/campaigns/{campaign}", { path: { campaign: bench.campaign }, signal })
+    : campaigns.find((campaign) => campaign.bench === bench.name && isRunning(campaign));
   /** @param {{ serial: string }} each */
   const unit = (each) => h("a", { href: `/units/${encodeURIComponent(each.serial)}` }, each.serial);
   const element = h(

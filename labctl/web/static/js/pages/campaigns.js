@@ -1,10 +1,11 @@
 // The page of all campaigns and of the schedule.
 
-import { get, remove } from "../core/http/api.js";
+import { get, getPart, remove } from "../core/http/api.js";
 import { Problem } from "../core/http/errors.js";
 import { setChildren, h } from "../core/elements.js";
 import { duration, instant, percent } from "../core/format.js";
-import { button, card, chip, emptyState, pageHeader, cardWithHeader, table } from "../core/components.js";
+import { button, card, chip, emptyState, pageHeader, table } from "../core/components.js";
+import { longList } from "../core/long_list.js";
 import { setTrouble } from "../core/freshness/line.js";
 import { linkButton } from "../bench/actions.js";
 import { attendanceNotice } from "../campaigns/attendance.js";
@@ -20,39 +21,36 @@ import { startTime } from "../campaigns/start_time.js";
 const POLL_MS = 4000;
 
 /** @param {PageContext} context */
-export async function page({ signal }) {
-  const place = h("div", { class: "page" });
-  const ask = () => Promise.all([get("/api/campaigns", { signal }), get("/api/schedule", { signal })]);
-  async function show() {
-    const [campaigns, schedule] = await ask();
-    setChildren(
-      place,
-      schedule.length ? scheduleCard(schedule, show) : null,
-      cardWithHeader(
-        campaigns.length === 1 ? "1 campaign" : `${campaigns.length} campaigns`,
-        null,
-        campaigns.length
-          ? campaignTable(campaigns)
-          : emptyState(
-              h("p", {}, "No campaign has been run yet."),
-              h("p", {}, linkButton("Plan the first", "/campaigns/new", "primary")),
-            ),
-      ),
-    );
-    return campaigns.some(isRunning);
+export async function page({ query, signal }) {
+  const scheduled = h("div", {});
+  const list = await longList({
+    what: "campaigns",
+    hint: "Recipe, bench, state or serial number of a unit.",
+    search: query.search,
+    read: (part) => getPart("/api/campaigns", { query: part, signal }),
+    draw: campaignTable,
+    empty: emptyState(
+      h("p", {}, "No campaign has been run yet."),
+      h("p", {}, linkButton("Plan the first", "/campaigns/new", "primary")),
+    ),
+  });
+  async function showSchedule() {
+    const schedule = await get("/api/schedule", { signal });
+    setChildren(scheduled, schedule.length ? scheduleCard(schedule, showAll) : null);
   }
-  let moving = await show();
-  const looking = setInterval(async () => {
-    if (!moving) return;
+  const showAll = () => Promise.all([list.refresh(), showSchedule()]);
+  await showSchedule();
+  const polling = setInterval(async () => {
+    if (!list.rows().some(isRunning)) return;
     try {
-      moving = await show();
+      await showAll();
       setTrouble();
     } catch (error) {
       if (error instanceof Problem) setTrouble(error.message);
     }
   }, POLL_MS);
-  signal.addEventListener("abort", () => clearInterval(looking));
-  window.addEventListener("labctl:fresh", () => show().catch(() => {}), { signal });
+  signal.addEventListener("abort", () => clearInterval(polling));
+  window.addEventListener("labctl:fresh", () => showAll().catch(() => {}), { signal });
   return h(
     "div",
     { class: "page" },
@@ -61,7 +59,8 @@ export async function page({ signal }) {
       "One run of a recipe on a bench.",
       linkButton("Plan a campaign", "/campaigns/new", "primary"),
     ),
-    place,
+    scheduled,
+    card("All campaigns", list.element),
   );
 }
 

@@ -17,9 +17,12 @@ import { versionView } from "../explore/version_view.js";
 /** @import { PageContext, Query } from "../../../types/pages.js" */
 /** @import { Chosen } from "../explore/chosen_recordings.js" */
 
+/** Units that can be chosen from the list; every other one has its link on the page of all units. */
+const LISTED = 500;
+
 /** @param {PageContext} context */
 export async function page({ query: asked, signal }) {
-  const [units, recordings] = await Promise.all([get("/api/units", { signal }), get("/api/recordings", { signal })]);
+  const units = await get("/api/units", { query: { limit: LISTED }, signal });
   if (!units.length) {
     return h(
       "div",
@@ -31,11 +34,13 @@ export async function page({ query: asked, signal }) {
       ),
     );
   }
-  const unit =
-    units.find((each) => each.serial === asked.unit) ?? units.find((each) => each.calibrations.length) ?? units[0];
-  const own = recordings.filter((each) => each.serial === unit.serial);
+  const { serial } = asked.unit ? { serial: asked.unit } : (units.find((each) => each.calibrations.length) ?? units[0]);
+  const [unit, own] = await Promise.all([
+    get("/api/units/{serial}", { path: { serial }, signal }),
+    get("/api/recordings", { query: { unit: serial }, signal }),
+  ]);
   const versions = [...unit.calibrations].sort((a, b) => a - b);
-  const version = versions.includes(Number(asked.version)) ? Number(asked.version) : versions.at(-1);
+  const version = asked.version ? Number(asked.version) : versions.at(-1);
   const calibration =
     version === undefined
       ? undefined
@@ -107,7 +112,7 @@ function selectors(units, unit, own, versions, version, chosen) {
   return [
     selectField(
       "Unit",
-      units.map((each) => option(each.serial, each.serial)),
+      [...new Set([unit.serial, ...units.map((each) => each.serial)])].sort().map((each) => option(each, each)),
       unit.serial,
       (value) => to({ unit: value }),
     ),

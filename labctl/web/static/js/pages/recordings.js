@@ -1,11 +1,10 @@
 // The page of all recordings, with the import form.
 
-import { get } from "../core/http/api.js";
-import { setChildren, h } from "../core/elements.js";
+import { getPart } from "../core/http/api.js";
+import { h } from "../core/elements.js";
 import { count, day } from "../core/format.js";
 import { chip, emptyState, pageHeader, cardWithHeader, table } from "../core/components.js";
-import { option, selectField } from "../core/fields.js";
-import { updateQuery } from "../core/router.js";
+import { longList } from "../core/long_list.js";
 import { importForm } from "../recordings/import_form.js";
 import { SIMULATED } from "../campaigns/campaign_time.js";
 
@@ -15,31 +14,15 @@ import { SIMULATED } from "../campaigns/campaign_time.js";
 
 /** @param {PageContext} context */
 export async function page({ query, signal }) {
-  const list = h("div", {});
-  let unit = query.unit ?? "";
-  let rows = await get("/api/recordings", { signal });
-
-  const choose = h("div", {});
-  function show() {
-    const units = [...new Set(rows.map((row) => row.serial))].sort();
-    setChildren(
-      choose,
-      units.length > 1
-        ? selectField("Unit", [["", "all units"], ...units.map((serial) => option(serial, serial))], unit, (value) => {
-            unit = value;
-            updateQuery({ unit });
-            show();
-          })
-        : null,
-    );
-    const shown = rows.filter((row) => !unit || row.serial === unit);
-    setChildren(list, shown.length ? recordingTable(shown) : noRecordings());
-  }
-  show();
-  const taken = async () => {
-    rows = await get("/api/recordings", { signal });
-    show();
-  };
+  const { unit } = query;
+  const list = await longList({
+    what: "recordings",
+    hint: "Serial number or notes.",
+    search: query.search,
+    read: (part) => getPart("/api/recordings", { query: unit ? { ...part, unit } : part, signal }),
+    draw: recordingTable,
+    empty: noRecordings(),
+  });
   return h(
     "div",
     { class: "page" },
@@ -48,8 +31,12 @@ export async function page({ query, signal }) {
       "All data sets of one unit in one campaign, or imported as files.",
       h("a", { class: "button", href: "/noise" }, "Compare noise at rest"),
     ),
-    importForm(taken),
-    cardWithHeader(`${count(rows.length)} recording${rows.length === 1 ? "" : "s"}`, choose, list),
+    importForm(list.refresh),
+    cardWithHeader(
+      unit ? `Recordings of ${unit}` : "All recordings",
+      unit ? h("a", { class: "button tiny", href: "/recordings" }, "Show all units") : null,
+      list.element,
+    ),
   );
 }
 

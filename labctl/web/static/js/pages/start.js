@@ -12,12 +12,17 @@ import { DUE_WITHIN, dueNotice } from "../unit/due.js";
 
 /** @import { PageContext } from "../../../types/pages.js" */
 
+/** Units that are listed. */
+const SHOWN = 6;
+/** Campaigns among which the running one is: a bench runs one at a time. */
+const NEWEST = 20;
+
 /** @param {PageContext} context */
 export async function page({ signal }) {
   const [units, due, campaigns, benches] = await Promise.all([
-    get("/api/units", { signal }),
+    get("/api/units", { query: { limit: SHOWN }, signal }),
     get("/api/units", { query: { due_within: DUE_WITHIN }, signal }),
-    get("/api/campaigns", { signal }),
+    get("/api/campaigns", { query: { limit: NEWEST }, signal }),
     get("/api/benches", { signal }),
   ]);
   if (units.length || campaigns.length) return overview(units, due, campaigns, benches);
@@ -132,16 +137,14 @@ function overview(units, due, campaigns, benches) {
         h(
           "ul",
           { class: "plain" },
-          units
-            .slice(0, 6)
-            .map((unit) =>
-              h(
-                "li",
-                { class: "row space-between" },
-                h("a", { href: `/units/${encodeURIComponent(unit.serial)}` }, unit.serial),
-                h("a", { class: "button tiny", href: `/explore?unit=${encodeURIComponent(unit.serial)}` }, "Explore"),
-              ),
+          units.map((unit) =>
+            h(
+              "li",
+              { class: "row space-between" },
+              h("a", { href: `/units/${encodeURIComponent(unit.serial)}` }, unit.serial),
+              h("a", { class: "button tiny", href: `/explore?unit=${encodeURIComponent(unit.serial)}` }, "Explore"),
             ),
+          ),
         ),
       ),
       card(

@@ -53,6 +53,24 @@ export async function get(path, ...[{ path: parameters, query, signal } = /** @t
 }
 
 /**
+ * Read one part of a long list: its rows, how many match in all, and the query of the next part, null at the end.
+ * @template {PathOf<"get">} P
+ * @param {P} path
+ * @param {Options<"get", P>} options
+ * @returns {Promise<{ rows: AnswerOf<"get", P>, total: number, next: Record<string, string> | null }>}
+ */
+export async function getPart(path, { path: parameters, query, signal } = /** @type {any} */ ({})) {
+  const response = await request(address(path, parameters, query), { headers: headers(), signal });
+  const rows = await response.json();
+  const next = /<[^>?]*\?([^>]*)>; rel="next"/.exec(response.headers.get("Link") ?? "")?.[1];
+  return {
+    rows,
+    total: Number(response.headers.get("X-Total-Count") ?? rows.length),
+    next: next === undefined ? null : Object.fromEntries(new URLSearchParams(next)),
+  };
+}
+
+/**
  * Act: `post("/api/campaigns/{campaign}/pause", { path: { campaign }, body, signal })`.
  * @template {PathOf<"post">} P
  * @param {P} path

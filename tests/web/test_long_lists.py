@@ -1,0 +1,109 @@
+"""Lists of many rows: a part at a time, a search over all of them, and an address that says what was searched."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING
+
+import pytest
+import sqlalchemy as sa
+
+from labctl.recording import RecordingInfo
+from labctl.store import NewCampaign
+from labctl.store.schema import tables
+from tests.helpers.browser import Service
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Page
+
+pytestmark = pytest.mark.timeout(300)
+
+AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
+STEP = {"kind": "acquire", "expected_s": 60.0, "rate_dps": 10.0}
+ROWS = 230
+
+
+@pytest.fixture
+def many(service: Service) -> None:
+    """A database with 230 units, recordings and campaigns."""
+    store = service.lab_service.store
+    info = RecordingInfo.model_validate({"serial": "G", "axes": ["z"], "kind": "points", "started_at": AT})
+    document = info.model_dump(mode="json")
+    for _ in range(ROWS):
+        store.campaigns.create(NewCampaign("short", {}, "single-axis-sim", {}, "hash", 60.0, [STEP], ()), AT)
+    serials = [f"G{k:03d}" for k in range(ROWS)]
+    with store._database.writing() as connection:
+        connection.execute(sa.update(tables.campaigns).values(state="done"))
+        connection.execute(
+            sa.insert(tables.units),
+            [{"serial": serial, "model": "VG-35", "technology": "fog", "first_seen_at": AT} for serial in serials],
+        )
+        connection.execute(
+            sa.insert(tables.recordings),
+            [
+                {
+                    "serial": serial,
+                    "kind": "points",
+                    "info": {**document, "serial": serial},
+                    "channels": [],
+                    "created_at": AT,
+                }
+                for serial in serials
+            ],
+        )
+
+
+@pytest.mark.usefixtures("many")
+@pytest.mark.parametrize("what", ["units", "recordings", "campaigns"])
+def test_a_long_list_is_shown_in_parts_and_searched_whole(visit: Callable[..., Page], what: str) -> None:
+    from playwright.sync_api import expect
+
+    page = visit(f"/{what}")
+    rows = page.get_by_role("main").locator("tbody tr")
+    expect(rows).to_have_count(100)
+    expect(page.get_by_text(f"100 of {ROWS} {what}")).to_be_visible()
+    page.get_by_role("button", name="Show 100 more").click()
+    expect(rows).to_have_count(200)
+    page.get_by_role("button", name="Show 100 more").click()
+    expect(rows).to_have_count(ROWS)
+    expect(page.get_by_role("button", name="Show 100 more")).to_be_hidden()
+    names = rows.locator("td:first-child a").all_inner_texts()
+    assert len(set(names)) == ROWS
+
+
+@pytest.mark.usefixtures("many")
+def test_a_search_is_in_the_address_and_finds_what_was_not_shown(visit: Callable[..., Page]) -> None:
+    from playwright.sync_api import expect
+
+    page = visit("/units")
+    rows = page.get_by_role("main").locator("tbody tr")
+    expect(rows).to_have_count(100)
+    page.get_by_label("Search units").fill("g22")
+    expect(rows).to_have_count(10)
+    expect(page.get_by_text("10 of 10 units found")).to_be_visible()
+    assert page.url.endswith("/units?search=g22")
+    page.reload()
+    expect(rows).to_have_count(10)
+    expect(page.get_by_label("Search units")).to_have_value("g22")
+    page.get_by_label("Search units").fill("nosuch")
+    expect(page.get_by_text("No units hold “nosuch”.")).to_be_visible()
+
+
+@pytest.mark.usefixtures("many")
+@pytest.mark.parametrize(
+    ("address", "said"),
+    [
+        ("/explore?unit=NOPE", "unit 'NOPE' is not in this database"),
+        ("/explore?unit=G001&version=999", "999"),
+    ],
+)
+def test_an_address_of_what_is_not_there_says_so(
+    visit: Callable[..., Page], faults: list[str], address: str, said: str
+) -> None:
+    from playwright.sync_api import expect
+
+    page = visit(address)
+    expect(page.get_by_role("main")).to_contain_text(said)
+    assert page.locator(".plot").count() == 0
+    faults.clear()  # the browser reports the 404 that the page is about
