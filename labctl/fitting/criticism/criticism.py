@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from operator import attrgetter
 
 import numpy as np
+from scipy.special import chdtrc
 
 from labctl.fitting.criticism.advice import advice_for, is_carried
 from labctl.fitting.criticism.candidates import beside_held
@@ -19,7 +20,7 @@ from labctl.fitting.criticism.residuals import Residuals, residuals_of
 from labctl.fitting.criticism.search.refinement import refined_term
 from labctl.fitting.criticism.search.stepwise import search_stepwise
 from labctl.fitting.criticism.slow_process import slow_process, with_hypothesis, without_harm
-from labctl.fitting.criticism.suspects import Suspect, suspects_of
+from labctl.fitting.criticism.suspects import LEAST_CAUSE, Suspect, is_only_shape, suspects_of, without_shapes
 from labctl.fitting.criticism.thermal_family import LAG, ThermalFamily, family_or_hint, with_family
 from labctl.fitting.criticism.verdict import FAR, Verdict
 from labctl.fitting.criticism.visibility import not_testable
@@ -71,6 +72,8 @@ def with_quantization(verdict: Verdict, data: ReducedRecording, left: Mapping[st
 LEAST_SPARE = 6
 #: The drift counts as larger than the data sheet says where the least that it may be is this many times as large.
 LARGE_DRIFT = 1.5
+#: From this chance on that noise leaves as much as a residual, the residual may be noise.
+BY_CHANCE = 0.05
 #: No model is adequate that leaves more than this many times the noise floor, whatever the evidence for any one cause.
 MOST_OVER_FLOOR = 3.0
 
@@ -113,6 +116,15 @@ class Criticism:
         if self.beside_missing is None:
             return {}
         return residuals_of(self.beside_missing, self.floor, self.base.residual_dps if self.base is not None else None)
+
+    @property
+    def lack_of_fit(self) -> tuple[float | None, float | None]:
+        """Chi2 of the whitened residual over its degrees of freedom, and the chance that noise leaves as much."""
+        if not self.residuals:
+            return None, None
+        chi2 = sum(left.chi2 for left in self.residuals.values())
+        freedom = max(sum(left.freedom for left in self.residuals.values()), 1)
+        return float(chi2 / freedom), float(chdtrc(freedom, chi2))
 
     @property
     def drift_over_datasheet(self) -> float | None:
@@ -183,9 +195,12 @@ def criticise(
         return found
     report_stage("listing suspects and residuals")
     suspects = tuple(suspects_of(comparison, found.beside_missing, fit_data, forward, refined_term, base))
-    suspected = {*found.verdict.named, *(s.candidate.id for s in suspects if s.candidate.log_bf > 0)}
+    verdict, suspects = _without_weak_names(found, suspects, forward), without_shapes(suspects, forward)
+    suspected = {*verdict.named, *(s.candidate.id for s in suspects if s.candidate.log_bf > 0)}
     return replace(
         found,
+        verdict=verdict,
+        advice=tuple(each for each in found.advice if each["effect"] in verdict.named),
         family=_with_time_constants(found.family, fit_data, forward),
         hint=_with_time_constants(found.hint, fit_data, forward),
         direct_rms_dps=_direct_rms_dps(fit_data, model),
@@ -279,6 +294,29 @@ def _with_time_constants(
         return None
     after = fit_preset(data, changed(forward, (family.response.term,)))
     return family.with_shapes(after.shapes)
+
+
+def _without_weak_names(found: Criticism, suspects: Sequence[Suspect], forward: ErrorModel) -> Verdict:
+    """Return the verdict, or "adequate" where noise may leave the residual, and what is named is no cause of it.
+
+    That is weak evidence for effects that hardly lower the error, although it is above the noise floor. Another shape
+    of an effect that the model has is not named beside other effects.
+    """
+    verdict = found.verdict
+    if verdict.form not in {"missing", "ambiguous"}:
+        return verdict
+    shapes = {each.candidate.id for each in suspects if is_only_shape(each, forward)}
+    groups = tuple(
+        group for names in verdict.groups if (group := tuple(name for name in names if name not in shapes) or names)
+    )
+    named = [each for each in suspects if each.candidate.id in verdict.named]
+    weak = all(each.candidate.log_bf < FAR and each.share_removed < LEAST_CAUSE for each in named)
+    error = found.base.error if found.base is not None else None
+    above = error is not None and (error.rms_dps or 0.0) > (error.noise_floor_dps or np.inf)
+    if named and weak and above and (found.lack_of_fit[1] or 0.0) >= BY_CHANCE:
+        further = tuple(group for group in groups if not set(group) <= shapes)
+        return Verdict("adequate", further=further)
+    return replace(verdict, groups=groups, form="missing" if all(len(group) == 1 for group in groups) else verdict.form)
 
 
 def _without_large_residual(verdict: Verdict, base: FitResult | None) -> Verdict:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import chdtrc
@@ -34,6 +34,8 @@ SHOWN = 6
 #: At most this many more suspects have the evidence, but a size that the unit's technology cannot have.
 UNPHYSICAL_SHOWN = 2
 
+#: What takes off less than this share of the error above the noise floor is no cause of it.
+LEAST_CAUSE = 0.1
 #: A fit with another effect that leaves this share more is worse, and not only weighed otherwise.
 WORSE_BY = 0.01
 
@@ -84,6 +86,21 @@ def suspects_of(
         )  # fmt: skip
         found.append(suspect)
     return found
+
+
+def is_only_shape(suspect: Suspect, model: ErrorModel) -> bool:
+    """Return whether a suspect is another shape of an effect that the model has, and lowers the error hardly at all."""
+    return suspect.candidate.id in model.effect_ids and suspect.share_removed < LEAST_CAUSE
+
+
+def without_shapes(suspects: Sequence[Suspect], model: ErrorModel) -> tuple[Suspect, ...]:
+    """Return the suspects without those that are only other shapes of what the model has, also in their groups."""
+    shapes = {suspect.candidate.id for suspect in suspects if is_only_shape(suspect, model)}
+    return tuple(
+        replace(suspect, group=tuple(name for name in suspect.group if name not in shapes))
+        for suspect in suspects
+        if suspect.candidate.id not in shapes
+    )
 
 
 def _is_worse(before: FitResult | None, after: FitResult) -> bool:

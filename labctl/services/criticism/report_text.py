@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.special import chdtrc
 
 from labctl.fitting.criticism import (
     Criticism,
@@ -116,12 +115,8 @@ def _noise(found: Criticism) -> CriticisedNoise:
 
 
 def _lack_of_fit(found: Criticism) -> LackOfFit:
-    """Chi2 of the whitened residual over its degrees of freedom, and its p-value."""
-    if not found.residuals:
-        return {"statistic": None, "p_value": None}
-    total = sum(left.chi2 for left in found.residuals.values())
-    freedom = sum(left.freedom for left in found.residuals.values())
-    return {"statistic": float(total / max(freedom, 1)), "p_value": float(chdtrc(max(freedom, 1), total))}
+    statistic, p_value = found.lack_of_fit
+    return {"statistic": statistic, "p_value": p_value}
 
 
 def _suspect(suspect: Suspect, found: Criticism) -> SuspectJson:

@@ -142,7 +142,7 @@ def search_stepwise(first: Comparison, catalogue: Mapping[str, Effect]) -> tuple
     Where nothing is found over all axes together, each axis is searched by itself: they may have different causes.
     """
     verdict, initial, final = _searched(first, catalogue)
-    if verdict.form in {"missing", "ambiguous"} and _is_weak(initial, verdict) and is_within_noise(first):
+    if verdict.form != "adequate" and _is_weak(initial, verdict) and is_within_noise(first):
         return Verdict("adequate", further=verdict.groups), initial, initial
     if verdict.form == "unexplained" and len(first.axes) > 1:
         apart = {axis: _searched(on_axis(first, axis), catalogue)[0] for axis in first.axes}
@@ -151,8 +151,12 @@ def search_stepwise(first: Comparison, catalogue: Mapping[str, Effect]) -> tuple
 
 
 def _is_weak(initial: Comparison, verdict: Verdict) -> bool:
-    """Return whether the evidence for what is named could still be noise, should the noise be other than estimated."""
-    return all(c.log_bf < FAR for c in initial.candidates if c.id in verdict.named and not c.smooth)
+    """Return whether the evidence for what is named could still be noise, should the noise be other than estimated.
+
+    Where nothing is named, that is the evidence for anything at all.
+    """
+    named = [c for c in initial.candidates if c.id in verdict.named and not c.smooth]
+    return all(c.log_bf < FAR for c in named or initial.candidates)
 
 
 def _searched(first: Comparison, catalogue: Mapping[str, Effect]) -> tuple[Verdict, Comparison, Comparison]:

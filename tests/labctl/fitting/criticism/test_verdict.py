@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from labctl.fitting.criticism import Criticism, Verdict
+from labctl.fitting.criticism import Criticism, Verdict, criticise
 from labctl.fitting.criticism.model_comparison import compare_models
 from labctl.fitting.criticism.reduction import reduce_recording
 from labctl.fitting.criticism.search.held_out import held_out_rises
@@ -91,6 +91,36 @@ def test_a_model_that_leaves_less_than_the_noise_is_adequate_whatever_is_like_th
         for line in sentences(found)
     )
     assert all(suspect.share_removed < 1 for suspect in found.suspects)
+
+
+def test_the_search_ends_where_the_data_say_nothing_more() -> None:
+    """The real fibre gyro whose cause was added: what is left is weak, takes off hardly anything, and may be noise."""
+    recording = read_recording(EXAMPLES / "osu-fog")
+    data = fit_data_of(recording)
+    before, _ = preset_for("bias_scale", []).build(data)
+    found = criticise(recording, before)
+    assert found.verdict.groups[0][0] == "sine_response"
+    fit = next(suspect.after for suspect in found.suspects if suspect.candidate.id == "sine_response")
+    assert fit is not None
+    after = fit.fitted.model
+    ended = criticise(recording, after)
+    assert (ended.verdict.form, ended.verdict.named, ended.advice) == ("adequate", (), ())
+    chance = ended.lack_of_fit[1]
+    assert chance is not None
+    assert chance > 0.05
+    assert not {suspect.candidate.id for suspect in ended.suspects} & set(after.effect_ids)
+    assert not {name for suspect in ended.suspects for name in suspect.group} & set(after.effect_ids)
+    further = {name for group in ended.verdict.further for name in group}
+    weak = [suspect for suspect in ended.suspects if suspect.candidate.id in further]
+    assert weak
+    assert all(suspect.share_removed < 0.1 for suspect in weak)
+
+
+@pytest.mark.parametrize("effect", ["dead_band=z10", "scale_factor_asymmetry=z10"])
+def test_a_small_cause_of_the_error_is_still_named(effect: str) -> None:
+    request = SimulateRequest(recipe="ojeda2000-121", seed=4, hide=[effect], sample_rate_hz=4.0)
+    found = held(make_recording(request).recording, full=True)
+    assert effect.partition("=")[0] in found.verdict.named
 
 
 def test_axes_may_have_different_causes() -> None:
