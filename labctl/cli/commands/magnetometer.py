@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from labctl.cli.earlier_version import Earlier, MisalignmentChange, ScaleChange, Temperature, earlier_version
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import By, Database, DeviceId, Json, Out, SensorExport, SensorInstance, SensorSerial, who
 from labctl.cli.output import print_json
@@ -38,7 +39,11 @@ def magnetometer(
             help="Size of the local field, uT; default: by the readings, with a soft iron of determinant 1.",
         ),
     ] = None,
+    temperature: Temperature = None,
     serial: SensorSerial = None,
+    earlier: Earlier = None,
+    scale_change: ScaleChange = 1e-3,
+    misalignment_change: MisalignmentChange = 5e-4,
     by: By = None,
     export: SensorExport = None,
     out: Out = None,
@@ -59,7 +64,8 @@ def magnetometer(
     kept = None
     with one_clear_line():
         check_export(export, out)
-        source = Source([name.strip() for name in columns.split(",")], unit, field_ut)
+        before = earlier_version(database, serial, earlier, (scale_change, misalignment_change))
+        source = Source([name.strip() for name in columns.split(",")], unit, field_ut, temperature, before)
         answer = magnetometer_of_file(path, source, serial)
         write_export(answer, export, out, instance, device_id)
         if serial is not None:

@@ -2126,7 +2126,7 @@ export interface components {
             earlier?: components["schemas"]["EarlierVersion"] | null;
             /** @description Over temperature; null: it was not asked for, and the parameters are constants. */
             temperature?: components["schemas"]["AccelerometerTemperature"] | null;
-            /** @description Rotation of the gyro triad from the accelerometer triad, deg; null: no gyro, turns that do not determine it, or a fit over temperature or with an earlier version. */
+            /** @description Rotation of the gyro triad from the accelerometer triad, deg; null: no gyro, rests and turns that do not determine it, or rests that do not agree with the earlier version: `text` says which. */
             alignment?: components["schemas"]["AlignmentJson"] | null;
             /**
              * Text
@@ -2222,7 +2222,7 @@ export interface components {
             earlier: components["schemas"]["EarlierVersion"] | null;
             /** @description Over temperature; null: it was not asked for, and the parameters are constants. */
             temperature: components["schemas"]["AccelerometerTemperature"] | null;
-            /** @description Rotation of the gyro triad from the accelerometer triad, deg; null: no gyro, turns that do not determine it, or a fit over temperature or with an earlier version. */
+            /** @description Rotation of the gyro triad from the accelerometer triad, deg; null: no gyro, rests and turns that do not determine it, or rests that do not agree with the earlier version: `text` says which. */
             alignment: components["schemas"]["AlignmentJson"] | null;
             /**
              * Text
