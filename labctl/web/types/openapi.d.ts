@@ -2334,6 +2334,11 @@ export interface components {
              */
             summary: string[];
             /**
+             * Coefficients
+             * @description Every coefficient, and the alignment of the gyro triad or of the magnetometer where it is known.
+             */
+            coefficients: components["schemas"]["SensorCoefficientResponse"][];
+            /**
              * Formats
              * @description Formats in which it is available; none for a magnetometer whose field was not constant.
              */
@@ -9180,6 +9185,11 @@ export interface components {
              */
             summary: string[];
             /**
+             * Coefficients
+             * @description Every coefficient, and the alignment of the gyro triad or of the magnetometer where it is known.
+             */
+            coefficients: components["schemas"]["SensorCoefficientResponse"][];
+            /**
              * Formats
              * @description Formats in which it is available; none for a magnetometer whose field was not constant.
              */
@@ -11706,6 +11716,32 @@ export interface components {
             attendance: components["schemas"]["AttendanceResponse"] | null;
         };
         /**
+         * SensorCoefficientResponse
+         * @description A coefficient of a sensor, or of its alignment.
+         */
+        SensorCoefficientResponse: {
+            /**
+             * Name
+             * @description Name, with the axis: bias x, soft iron xy, gyro triad about z.
+             */
+            name: string;
+            /**
+             * Unit
+             * @description Unit of the numbers; 1: a ratio.
+             */
+            unit: string;
+            /**
+             * Value
+             * @description Value, in `unit`.
+             */
+            value: number;
+            /**
+             * U
+             * @description Standard uncertainty, in `unit`; null: the value was given.
+             */
+            u: number | null;
+        };
+        /**
          * SensorFormatResponse
          * @description A format in which a version is available.
          */
@@ -11728,7 +11764,7 @@ export interface components {
         };
         /**
          * SensorVersionResponse
-         * @description A version of a sensor, without its parameters.
+         * @description A version of a sensor.
          */
         SensorVersionResponse: {
             /**
@@ -11781,6 +11817,11 @@ export interface components {
              * @description What the fit found, in sentences.
              */
             summary: string[];
+            /**
+             * Coefficients
+             * @description Every coefficient, and the alignment of the gyro triad or of the magnetometer where it is known.
+             */
+            coefficients: components["schemas"]["SensorCoefficientResponse"][];
             /**
              * Formats
              * @description Formats in which it is available; none for a magnetometer whose field was not constant.
