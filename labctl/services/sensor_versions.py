@@ -197,8 +197,11 @@ def _answer(row: SensorVersionRow) -> SensorVersionResponse:
 def _fields(row: SensorVersionRow, *, whole: bool = False) -> dict[str, object]:
     result: dict[str, object] = {"result": row.result} if whole else {}
     adequate = row.sensor == "accelerometer" or row.verdict == "adequate"
-    formats = SENSOR_FORMATS[row.sensor] if adequate else {}
     parameters = RESULTS[row.sensor].model_validate(row.result)
+    formats = {
+        name: each for name, each in SENSOR_FORMATS[row.sensor].items()
+        if adequate and (parameters.alignment is not None or not each.of_alignment)
+    }  # fmt: skip
     return result | {
         "serial": row.serial, "sensor": row.sensor, "version": row.version, "verdict": row.verdict, "at": row.at,
         "by": row.by, "by_key": row.by_key, "data": row.data, "hash": row.hash, "summary": row.result["text"],

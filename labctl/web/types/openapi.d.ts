@@ -16670,7 +16670,7 @@ export interface operations {
     file_api_units__serial__sensors__sensor__file_get: {
         parameters: {
             query: {
-                /** @description px4, ardupilot, json, python, c; an accelerometer also kalibr, ros. */
+                /** @description px4, ardupilot, json, python, c, tf2, urdf; an accelerometer also kalibr, ros. */
                 format: string;
                 /** @description Number of the version; default: the newest. */
                 version?: number | null;

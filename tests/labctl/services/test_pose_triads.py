@@ -95,6 +95,12 @@ def test_rests_that_do_not_agree_or_are_too_few_are_named_with_what_to_do(tmp_pa
     assert "calibrate it without the earlier version" in text
     found = answer(sensor, str(write_turned(tmp_path / "few", unit, 8, seed=6)), *EARLIER)
     assert found["alignment"] is None
+    rows = json.loads(run("sensors", "list", SERIAL, "--json").stdout)
+    offered = {(row["sensor"], row["version"]): {each["id"] for each in row["formats"]} for row in rows}
+    transforms = {"tf2", "urdf"}
+    assert transforms <= offered["accelerometer", 1]  # the first session tells the alignment
+    newest = max(version for name, version in offered if name == sensor)
+    assert not transforms & offered[sensor, newest]
     assert "8 rests have 7 turns between them; nine coefficients of the gyro need at least 9" in " ".join(found["text"])
 
 
