@@ -1,24 +1,35 @@
 """Alignment of the gyro and magnetometer triads to the accelerometer's: coverage of U = 2 u at 12, 30 and 100 rests.
 
-`run()` gives each share with its standard uncertainty; truth is `studies.triads_simulation`, of NumPy alone.
+Then over temperature, and with an earlier version of the accelerometer. `run()` gives each share with its standard
+uncertainty; truth is `studies.triads_simulation`, of NumPy alone.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import UTC, datetime
 
 import numpy as np
 
 from labctl.fitting.magnetometer.alignment import align_field
 from labctl.fitting.magnetometer.calibrate import calibrate_magnetometer
-from labctl.fitting.poses.fit import solve
-from labctl.fitting.poses.readings import AXES, readings_of
+from labctl.fitting.poses.at_rest.accelerometer import calibrate_accelerometer
+from labctl.fitting.poses.at_rest.fewer_poses import Known, by_fewer_poses
+from labctl.fitting.poses.at_rest.rests import find_rests
+from labctl.fitting.poses.fit import Solved, solve
+from labctl.fitting.poses.readings import AXES, PoseReadings, readings_of
+from labctl.fitting.poses.triad import UPPER
 from labctl.recording import Recording, RecordingInfo
+from labctl.services.pose_triads import solved_of
 from studies.poses import turned_deg
-from studies.triads_simulation import DIP_DEG, TrueTriads, turned_by_hand, vector_of
+from studies.triads_simulation import DIP_DEG, TrueTriads, turned_by_hand, vector_of, warmed, warmed_k
 
 #: Rests of a session, and sessions.
 CELLS = {12: 100, 30: 80, 100: 20}
+#: Sessions over temperature, and with an earlier version.
+OTHERS = 60
+#: Middle of the temperatures, deg C, and what a scale factor and a misalignment change from session to session.
+ABOUT_C, CHANGES = 25.0, (1e-3, 5e-4)
 #: Field that is another in each rest, uT, and how many readings one of the magnetometer's is taken from.
 PLACE_UT, EVERY = 0.2, 10
 
@@ -36,12 +47,50 @@ def recording_of(t_s: np.ndarray, gyro_dps: np.ndarray, force_g: np.ndarray, fie
     return Recording(info, columns)
 
 
-def scores(seed: int, rests: int, place_ut: float = PLACE_UT) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+Scores = tuple[np.ndarray, np.ndarray, np.ndarray]
+Parts = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+
+
+def scores(seed: int, rests: int, place_ut: float = PLACE_UT) -> Scores:
     """Return (value - truth) / u of the gyro's angles (3,), and of the magnetometer's with the dip (4,); its u, deg."""
     unit = TrueTriads.drawn(np.random.default_rng(10**6 + seed))
     parts = turned_by_hand(seed, unit, rests, place_ut=place_ut)
     readings = readings_of(recording_of(*parts))
-    solved = solve(readings)
+    return _scores(unit, readings, solve(readings), parts)
+
+
+def scores_over_temperature(seed: int, rests: int) -> Scores:
+    """Return the same of a session at four temperatures, over which bias and scale factors of the forces change."""
+    rng = np.random.default_rng(2 * 10**6 + seed)
+    unit = TrueTriads.drawn(np.random.default_rng(10**6 + seed))
+    parts = turned_by_hand(seed, unit, rests, place_ut=PLACE_UT)
+    away_k = warmed_k(len(parts[0]))
+    changed = (parts[0], parts[1], warmed(rng, unit, parts[2], away_k), parts[3])
+    readings = replace(readings_of(recording_of(*changed)), temperature_c=ABOUT_C + away_k)
+    return _scores(unit, readings, solved_of(readings, None, over_temperature=True), changed)
+
+
+def scores_with_earlier(seed: int, rests: int) -> Scores:
+    """Return the same with an earlier session's accelerometer, which has changed since as the fit allows."""
+    rng = np.random.default_rng(3 * 10**6 + seed)
+    unit = TrueTriads.drawn(np.random.default_rng(10**6 + seed))
+    first = readings_of(recording_of(*turned_by_hand(seed, unit, 24, place_ut=PLACE_UT)))
+    rests_then = find_rests(first)
+    was = calibrate_accelerometer(first, rests_then)
+    changes = np.where(np.eye(3, dtype=bool), *CHANGES)
+    moved = unit.force + np.triu(rng.normal(0, 1, (3, 3)) * changes)
+    now = replace(unit, force=moved, force_bias_g=unit.force_bias_g + rng.normal(0, 0.01, 3))
+    parts = turned_by_hand(10**5 + seed, now, rests, place_ut=PLACE_UT)
+    readings = readings_of(recording_of(*parts))
+    found = find_rests(readings)
+    of_change = np.diag(np.repeat(CHANGES, 3) ** 2)
+    errors = np.array([was.errors[place] for place in UPPER])
+    known = Known(errors, was.covariance[3:, 3:] + of_change, was.bias_g, 0.0)
+    fewer = by_fewer_poses(readings, found, known)
+    return _scores(now, readings, solve(readings, (found, fewer.found)), parts)
+
+
+def _scores(unit: TrueTriads, readings: PoseReadings, solved: Solved, parts: Parts) -> Scores:
     gyro = solved.alignment
     field = align_field(readings, solved, parts[3], calibrate_magnetometer("study", parts[3][::EVERY]))
     true = np.radians(turned_deg(unit.gyro - np.eye(3), unit.force - np.eye(3)))
@@ -49,15 +98,25 @@ def scores(seed: int, rests: int, place_ut: float = PLACE_UT) -> tuple[np.ndarra
     return (gyro.angles_rad - true) / gyro.u_rad, away / field.u_rad, np.degrees(field.u_rad)
 
 
-def run(cells: dict[int, int] | None = None) -> str:
-    """Return the table: by rests, the share of each kind within 2 u, and the root mean square of error over u."""
+def run(cells: dict[int, int] | None = None, others: int = OTHERS) -> str:
+    """Return the table: by rests, the share of each kind within 2 u, and the root mean square of error over u.
+
+    `others` are the sessions over temperature, and those with an earlier version.
+    """
     rows = []
     for rests, sessions in (cells or CELLS).items():
-        gyro, field, u = (np.array(each) for each in zip(*(scores(k, rests) for k in range(sessions)), strict=True))
-        rows.append(f"   {rests} rests, {sessions} sessions, field u {np.median(u[:, :3]):.3f} deg:")
-        for kind, z in (("gyro", gyro), ("magnetometer", field[:, :3]), ("dip", field[:, 3:])):
-            share = float(np.mean(np.abs(z) <= 2))
-            spread = np.mean(np.abs(z) <= 2, axis=1).std() / np.sqrt(len(z))
-            size = np.sqrt(np.mean(z**2))
-            rows.append(f"      {kind:13} {100 * share:5.1f} % +- {100 * spread:.1f}; RMS {size:.2f} u")
+        rows += _rows(f"{rests} rests", [scores(k, rests) for k in range(sessions)])
+    if others:
+        rows += _rows("32 rests over temperature", [scores_over_temperature(k, 32) for k in range(others)])
+        rows += _rows("12 rests with an earlier version", [scores_with_earlier(k, 12) for k in range(others)])
     return "\n".join(rows)
+
+
+def _rows(name: str, found: list[Scores]) -> list[str]:
+    gyro, field, u = (np.array(each) for each in zip(*found, strict=True))
+    rows = [f"   {name}, {len(found)} sessions, field u {np.median(u[:, :3]):.3f} deg:"]
+    for kind, z in (("gyro", gyro), ("magnetometer", field[:, :3]), ("dip", field[:, 3:])):
+        share = float(np.mean(np.abs(z) <= 2))
+        spread = np.mean(np.abs(z) <= 2, axis=1).std() / np.sqrt(len(z))
+        rows.append(f"      {kind:13} {100 * share:5.1f} % +- {100 * spread:.1f}; RMS {np.sqrt(np.mean(z**2)):.2f} u")
+    return rows

@@ -101,6 +101,22 @@ def turned_by_hand(
     )
 
 
+def warmed_k(n: int) -> Array:
+    """Return what the temperature of n readings is from the middle, K: four levels, with a slow change in each."""
+    share = np.arange(n) / n
+    return np.asarray(np.array([-30.0, -10.0, 10.0, 30.0])[(4 * share).astype(np.int64)] + 2 * share)
+
+
+def warmed(rng: np.random.Generator, unit: TrueTriads, force_g: Array, away_k: Array) -> Array:
+    """Return readings (n, 3) of the accelerometer, g, with bias and scale factors that change with temperature.
+
+    `away_k` (n,) is the temperature from that at which the unit is as drawn.
+    """
+    force = np.linalg.solve(unit.force, (force_g - unit.force_bias_g).T).T
+    bias = sum(away_k[:, None] ** k * rng.normal(0, size, 3) for k, size in ((1, 5e-4), (2, 5e-6), (3, 1e-7)))
+    return np.asarray(force_g + bias + away_k[:, None] * rng.normal(0, 1e-4, 3) * force)
+
+
 #: Directions up of twelve poses that no five degrees are between: the corners of an icosahedron.
 GOLDEN = (1 + np.sqrt(5)) / 2
 CORNERS = np.array([

@@ -166,7 +166,8 @@ SensorExport = Annotated[
     typer.Option(
         "--export",
         metavar="NAME",
-        help="Write the calibration to --out: px4, ardupilot, json, python, c; an accelerometer also kalibr, ros.",
+        help="Write the calibration to --out: px4, ardupilot, json, python, c, tf2, urdf; an accelerometer also "
+        "kalibr, ros.",
     ),
 ]
 Out = Annotated[Path | None, typer.Option("--out", metavar="FILE", help="Path of the file to write.")]

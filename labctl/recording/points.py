@@ -97,22 +97,26 @@ def _windows(since_s: NDArray[np.float64], temperature_c: NDArray[np.float64] | 
     return np.minimum(since_s / max(length_s, 1e-9) * parts, parts - 1).astype(np.int64)
 
 
-def with_pieces(points: Recording, readings_of: Callable[[int], Columns]) -> Recording:
+def longest_undivided_s(motion: Motion) -> float:
+    """Return up to which duration, s, a data set has one row of means, whatever its readings are."""
+    return 0.0 if motion == "rest" else LONG_S
+
+
+def with_pieces(points: Recording, pieces_of: Callable[[int], Recording]) -> Recording:
     """Return points with a row for each piece of a data set that is divided, under the number of the data set.
 
-    For means that are kept without their readings: `readings_of` returns those of a data set; only the long ones are
-    read. A column that the readings do not have, such as the set point, is copied from the data set.
+    For means that are kept without their readings: `pieces_of` returns `to_points` of the readings of a data set; only
+    the long ones are asked for. A column that the readings do not have, such as the set point, is copied from the set.
     """
     columns = {name: np.asarray(values) for name, values in points.columns.items()}
-    longest_s = 0.0 if points.info.motion == "rest" else LONG_S
+    longest_s = longest_undivided_s(points.info.motion)
     if not np.any(np.asarray(columns.get("duration_s", 0.0), dtype=np.float64) > longest_s):
         return points
     rows: list[dict[str, NDArray[np.generic]]] = []
     for row in range(len(points)):
         kept = {name: values[row : row + 1] for name, values in columns.items()}
         if kept["duration_s"][0] > longest_s:
-            info = points.info.model_copy(update={"kind": "samples"})
-            found = to_points(Recording(info, readings_of(int(kept["dataset"][0]))))
+            found = pieces_of(int(kept["dataset"][0]))
             if len(found) > 1:
                 kept = {n: found.columns[n] if n in found.columns else v.repeat(len(found)) for n, v in kept.items()}
         rows.append(kept)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,22 +13,22 @@ from labctl.errors import BadInput, BadRecording, NotEnoughData
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.poses.at_rest.accelerometer import Accelerometer, calibrate_accelerometer, different_poses
 from labctl.fitting.poses.at_rest.adequacy import Adequacy, adequacy_of
-from labctl.fitting.poses.at_rest.fewer_poses import ByFewer, Known, by_fewer_poses
+from labctl.fitting.poses.at_rest.fewer_poses import by_fewer_poses
 from labctl.fitting.poses.at_rest.gravity import STANDARD_GRAVITY
 from labctl.fitting.poses.at_rest.rests import Rests, find_rests
 from labctl.fitting.poses.at_rest.temperature import OverTemperature, calibrate_over_temperature
 from labctl.fitting.poses.description import alignment_json, alignment_text
-from labctl.fitting.poses.fit import solve
+from labctl.fitting.poses.fit import Solved, solve
 from labctl.fitting.poses.readings import AXES, GAP, LEAST_READINGS, PoseReadings, readings_of
 from labctl.fitting.poses.triad import UPPER
 from labctl.recording import RecordingInfo
 from labctl.recording.data_files import read_table
 from labctl.recording.files import read_recording
 from labctl.recording.info import NO_DATE
+from labctl.services.pose_triads import Earlier, require_one, solve_even, solve_with_earlier
 from labctl.services.schemas.reports.accelerometer import (
     AccelerometerResponse,
     AccelerometerTemperature,
-    EarlierVersion,
 )
 from labctl.services.schemas.reports.magnetometer import Estimate
 from labctl.services.table_readings import numbers_of
@@ -55,54 +55,6 @@ class Source:
         return f"columns {', '.join(self.columns)} in {self.unit}{local}{warm}"
 
 
-@dataclass(frozen=True)
-class Earlier:
-    """An earlier version of the same accelerometer, and by how much it may have changed since."""
-
-    version: int
-    result: AccelerometerResponse
-    scale_change: float = 1e-3  #: standard uncertainty
-    misalignment_change: float = 5e-4  #: standard uncertainty, rad
-
-    def known(self) -> Known:
-        """Return what it tells of the parameters now. Raises BadInput for a change that is not positive."""
-        for option, value in (
-            ("--scale-change", self.scale_change),
-            ("--misalignment-change", self.misalignment_change),
-        ):
-            if not 0 < value <= 1:
-                raise BadInput(f"{option} {value:g}: give a standard uncertainty above 0 and up to 1, such as 0.001")
-        was = self.result
-        values = [was.scale_factor[a].value for a in AXES]
-        values += [was.misalignment[AXES[i] + AXES[j]].value for i, j in UPPER[3:]]
-        changes = np.repeat([self.scale_change, self.misalignment_change], 3)
-        more = max(was.heldout_g**2 - was.expected_g**2, 0.0) if was.verdict == "unexplained" else 0.0
-        return Known(
-            np.array(values), np.array(was.covariance)[3:, 3:] + np.diag(changes**2),
-            np.array([was.bias_g[a].value for a in AXES]), more,
-        )  # fmt: skip
-
-    def answer(self, p_value: float) -> EarlierVersion:
-        """Return what the response says of it."""
-        return EarlierVersion(
-            version=self.version, scale_change=self.scale_change, misalignment_change=self.misalignment_change,
-            p_value=p_value,
-        )  # fmt: skip
-
-    def text(self, fewer: ByFewer) -> str:
-        """Return a sentence on what it contributes, and whether the rests agree with it."""
-        used = (
-            f"Scale factors and misalignments rest on version {self.version} too, with a change since of "
-            f"{self.scale_change:g} and {self.misalignment_change:g} (standard uncertainty)"
-        )
-        if fewer.agrees:
-            return f"{used}; the rests agree with it (p = {fewer.p_value:.2g})."
-        return (
-            f"{used}; the rests do NOT agree with it (p = {fewer.p_value:.1g}): the unit changed by more, or moved in "
-            "its rests; lay it down in at least 12 poses and calibrate it without the earlier version."
-        )
-
-
 def accelerometer_of_files(
     paths: Sequence[Path], source: Source, serial: str | None = None, earlier: Earlier | None = None
 ) -> AccelerometerResponse:
@@ -125,20 +77,22 @@ def accelerometer_of_files(
             )
     readings = _joined(parts)
     rests = find_rests(readings)
+    require_one(source.temperature, earlier)
     if source.temperature is not None:
-        if earlier is not None:
-            raise BadInput("--temperature with --earlier: coefficients of temperature need all poses; leave one out")
-        return temperature_response(calibrate_over_temperature(readings, rests), rests)
+        warm = calibrate_over_temperature(readings, rests)
+        return _with_alignment(_over_temperature(warm, rests), readings, lambda: solve_even(readings, rests, warm))
     if earlier is None:
         found = calibrate_accelerometer(readings, rests)
-        return with_alignment(_response(found, rests, adequacy_of(found, rests)), readings)
+        answer = _response(found, rests, adequacy_of(found, rests))
+        return _with_alignment(answer, readings, lambda: solve(readings, (rests, found)))
     known = earlier.known()
     fewer = by_fewer_poses(readings, rests, known)
     worth = adequacy_of(fewer.found, rests, known.whitened)
-    return _response(fewer.found, rests, worth).model_copy(update={
+    answer = _response(fewer.found, rests, worth).model_copy(update={
         "verdict": "adequate" if fewer.agrees else "unexplained", "earlier": earlier.answer(fewer.p_value),
         "text": [*_size_text(fewer.found, worth), earlier.text(fewer)],
     })  # fmt: skip
+    return _with_alignment(answer, readings, lambda: solve_with_earlier(readings, rests, earlier, fewer))
 
 
 def _readings(path: Path, source: Source) -> PoseReadings:
@@ -199,18 +153,20 @@ def _both(first: Array | None, then: Array | None) -> Array | None:
     return None if first is None or then is None else np.concatenate([first, then])
 
 
-def with_alignment(answer: AccelerometerResponse, readings: PoseReadings) -> AccelerometerResponse:
-    """Return a calibration with the alignment of the gyro triad, where the readings have a gyro and enough turns."""
+def _with_alignment(
+    answer: AccelerometerResponse, readings: PoseReadings, solved: Callable[[], Solved]
+) -> AccelerometerResponse:
+    """Return a calibration with the alignment of the gyro triad, or with why rests and turns do not tell it."""
     if not readings.gyro_dps.any():
         return answer
     try:
-        found = alignment_json(solve(readings).alignment)
+        found = alignment_json(solved().alignment)
     except NotEnoughData as error:
         return answer.model_copy(update={"text": [*answer.text, f"Alignment of the gyro triad: unknown: {error}"]})
     return answer.model_copy(update={"alignment": found, "text": [*answer.text, alignment_text(found)]})
 
 
-def temperature_response(found: OverTemperature, rests: Rests) -> AccelerometerResponse:
+def _over_temperature(found: OverTemperature, rests: Rests) -> AccelerometerResponse:
     """Return a calibration over temperature as a response."""
     u = np.sqrt(np.diag(found.covariance))
     begin = len(found.reference.covariance)

@@ -14,11 +14,11 @@ from labctl.fitting.magnetometer.alignment import FieldAlignment, align_field
 from labctl.fitting.magnetometer.calibrate import AXES, MOST_LEFT_OUT, Magnetometer, calibrate_magnetometer
 from labctl.fitting.magnetometer.ellipsoid import PLACES
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.poses.fit import solve
 from labctl.fitting.poses.readings import PoseReadings, readings_of
 from labctl.json_types.poses import FieldAlignmentJson
 from labctl.recording.data_files import read_table
 from labctl.recording.files import read_recording
+from labctl.services.pose_triads import Earlier, require_one, solved_of
 from labctl.services.schemas.reports.magnetometer import Estimate, MagnetometerResponse
 from labctl.services.table_readings import numbers_of
 
@@ -38,12 +38,21 @@ class Source:
     columns: Sequence[str] = COLUMNS  #: x, y and z
     unit: str = "uT"
     field_ut: float | None = None  #: size of the local field
+    temperature: str | None = None  #: where the accelerometer of a recording is fitted over it; None: it is not
+    earlier: Earlier | None = None  #: version of the unit's accelerometer that the alignment uses too
 
     @property
     def text(self) -> str:
         """What was read, in one line."""
         given = "" if self.field_ut is None else f", field {self.field_ut:g} uT"
-        return f"columns {', '.join(self.columns)} in {self.unit}{given}"
+        return f"columns {', '.join(self.columns)} in {self.unit}{given}{self.levels}"
+
+    @property
+    def levels(self) -> str:
+        """What tells the accelerometer beside the poses, after a comma; empty: nothing."""
+        if self.temperature is not None:
+            return ", accelerometer over temperature"
+        return "" if self.earlier is None else f", with version {self.earlier.version} of the accelerometer"
 
 
 def magnetometer_of_file(path: Path, source: Source, serial: str | None = None) -> MagnetometerResponse:
@@ -52,17 +61,24 @@ def magnetometer_of_file(path: Path, source: Source, serial: str | None = None) 
     `serial` is the unit's serial number where it is known: a recording of another unit is refused. Raises BadInput,
     BadRecording, NotEnoughData.
     """
+    require_one(source.temperature, source.earlier)
     columns, unit, field_ut = source.columns, source.unit, source.field_ut
     if unit not in UNITS_UT:
         raise BadInput(f"--unit {unit}: give one of {', '.join(UNITS_UT)}")
     if field_ut is not None and not (np.isfinite(field_ut) and field_ut > 0):
         raise BadInput(f"--field-ut {field_ut:g}: give the size of the local field in uT, such as 49.2")
     if path.is_dir():
-        return _of_recording(path, field_ut, serial)
+        return _of_recording(path, source, serial)
     if not path.is_file():
         raise BadRecording(
             f"{path}: not found; name a CSV or Parquet file with the readings of a magnetometer, or the folder of a "
             "recording in poses"
+        )
+    if source.temperature is not None or source.earlier is not None:
+        option = "--earlier" if source.temperature is None else "--temperature"
+        raise BadInput(
+            f"{path}: {option} is for the alignment, which a table of a magnetometer's readings does not tell; name "
+            "the folder of a recording in poses, or leave it out"
         )
     if len(columns) != len(AXES):
         raise BadInput(f"--columns {','.join(columns)}: name three columns, of x, y and z")
@@ -71,7 +87,7 @@ def magnetometer_of_file(path: Path, source: Source, serial: str | None = None) 
     return _response(result, given=field_ut is not None)
 
 
-def _of_recording(path: Path, field_ut: float | None, serial: str | None) -> MagnetometerResponse:
+def _of_recording(path: Path, source: Source, serial: str | None) -> MagnetometerResponse:
     """Return the calibration of a recording in poses, with the alignment where rests and turns determine it."""
     recording = read_recording(path)
     if serial is not None and recording.info.serial != serial:
@@ -93,15 +109,17 @@ def _of_recording(path: Path, field_ut: float | None, serial: str | None) -> Mag
         raise BadRecording(
             f"{path}: the field at t_s = {readings.t_s[row]:.6g} is not a number; mark such readings with valid = 0"
         )
-    found = calibrate_magnetometer(recording.info.serial, field, field_ut)
-    return _with_alignment(_response(found, given=field_ut is not None), readings, field, found)
+    found = calibrate_magnetometer(recording.info.serial, field, source.field_ut)
+    return _with_alignment(_response(found, given=source.field_ut is not None), readings, field, found, source)
 
 
 def _with_alignment(
-    answer: MagnetometerResponse, readings: PoseReadings, field: NDArray[np.float64], found: Magnetometer
-) -> MagnetometerResponse:
+    answer: MagnetometerResponse, readings: PoseReadings, field: NDArray[np.float64], found: Magnetometer,
+    source: Source,
+) -> MagnetometerResponse:  # fmt: skip
     try:
-        aligned = align_field(readings, solve(readings), field, found)
+        solved = solved_of(readings, source.earlier, over_temperature=source.temperature is not None)
+        aligned = align_field(readings, solved, field, found)
     except NotEnoughData as error:
         said = f"Alignment of the magnetometer: unknown: {error}"
         return answer.model_copy(update={"text": [said, *answer.text]})
@@ -110,8 +128,8 @@ def _with_alignment(
         for value, u in zip(np.degrees(aligned.angles_rad), np.degrees(aligned.u_rad[:3]), strict=True)
     )
     said = (
-        f"Magnetometer turned from the accelerometer's axes about x, y, z by {angles} deg (U, k = 2); the field dips "
-        f"by {np.degrees(aligned.dip_rad):.1f} deg."
+        f"Magnetometer turned from the accelerometer's axes about x, y, z by {angles} deg (U, k = 2{source.levels}); "
+        f"the field dips by {np.degrees(aligned.dip_rad):.1f} deg."
     )
     # the last sentence is that of the verdict, which a refusal of an export cites
     return answer.model_copy(update={"alignment": _alignment(aligned), "text": [said, *answer.text]})

@@ -32,9 +32,14 @@ from labctl.services.schemas.sensors import (
     SensorName,
     SensorVersionResponse,
 )
+from labctl.services.sensor_coefficients import coefficients_of
 from labctl.services.sensor_exports import export_of
 from labctl.store import NewSensorVersion, SensorVersionRow, Store
 
+#: What is stored of each sensor.
+RESULTS: Mapping[SensorName, type[AccelerometerResponse | MagnetometerResponse]] = {
+    "accelerometer": AccelerometerResponse, "magnetometer": MagnetometerResponse,
+}  # fmt: skip
 #: Largest difference between a stated uncertainty and that of the covariance, relative.
 ROUNDING = 1e-6
 
@@ -192,9 +197,14 @@ def _answer(row: SensorVersionRow) -> SensorVersionResponse:
 def _fields(row: SensorVersionRow, *, whole: bool = False) -> dict[str, object]:
     result: dict[str, object] = {"result": row.result} if whole else {}
     adequate = row.sensor == "accelerometer" or row.verdict == "adequate"
-    formats = SENSOR_FORMATS[row.sensor] if adequate else {}
+    parameters = RESULTS[row.sensor].model_validate(row.result)
+    formats = {
+        name: each for name, each in SENSOR_FORMATS[row.sensor].items()
+        if adequate and (parameters.alignment is not None or not each.of_alignment)
+    }  # fmt: skip
     return result | {
         "serial": row.serial, "sensor": row.sensor, "version": row.version, "verdict": row.verdict, "at": row.at,
         "by": row.by, "by_key": row.by_key, "data": row.data, "hash": row.hash, "summary": row.result["text"],
+        "coefficients": coefficients_of(parameters),
         "formats": [{"id": name, "title": each.title, "suffix": each.suffix} for name, each in formats.items()],
     }  # fmt: skip

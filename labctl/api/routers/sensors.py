@@ -22,6 +22,10 @@ from labctl.services.sensor_versions import list_versions, one_accelerometer, on
 router = APIRouter(prefix="/api/units/{serial}/sensors", tags=["sensors"])
 Version = Annotated[int | None, Query(description="Number of the version; default: the newest.")]
 
+FormatName = Annotated[
+    str, Query(description="px4, ardupilot, json, python, c, tf2, urdf; an accelerometer also kalibr, ros.")
+]
+
 
 @router.get("", summary="Accelerometer and magnetometer of a unit")
 def sensors(serial: str, service: ServiceDep) -> list[SensorVersionResponse]:
@@ -46,7 +50,7 @@ def file(
     serial: str,
     sensor: SensorName,
     service: ServiceDep,
-    format: Annotated[str, Query(description="px4, ardupilot, json, python, c; an accelerometer also kalibr, ros.")],  # noqa: A002  as of a calibration
+    format: FormatName,  # noqa: A002  as of a calibration
     version: Version = None,
     instance: Annotated[
         int | None, Query(description="Number of the sensor: px4 from 0, ardupilot from 1; default: the first.")

@@ -7,43 +7,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from labctl.cli.earlier_version import Earlier, MisalignmentChange, ScaleChange, Temperature, earlier_version
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import By, Database, DeviceId, Json, Out, SensorExport, SensorInstance, SensorSerial, who
 from labctl.cli.output import print_json
 from labctl.cli.printing.sensors import print_kept, print_sensor
 
 if TYPE_CHECKING:
-    from labctl.services.accelerometer import Earlier as EarlierVersion
     from labctl.services.schemas.reports.accelerometer import AccelerometerResponse
     from labctl.services.schemas.sensors import AccelerometerVersion, MeasuredData
-
-Earlier = Annotated[
-    int | None,
-    typer.Option(
-        "--earlier",
-        metavar="N",
-        help="Use version N of this unit (--serial) too, 0: its newest; four poses are then enough.",
-    ),
-]
-Temperature = Annotated[
-    str | None,
-    typer.Option(
-        "--temperature",
-        metavar="COLUMN",
-        help="Fit bias and scale factors over the temperature in this column, deg C (of a recording: its own): poses "
-        "at two temperatures or more that span 5 K.",
-    ),
-]
-ScaleChange = Annotated[
-    float,
-    typer.Option(
-        "--scale-change", metavar="U", help="With --earlier: standard uncertainty of a scale factor's change since."
-    ),
-]
-MisalignmentChange = Annotated[
-    float,
-    typer.Option("--misalignment-change", metavar="U", help="With --earlier: the same of a misalignment, rad."),
-]
 
 
 def accelerometer(
@@ -81,7 +53,7 @@ def accelerometer(
     with one_clear_line():
         check_export(export, out)
         source = Source([name.strip() for name in columns.split(",")], unit, latitude_deg, temperature)
-        before = _earlier(database, serial, earlier, (scale_change, misalignment_change))
+        before = earlier_version(database, serial, earlier, (scale_change, misalignment_change))
         answer = accelerometer_of_files(paths, source, serial, before)
         write_export(answer, export, out, instance, device_id)
         if serial is not None:
@@ -90,23 +62,6 @@ def accelerometer(
         print_json(answer if kept is None else kept)
     else:
         print_sensor(answer) if kept is None else print_kept(kept)
-
-
-def _earlier(
-    database: str | None, serial: str | None, number: int | None, changes: tuple[float, float]
-) -> EarlierVersion | None:
-    from labctl.errors import BadInput
-    from labctl.services.accelerometer import Earlier as Found
-    from labctl.services.commands.open import open_readonly
-    from labctl.services.sensor_versions import one_accelerometer
-
-    if number is None:
-        return None
-    if serial is None:
-        raise BadInput("--earlier needs --serial: name the unit of which it is a version")
-    with open_readonly(database) as store:
-        version = one_accelerometer(store, serial, number or None)
-    return Found(version.version, version.result, *changes)
 
 
 def _kept(

@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from labctl.cli.earlier_version import Earlier, MisalignmentChange, ScaleChange, Temperature, earlier_version
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import By, Database, DeviceId, Json, Out, SensorExport, SensorInstance, SensorSerial, who
 from labctl.cli.output import print_json
 from labctl.cli.printing.sensors import print_kept, print_sensor
+
+if TYPE_CHECKING:
+    from labctl.services.schemas.reports.magnetometer import MagnetometerResponse
+    from labctl.services.schemas.sensors import MagnetometerVersion, MeasuredData
 
 Readings = Annotated[
     Path,
@@ -38,7 +43,11 @@ def magnetometer(
             help="Size of the local field, uT; default: by the readings, with a soft iron of determinant 1.",
         ),
     ] = None,
+    temperature: Temperature = None,
     serial: SensorSerial = None,
+    earlier: Earlier = None,
+    scale_change: ScaleChange = 1e-3,
+    misalignment_change: MisalignmentChange = 5e-4,
     by: By = None,
     export: SensorExport = None,
     out: Out = None,
@@ -48,24 +57,32 @@ def magnetometer(
     database: Database = None,
 ) -> None:
     """Calibrate a magnetometer: hard iron, soft iron, their uncertainty, and whether the field was constant."""
-    from labctl.services.commands.open import execute
-    from labctl.services.commands.requests import ToUnit
-    from labctl.services.commands.sensors import KEEP_MAGNETOMETER
     from labctl.services.magnetometer import Source, magnetometer_of_file
-    from labctl.services.schemas.sensors import MagnetometerRequest
     from labctl.services.sensor_exports import check_export, write_export
     from labctl.services.sensor_versions import measured_data
 
     kept = None
     with one_clear_line():
         check_export(export, out)
-        source = Source([name.strip() for name in columns.split(",")], unit, field_ut)
+        before = earlier_version(database, serial, earlier, (scale_change, misalignment_change))
+        source = Source([name.strip() for name in columns.split(",")], unit, field_ut, temperature, before)
         answer = magnetometer_of_file(path, source, serial)
         write_export(answer, export, out, instance, device_id)
         if serial is not None:
-            request = MagnetometerRequest(data=measured_data([path], source.text), result=answer, by=who(by))
-            kept = execute(database, KEEP_MAGNETOMETER, ToUnit(serial, request))
+            kept = _kept(database, serial, measured_data([path], source.text), answer, by)
     if as_json:
         print_json(answer if kept is None else kept)
     else:
         print_sensor(answer) if kept is None else print_kept(kept)
+
+
+def _kept(
+    database: str | None, serial: str, data: MeasuredData, answer: MagnetometerResponse, by: str | None
+) -> MagnetometerVersion:
+    from labctl.services.commands.open import execute
+    from labctl.services.commands.requests import ToUnit
+    from labctl.services.commands.sensors import KEEP_MAGNETOMETER
+    from labctl.services.schemas.sensors import MagnetometerRequest
+
+    request = MagnetometerRequest(data=data, result=answer, by=who(by))
+    return execute(database, KEEP_MAGNETOMETER, ToUnit(serial, request))

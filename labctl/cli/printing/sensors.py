@@ -8,14 +8,24 @@ from labctl.cli.output import console, format_number, table
 from labctl.services.schemas.reports.accelerometer import AccelerometerResponse
 from labctl.services.schemas.reports.magnetometer import MagnetometerResponse
 from labctl.services.schemas.sensors import AccelerometerVersion, MagnetometerVersion, SensorVersionResponse
+from labctl.services.sensor_coefficients import coefficients_of
+
+#: Of the expanded uncertainty.
+COVERAGE = 2
 
 
 def print_sensor(answer: AccelerometerResponse | MagnetometerResponse) -> None:
     """Print the parameters with their uncertainty, the verdict and what it stands on."""
-    if isinstance(answer, AccelerometerResponse):
-        _print_accelerometer(answer)
-    else:
-        _print_magnetometer(answer)
+    name = "accelerometer" if isinstance(answer, AccelerometerResponse) else "magnetometer"
+    rows = table(name, "coefficient", "unit", "value", "u", "U, k = 2", numbers=2)
+    for each in coefficients_of(answer):
+        expanded = None if each.u is None else COVERAGE * each.u
+        rows.add_row(
+            each.name, each.unit, format_number(each.value, 5), format_number(each.u, 2), format_number(expanded, 2)
+        )
+    console.print(rows)
+    _print_verdict(answer)
+    _print_extent(answer)
 
 
 def print_kept(answer: AccelerometerVersion | MagnetometerVersion) -> None:
@@ -41,46 +51,20 @@ def print_versions(answers: Sequence[SensorVersionResponse]) -> None:
     console.print(rows)
 
 
-def _print_accelerometer(answer: AccelerometerResponse) -> None:
-    rows = table("accelerometer", "coefficient", "unit", "value", "u", numbers=2)
-    for name, unit, values in (
-        ("bias", "g", answer.bias_g),
-        ("scale factor", "1", answer.scale_factor),
-        ("misalignment", "1", answer.misalignment),
-    ):
-        for place, found in values.items():
-            rows.add_row(f"{name} {place}", unit, format_number(found.value, 5), format_number(found.u, 2))
-    if answer.temperature is not None:
-        for name, unit, terms in (("bias", "g", answer.temperature.bias_g),
-                                  ("scale factor", "1", answer.temperature.scale_factor)):  # fmt: skip
-            for axis, found_terms in terms.items():
-                for power, found in enumerate(found_terms, start=1):
-                    per = f"{unit}/K" + (f"^{power}" if power > 1 else "")
-                    rows.add_row(f"{name} {axis}", per, format_number(found.value, 3), format_number(found.u, 2))
-    console.print(rows)
-    _print_verdict(answer)
-    density = max(answer.noise_density_m_s2.values())
-    console.print(
-        f"{answer.rests - answer.left_out} of {answer.rests} rests used, in {answer.poses} poses; white noise up to "
-        f"{density:.2g} m/s2/sqrt(Hz)",
-        style="dim",
-    )
-
-
-def _print_magnetometer(answer: MagnetometerResponse) -> None:
-    rows = table("magnetometer", "coefficient", "unit", "value", "u", numbers=2)
-    for axis, found in answer.hard_iron_ut.items():
-        rows.add_row(f"hard iron {axis}", "uT", format_number(found.value), format_number(found.u, 2))
-    for place, found in answer.soft_iron.items():
-        rows.add_row(f"soft iron {place}", "1", format_number(found.value, 5), format_number(found.u, 2))
-    rows.add_row("field", "uT", format_number(answer.field_ut.value), format_number(answer.field_ut.u, 2))
-    console.print(rows)
-    _print_verdict(answer)
-    console.print(
-        f"{answer.readings - answer.left_out} of {answer.readings} readings used; from any direction to the nearest "
-        f"measured one: up to {answer.largest_gap_deg:.0f} deg",
-        style="dim",
-    )
+def _print_extent(answer: AccelerometerResponse | MagnetometerResponse) -> None:
+    """Print how many data the result stands on."""
+    if isinstance(answer, AccelerometerResponse):
+        density = max(answer.noise_density_m_s2.values())
+        said = (
+            f"{answer.rests - answer.left_out} of {answer.rests} rests used, in {answer.poses} poses; white noise up "
+            f"to {density:.2g} m/s2/sqrt(Hz)"
+        )
+    else:
+        said = (
+            f"{answer.readings - answer.left_out} of {answer.readings} readings used; from any direction to the "
+            f"nearest measured one: up to {answer.largest_gap_deg:.0f} deg"
+        )
+    console.print(said, style="dim")
 
 
 def _print_verdict(answer: AccelerometerResponse | MagnetometerResponse) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 from labctl.errors import BadInput
 from labctl.exports.flight_controllers import accelerometer, magnetometer
-from labctl.exports.sensors import program, robots
+from labctl.exports.sensors import program, robots, static_transform
 from labctl.exports.sensors.parameters import Parameters
 
 
@@ -17,6 +17,7 @@ class SensorFormat:
     """A format: its title, the suffix and media type of its files, and its writer.
 
     `first` is the number of the first sensor at an autopilot; None: the format has no numbers and no device ids.
+    `of_alignment`: it carries the alignment and nothing else.
     """
 
     title: str
@@ -24,6 +25,7 @@ class SensorFormat:
     media_type: str
     write: Callable[..., str]
     first: int | None = None
+    of_alignment: bool = False
 
 
 _TEXT = "text/plain; charset=us-ascii"
@@ -32,6 +34,10 @@ _PROGRAMS = {
     "python": SensorFormat("Python module", "py", _TEXT, program.python_text),
     "c": SensorFormat("C99 header", "h", _TEXT, program.c_text),
 }
+_TRANSFORMS = {
+    "tf2": SensorFormat("ROS 2 static transform (command)", "sh", _TEXT, static_transform.tf2, of_alignment=True),
+    "urdf": SensorFormat("URDF fixed joint", "urdf", "application/xml", static_transform.urdf, of_alignment=True),
+}
 SENSOR_FORMATS: Mapping[str, Mapping[str, SensorFormat]] = {
     "accelerometer": {
         "px4": SensorFormat("PX4 parameters", "params", _TEXT, accelerometer.px4, first=0),
@@ -39,11 +45,13 @@ SENSOR_FORMATS: Mapping[str, Mapping[str, SensorFormat]] = {
         "kalibr": SensorFormat("Kalibr scale-misalignment (YAML)", "yaml", _TEXT, robots.kalibr),
         "ros": SensorFormat("ROS imu_calib (YAML)", "yaml", _TEXT, robots.ros),
         **_PROGRAMS,
+        **_TRANSFORMS,
     },
     "magnetometer": {
         "px4": SensorFormat("PX4 parameters", "params", _TEXT, magnetometer.px4, first=0),
         "ardupilot": SensorFormat("ArduPilot parameters", "param", _TEXT, magnetometer.ardupilot, first=1),
         **_PROGRAMS,
+        **_TRANSFORMS,
     },
 }
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.poses.at_rest.gravity import STANDARD_GRAVITY
+from labctl.fitting.poses.at_rest.temperature import powers_of
 
 
 class ForceParameters(Protocol):
@@ -67,11 +68,6 @@ class TemperatureParameters:
             f"LOST temperature: over {low:.1f} to {high:.1f} deg C {of_bias}the scale factors by up to {scale:.2g} g "
             f"of 1 g differ from those here, of {self.reference_c:g} deg C."
         )
-
-
-def powers_of(away: Array, order: int) -> NDArray[np.float64]:
-    """Return the powers 1 to `order` of differences (k,), (k, order)."""
-    return np.asarray(away[:, None] ** np.arange(1, order + 1), dtype=np.float64)
 
 
 @dataclass(frozen=True)

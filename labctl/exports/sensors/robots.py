@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from labctl.exports.comments import commented, plain
 from labctl.exports.sensors.parameters import AccelerometerParameters
+from labctl.exports.sensors.static_transform import command_of
 
 
 def lower_triangle(errors: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -55,13 +56,9 @@ def _transform(found: AccelerometerParameters) -> list[str]:
     """Return the static transform from the accelerometer's frame to the gyro's, as a command of tf2_ros."""
     if found.gyro_turned_rad is None:
         return []
-    from scipy.spatial.transform import Rotation
-
-    named = zip("xyzw", Rotation.from_rotvec(found.gyro_turned_rad).as_quat(), strict=True)
-    turn = " ".join(f"--q{name} {value:.9f}" for name, value in named)
     return [
         "LOST gyro triad; for rates that labctl's matrix has not corrected, which has this turn in it:",
-        f"ros2 run tf2_ros static_transform_publisher {turn} --frame-id accelerometer --child-frame-id gyro",
+        command_of(found.gyro_turned_rad, "gyro"),
     ]
 
 

@@ -12,7 +12,7 @@ from labctl.fitting.numeric.least_squares import rank_of
 from labctl.recording import Recording
 
 #: Presets, the fullest first, for one axis and for several; the first that a recording determines is proposed.
-ONE_AXIS = ("ojeda2000", "bias_scale", "bias_temperature", "bias")
+ONE_AXIS = ("ojeda2000", "bias_scale", "single_temperature", "bias_temperature", "bias")
 SEVERAL_AXES = ("yang2018", "bias_scale", "single_temperature", "bias_temperature", "bias")
 #: At rest nothing is learned of the scale factor.
 AT_REST = ("bias_temperature", "bias")

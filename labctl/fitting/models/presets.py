@@ -68,14 +68,14 @@ def _yang2018(data: FitData) -> tuple[ErrorModel, Rows]:
 
 
 def _single_temperature(data: FitData) -> tuple[ErrorModel, Rows]:
-    levels = data.levels
+    levels, terms = data.levels, ALIGNED if len(data.info.axes) > 1 else ALIGNED[:2]
     if levels is None:
         raise NotEnoughData(
             f"{data.info.serial}: model single_temperature needs discrete temperature levels; fit `--effects "
-            "bias,scale_factor,misalignment` instead"
+            f"{','.join(term.effect for term in terms)}` instead"
         )
     nearest = int(np.argmin(np.abs(level_means(data.temperature_c, levels) - 25.0)))
-    return ErrorModel("single_temperature", ALIGNED, "rate", reference=Reference(25.0)), levels == nearest
+    return ErrorModel("single_temperature", terms, "rate", reference=Reference(25.0)), levels == nearest
 
 
 def _weiss1995(data: FitData) -> tuple[ErrorModel, Rows]:
@@ -138,7 +138,7 @@ PRESETS: dict[str, tuple[Preset, str]] = {
     ),
     "single_temperature": (
         Preset("single_temperature", _single_temperature),
-        "The traditional method: bias, scale factor and misalignment from the temperature nearest 25 deg C alone.",
+        "The traditional method at the temperature nearest 25 deg C: bias, scale factor, of several axes misalignment.",
     ),
     "weiss1995": (
         Preset("weiss1995", _weiss1995, inner_only=True),

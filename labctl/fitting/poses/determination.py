@@ -34,6 +34,15 @@ def require_moves(serial: str, moves: Moves) -> None:
     )
 
 
+def require_rests(serial: str, rests: int) -> None:
+    """Raise NotEnoughData for fewer rests than LEAST_MOVES turns between them take."""
+    if rests <= LEAST_MOVES:
+        raise NotEnoughData(
+            f"{serial}: {rests} rests have {max(rests - 1, 0)} turns between them; nine coefficients of the gyro need "
+            f"at least {LEAST_MOVES}: turn the unit by 90 deg or more from rest to rest, about each axis, both ways"
+        )
+
+
 def condition_of(jacobian: NDArray[np.float64], covariance: NDArray[np.float64]) -> float:
     """Return the condition of the nine columns (2m, 9), whitened and scaled to unit length."""
     white = np.linalg.solve(np.linalg.cholesky(covariance), jacobian)

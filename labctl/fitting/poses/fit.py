@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
-from labctl.errors import NotEnoughData
 from labctl.fitting.effects import Reference, Term
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.fitted_model import AxisFit, FittedModel
@@ -19,7 +18,7 @@ from labctl.fitting.poses.at_rest.bias import Bias, bias_of
 from labctl.fitting.poses.at_rest.rests import Rests, find_rests
 from labctl.fitting.poses.covariance import move_covariance, of_readings
 from labctl.fitting.poses.description import describe
-from labctl.fitting.poses.determination import require_determined, require_moves
+from labctl.fitting.poses.determination import require_determined, require_moves, require_rests
 from labctl.fitting.poses.direction_errors import per_second, rms_dps, uncorrected_errors
 from labctl.fitting.poses.equations import equations_of
 from labctl.fitting.poses.gyroscope import Gyroscope, fit_gyroscope
@@ -66,10 +65,17 @@ def fit_poses(recording: Recording) -> PosesFit:
     return _result(readings, solve(readings))
 
 
-def solve(readings: PoseReadings) -> Solved:
-    """Calibrate accelerometer and gyro by readings in poses. Raises NotEnoughData as `fit_poses`."""
-    rests = find_rests(readings)
-    accelerometer = calibrate_accelerometer(readings, rests)
+def solve(readings: PoseReadings, calibrated: tuple[Rests, Accelerometer] | None = None) -> Solved:
+    """Calibrate accelerometer and gyro by readings in poses. Raises NotEnoughData as `fit_poses`.
+
+    `calibrated` are the rests of the readings, and an accelerometer that more than these poses tell, such as an
+    earlier calibration.
+    """
+    if calibrated is None:
+        rests = find_rests(readings)
+        calibrated = rests, calibrate_accelerometer(readings, rests)
+    rests, accelerometer = calibrated
+    require_rests(readings.info.serial, len(rests))
     force_g = corrected(rests.accel_g, accelerometer.errors, accelerometer.bias_g)
     bias = bias_of(readings, rests, force_g, accelerometer.used)
     every = _moves(readings, rests, accelerometer, bias)
@@ -86,11 +92,6 @@ def solve(readings: PoseReadings) -> Solved:
 
 def _moves(readings: PoseReadings, rests: Rests, accelerometer: Accelerometer, bias: Bias) -> Moves:
     """Return the moves, with what the specific force adds to the output taken off."""
-    if len(rests) < 2:
-        raise NotEnoughData(
-            f"{readings.info.serial}: the recording has only one rest, so it contains no turn between rests; "
-            "record rests in many poses"
-        )
     force_g = corrected(readings.accel_g, accelerometer.errors, accelerometer.bias_g)
     return moves_between(readings, rests, readings.gyro_dps - force_g @ bias.per_g.T)
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from labctl.fitting.numeric.arrays import Array
-from labctl.fitting.poses.at_rest.accelerometer import PARAMETERS, Accelerometer
+from labctl.fitting.poses.at_rest.accelerometer import Accelerometer
 from labctl.fitting.poses.at_rest.bias import Bias
 from labctl.fitting.poses.between import components, gls
 from labctl.fitting.poses.covariance import move_covariance
@@ -75,7 +75,7 @@ def fit_gyroscope(
         equations.jacobian[rows], equations.residual[rows], (noise + extra * np.eye(len(noise)))[np.ix_(rows, rows)]
     )
     # the scale of the noise is itself estimated: u of a t distribution (JCGM 101:2008, 6.4.9.4)
-    freedom = np.count_nonzero(accelerometer.used) - PARAMETERS + np.count_nonzero(rows) - equations.jacobian.shape[1]
+    freedom = accelerometer.freedom + np.count_nonzero(rows) - equations.jacobian.shape[1]
     covariance *= freedom / (freedom - 2)
     return Gyroscope(errors, covariance, equations, noise, float(np.sqrt(extra)), used, held_out)
 
@@ -103,13 +103,14 @@ class _Noises:
     def variances(self, equations: Equations, rows: NDArray[np.bool_]) -> tuple[float, float]:
         """Return the variance of a pose beyond the noise, g^2, and that of an equation beyond all, rad^2.
 
-        The scatter of the rests' sizes tells the first, with k - 9 degrees of freedom; what it makes of the directions
-        of gravity the moves tell too, with 2m - 9. By the sizes alone an estimate that came out large stays in every
-        equation while one that came out small is made up for by the second variance: on average that is too much.
+        The scatter of the rests' sizes tells the first, with the accelerometer's degrees of freedom; what it makes of
+        the directions of gravity the moves tell too, with 2m - 9. By the sizes alone an estimate that came out large
+        stays in every equation while one that came out small is made up for by the second variance: on average that is
+        too much.
         """
         found = self.accelerometer
         k = int(np.count_nonzero(found.used))
-        freedom = k - PARAMETERS
+        freedom = found.freedom
         white, scatter = float(self.white_g2[found.used].mean()), found.residual_g**2 * k
         typical = float(self.white_g2.mean())
 

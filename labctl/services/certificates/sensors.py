@@ -7,7 +7,7 @@ to the value that the order states, and its uncertainty is a line of their budge
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,7 +20,7 @@ from labctl.fitting.poses.at_rest.accelerometer import PARAMETERS as ACCELEROMET
 from labctl.fitting.poses.at_rest.gravity import STANDARD_GRAVITY
 from labctl.fitting.poses.triad import UPPER
 from labctl.fitting.uncertainty.budget import BudgetLine, budget_of
-from labctl.json_types.poses import AlignmentJson
+from labctl.json_types.poses import AccelerometerCoefficient
 from labctl.services.schemas.documents.certificates import (
     CertificateOrder,
     OrderedAccelerometer,
@@ -38,6 +38,10 @@ FORCE = "reading = bias + (1 + E) force; E: scale factors on the diagonal, misal
 ALIGNED = (
     "gyro triad about each axis: rotation vector from the frame of the accelerometer to that of the gyro, each frame "
     "the nearest orthonormal one to the axes of its triad"
+)
+FIELD_ALIGNED = (
+    "magnetometer about each axis: rotation vector from the axes of the corrected force and rate of this item to those "
+    "of the corrected field"
 )
 FIELD = "field = soft iron (reading - hard iron); soft iron symmetric, in the axes of the sensor"
 NOT_FORCE = (
@@ -127,7 +131,7 @@ def accelerometer_result(
         value = ratio * (own + was.value) - own
         named = f"scale factor {AXES[i]}" if i == j else f"misalignment {name}"
         found.append(_coefficient(named, value, "1", (ratio * u[place], freedom), (own + value) * relative_u))
-    found += [] if result.alignment is None else _aligned(result.alignment, freedom)
+    found += [] if result.alignment is None else _aligned("gyro triad", result.alignment["axes"])
     found += [] if result.temperature is None else _over_temperature(result.temperature, ratio, freedom)
     reference = SensorReference(
         quantity="local gravity", value=ordered.gravity_m_s2, u=ordered.gravity_u_m_s2, unit="m/s^2",
@@ -149,11 +153,14 @@ def accelerometer_result(
     return _result("accelerometer", version, ordered, included_by, reference, found, notes, [converted])
 
 
-def _aligned(found: AlignmentJson, freedom: float) -> list[SensorCoefficient]:
-    """Return the rotation of the gyro triad; gravity's size has no part in it."""
+def _aligned(what: str, axes: Mapping[str, AccelerometerCoefficient]) -> list[SensorCoefficient]:
+    """Return a rotation; the sizes of gravity and field have no part in it.
+
+    Its standard uncertainty is that of a t distribution already: U is twice as much, as the fit states it.
+    """
     return [
-        _coefficient(f"gyro triad about {axis}", each["value"], each["unit"], (each["u"], freedom), 0.0)
-        for axis, each in found["axes"].items()
+        _coefficient(f"{what} about {axis}", each["value"], each["unit"], (each["u"], None), 0.0)
+        for axis, each in axes.items()
     ]
 
 
@@ -201,6 +208,7 @@ def magnetometer_result(version: MagnetometerVersion, ordered: OrderedMagnetomet
         of_fit = math.sqrt(max(float(by @ covariance @ by), 0.0))
         of_field = 0.0 if stated is None or u_stated is None else value * u_stated / stated
         found.append(_coefficient(f"soft iron {AXES[i]}{AXES[j]}", value, "1", (of_fit, freedom), of_field))
+    found += [] if result.alignment is None else _aligned("magnetometer", result.alignment["axes"])
     reference = SensorReference(
         quantity="size of the local field", value=used if stated is None else stated, unit="uT",
         u=None if stated is None else u_stated,
@@ -210,7 +218,8 @@ def magnetometer_result(version: MagnetometerVersion, ordered: OrderedMagnetomet
         "The item as it was mounted, with the iron and the currents near it; from any direction of the field to the "
         f"nearest that was measured: up to {result.largest_gap_deg:.0f}°."
     )
-    return _result("magnetometer", version, ordered, included_by, reference, found, (FIELD, holds_for, NOT_FIELD))
+    formula = FIELD if result.alignment is None else f"{FIELD}; {FIELD_ALIGNED}"
+    return _result("magnetometer", version, ordered, included_by, reference, found, (formula, holds_for, NOT_FIELD))
 
 
 def _freedom_of(result: AccelerometerResponse) -> float:
@@ -222,9 +231,9 @@ def _freedom_of(result: AccelerometerResponse) -> float:
 
 
 def _coefficient(
-    name: str, value: float, unit: str, of_fit: tuple[float, float], of_reference: float
+    name: str, value: float, unit: str, of_fit: tuple[float, float | None], of_reference: float
 ) -> SensorCoefficient:
-    """Return a coefficient with U: `of_fit` is the standard uncertainty of the fit with its degrees of freedom."""
+    """Return a coefficient with U: `of_fit` is the standard uncertainty of the fit, and its degrees of freedom."""
     u, freedom = of_fit
     lines = [BudgetLine("coefficients", "fit", "A", "normal", u, unit, 1.0, u, freedom)]
     if of_reference:

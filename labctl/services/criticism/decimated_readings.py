@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -11,6 +11,7 @@ import numpy as np
 
 from labctl.recording import Columns, Recording, RecordingInfo
 from labctl.recording.decimation import decimate
+from labctl.recording.points import longest_undivided_s, to_points
 from labctl.services.forked import Forked
 from labctl.services.recordings.loading import is_profile, motion_of
 from labctl.store import RecordingRow, Store, open_store
@@ -19,12 +20,17 @@ if TYPE_CHECKING:
     from labctl.fitting.data.static_record import StaticRecord
 
 
+#: The duration of a data set may be a spacing of readings longer than they span.
+LONG_SHARE = 0.9
+
+
 @dataclass(frozen=True)
 class ReadRecording:
     """What a criticism takes of a recording: its readings, decimated, and its static record by all of them."""
 
     columns: Columns
     static: StaticRecord | None
+    pieces: Mapping[int, Recording]  #: means of each data set that may be divided, as `points_of` takes them
 
 
 #: Gives what a criticism takes of a recording.
@@ -40,13 +46,20 @@ def is_decimated(row: RecordingRow) -> bool:
 
 
 def read_recording_of(store: Store, row: RecordingRow) -> ReadRecording:
-    """Return the readings of a recording, decimated data set by data set, and its static record."""
-    from labctl.services.recordings.allan import static_record_of  # noqa: PLC0415  slow to import
+    """Return what a criticism takes of the readings of a recording, each of which is read once."""
+    from labctl.services.recordings.allan import StillReadings  # noqa: PLC0415  slow to import
 
     info = RecordingInfo.model_validate(row.info)
-    parts = [decimate(Recording(info, columns, None)).columns for _, columns in store.recordings.iter_datasets(row.id)]
-    columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    return ReadRecording(columns, static_record_of(store, row))
+    longest_s, still = longest_undivided_s(info.motion), StillReadings(store, row)
+    parts, pieces = list[Columns](), {}
+    for number, columns in store.recordings.iter_datasets(row.id):
+        whole = Recording(info, columns, None)
+        parts.append(decimate(whole).columns)
+        still.add(number, columns)
+        if LONG_SHARE * longest_s < np.ptp(np.asarray(columns["t_s"], dtype=np.float64)):
+            pieces[number] = to_points(whole)
+    together = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    return ReadRecording(together, still.record(), pieces)
 
 
 @contextmanager
@@ -62,10 +75,8 @@ def reading_beside(store: Store, rows: Sequence[RecordingRow]) -> Iterator[Decim
         found: dict[int, ReadRecording] = {}
 
         def decimated(row: RecordingRow) -> ReadRecording:
-            if not forked.is_forked:
-                return read_recording_of(store, row)
-            if not found:
-                found.update(forked.result())
+            if row.id not in found:
+                found.update(forked.result() if forked.is_forked else {row.id: read_recording_of(store, row)})
             return found[row.id]
 
         yield decimated

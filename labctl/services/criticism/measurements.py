@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -66,7 +66,14 @@ class Measurements:
     @cached_property
     def of_each(self) -> Mapping[int, Recording]:
         """The means of each recording, by its number."""
-        return {row.id: points_of(self.store, row) for row in self.rows}
+        return {row.id: points_of(self.store, row, self._pieces_of(row)) for row in self.rows}
+
+    def _pieces_of(self, row: RecordingRow) -> Callable[[], Mapping[int, Recording]] | None:
+        """Return what gives the means of long data sets, where their readings are being read for this anyway."""
+        decimated = self.decimated
+        if decimated is None or not is_decimated(row):
+            return None
+        return lambda: decimated(row).pieces
 
     @cached_property
     def points(self) -> Recording:

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting.data.static_record import StaticRecord, static_record
 from labctl.fitting.numeric.allan import LEAST_READINGS, allan
 from labctl.progress import report_stage
-from labctl.recording import Recording, RecordingInfo
+from labctl.recording import Columns, Recording, RecordingInfo
 from labctl.recording.points import temperature_of
 from labctl.services.cache import cached
 from labctl.services.schemas.recordings import AllanResponse
@@ -103,14 +102,22 @@ def _of_set(recording: Recording, dataset: int) -> StaticRecord:
     return StaticRecord(dataset, dataset, mean_c, len(t_s) * period_s, axes)
 
 
-def static_record_of(store: Store, row: RecordingRow) -> StaticRecord | None:
-    """Return the static record of a recording by all of its readings, or None: of the Allan deviation and a criticism.
+class StillReadings:
+    """Collects of a recording, while its readings are read for something else, those that its static record needs."""
 
-    The longest section at rest of what is fitted, as `allan_unit` states it.
-    """
-    info = RecordingInfo.model_validate(row.info)
-    _, still = _still(store, row.id)
-    return _static_record(store, row.id, info, still) if still else None
+    def __init__(self, store: Store, row: RecordingRow) -> None:
+        self._info = RecordingInfo.model_validate(row.info)
+        _, still = _still(store, row.id)
+        self._still, self._parts = set(still), list[Columns]()
+
+    def add(self, number: int, columns: Columns) -> None:
+        """Keep what is needed of the readings of a data set, in the order of measurement."""
+        if number in self._still:
+            self._parts.append(_needed(self._info, columns))
+
+    def record(self) -> StaticRecord | None:
+        """Return the longest section at rest of what is fitted, as `allan_unit` states it; None: there is none."""
+        return _together(self._info, self._parts) if self._parts else None
 
 
 def _still(store: Store, recording: int) -> tuple[int, list[int]]:
@@ -121,11 +128,15 @@ def _still(store: Store, recording: int) -> tuple[int, list[int]]:
 
 
 def _static_record(store: Store, recording: int, info: RecordingInfo, still: Sequence[int]) -> StaticRecord | None:
+    return _together(info, [_needed(info, store.recordings.dataset(recording, number)) for number in still])
+
+
+def _needed(info: RecordingInfo, columns: Columns) -> Columns:
     names = (*NEEDED, *(f"gyro_{axis}" for axis in info.axes))
-    parts: list[dict[str, NDArray[np.generic]]] = []
-    for number in still:
-        columns = store.recordings.dataset(recording, number)
-        parts.append({name: columns[name] for name in names if name in columns})
+    return {name: columns[name] for name in names if name in columns}
+
+
+def _together(info: RecordingInfo, parts: Sequence[Columns]) -> StaticRecord | None:
     together = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
     return static_record(Recording(info, together))
 

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from labctl.errors import BadInput, NotEnoughData, NotFound
 from labctl.recording import Recording, to_points
@@ -25,11 +24,14 @@ from labctl.store import RecordingRow, Store
 MOST_TOGETHER = 32
 
 
-def points_of(store: Store, row: RecordingRow) -> Recording:
+def points_of(
+    store: Store, row: RecordingRow, pieces: Callable[[], Mapping[int, Recording]] | None = None
+) -> Recording:
     """Return a recording's means as a fit takes them: a long data set through which the temperature moved in pieces.
 
     Of turns they are integrals over the readings, which are few. Where the rate changes within data sets (motion
-    "profile") every reading is returned: a fit needs the rate of each.
+    "profile") every reading is returned: a fit needs the rate of each. `pieces` gives `to_points` of long data sets, by
+    their numbers, where their readings are read for something else.
     """
     if is_profile(row):
         return store.recordings.samples(row.id)
@@ -39,12 +41,15 @@ def points_of(store: Store, row: RecordingRow) -> Recording:
     if points.info.motion == "turns":
         return to_points(store.recordings.samples(row.id))
 
-    def readings(dataset: int) -> Mapping[str, NDArray[np.generic]]:
+    def pieces_of(dataset: int) -> Recording:
+        found = None if pieces is None else pieces().get(dataset)
+        if found is not None:
+            return found
         compute(UNNAMED)
-        return store.recordings.dataset(row.id, dataset)
+        info = points.info.model_copy(update={"kind": "samples"})
+        return to_points(Recording(info, store.recordings.dataset(row.id, dataset)))
 
-    pieces = with_pieces(points, readings)
-    return _with_steps(pieces, inspect_stored(store, row))
+    return _with_steps(with_pieces(points, pieces_of), inspect_stored(store, row))
 
 
 def source_of(store: Store, row: RecordingRow) -> Recording:

@@ -57,8 +57,17 @@ class SensorFormatResponse(ResponseModel):
     suffix: str = Field(description="Suffix of a file in this format, without the dot.")
 
 
+class SensorCoefficientResponse(ResponseModel):
+    """A coefficient of a sensor, or of its alignment."""
+
+    name: str = Field(description="Name, with the axis: bias x, soft iron xy, gyro triad about z.")
+    unit: str = Field(description="Unit of the numbers; 1: a ratio.")
+    value: float = Field(description="Value, in `unit`.")
+    u: float | None = Field(description="Standard uncertainty, in `unit`; null: the value was given.")
+
+
 class SensorVersionResponse(ResponseModel):
-    """A version of a sensor, without its parameters."""
+    """A version of a sensor."""
 
     serial: Serial
     sensor: SensorName = Field(description="The sensor of the unit that was calibrated.")
@@ -72,6 +81,9 @@ class SensorVersionResponse(ResponseModel):
     data: MeasuredData = Field(description="The data that the result was fitted to.")
     hash: str = Field(description="SHA-256 of the result in canonical JSON.")
     summary: list[str] = Field(description="What the fit found, in sentences.")
+    coefficients: list[SensorCoefficientResponse] = Field(
+        description="Every coefficient, and the alignment of the gyro triad or of the magnetometer where it is known."
+    )
     formats: list[SensorFormatResponse] = Field(
         description="Formats in which it is available; none for a magnetometer whose field was not constant."
     )

@@ -2131,7 +2131,7 @@ export interface components {
             earlier?: components["schemas"]["EarlierVersion"] | null;
             /** @description Over temperature; null: it was not asked for, and the parameters are constants. */
             temperature?: components["schemas"]["AccelerometerTemperature"] | null;
-            /** @description Rotation of the gyro triad from the accelerometer triad, deg; null: no gyro, turns that do not determine it, or a fit over temperature or with an earlier version. */
+            /** @description Rotation of the gyro triad from the accelerometer triad, deg; null: no gyro, rests and turns that do not determine it, or rests that do not agree with the earlier version: `text` says which. */
             alignment?: components["schemas"]["AlignmentJson"] | null;
             /**
              * Text
@@ -2227,7 +2227,7 @@ export interface components {
             earlier: components["schemas"]["EarlierVersion"] | null;
             /** @description Over temperature; null: it was not asked for, and the parameters are constants. */
             temperature: components["schemas"]["AccelerometerTemperature"] | null;
-            /** @description Rotation of the gyro triad from the accelerometer triad, deg; null: no gyro, turns that do not determine it, or a fit over temperature or with an earlier version. */
+            /** @description Rotation of the gyro triad from the accelerometer triad, deg; null: no gyro, rests and turns that do not determine it, or rests that do not agree with the earlier version: `text` says which. */
             alignment: components["schemas"]["AlignmentJson"] | null;
             /**
              * Text
@@ -2338,6 +2338,11 @@ export interface components {
              * @description What the fit found, in sentences.
              */
             summary: string[];
+            /**
+             * Coefficients
+             * @description Every coefficient, and the alignment of the gyro triad or of the magnetometer where it is known.
+             */
+            coefficients: components["schemas"]["SensorCoefficientResponse"][];
             /**
              * Formats
              * @description Formats in which it is available; none for a magnetometer whose field was not constant.
@@ -9185,6 +9190,11 @@ export interface components {
              */
             summary: string[];
             /**
+             * Coefficients
+             * @description Every coefficient, and the alignment of the gyro triad or of the magnetometer where it is known.
+             */
+            coefficients: components["schemas"]["SensorCoefficientResponse"][];
+            /**
              * Formats
              * @description Formats in which it is available; none for a magnetometer whose field was not constant.
              */
@@ -11711,6 +11721,32 @@ export interface components {
             attendance: components["schemas"]["AttendanceResponse"] | null;
         };
         /**
+         * SensorCoefficientResponse
+         * @description A coefficient of a sensor, or of its alignment.
+         */
+        SensorCoefficientResponse: {
+            /**
+             * Name
+             * @description Name, with the axis: bias x, soft iron xy, gyro triad about z.
+             */
+            name: string;
+            /**
+             * Unit
+             * @description Unit of the numbers; 1: a ratio.
+             */
+            unit: string;
+            /**
+             * Value
+             * @description Value, in `unit`.
+             */
+            value: number;
+            /**
+             * U
+             * @description Standard uncertainty, in `unit`; null: the value was given.
+             */
+            u: number | null;
+        };
+        /**
          * SensorFormatResponse
          * @description A format in which a version is available.
          */
@@ -11733,7 +11769,7 @@ export interface components {
         };
         /**
          * SensorVersionResponse
-         * @description A version of a sensor, without its parameters.
+         * @description A version of a sensor.
          */
         SensorVersionResponse: {
             /**
@@ -11786,6 +11822,11 @@ export interface components {
              * @description What the fit found, in sentences.
              */
             summary: string[];
+            /**
+             * Coefficients
+             * @description Every coefficient, and the alignment of the gyro triad or of the magnetometer where it is known.
+             */
+            coefficients: components["schemas"]["SensorCoefficientResponse"][];
             /**
              * Formats
              * @description Formats in which it is available; none for a magnetometer whose field was not constant.
@@ -16674,7 +16715,7 @@ export interface operations {
     file_api_units__serial__sensors__sensor__file_get: {
         parameters: {
             query: {
-                /** @description px4, ardupilot, json, python, c; an accelerometer also kalibr, ros. */
+                /** @description px4, ardupilot, json, python, c, tf2, urdf; an accelerometer also kalibr, ros. */
                 format: string;
                 /** @description Number of the version; default: the newest. */
                 version?: number | null;

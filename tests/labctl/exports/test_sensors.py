@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+import shlex
 import shutil
 import subprocess
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -91,6 +93,60 @@ def test_what_a_format_has_not_is_refused() -> None:
         written(MAGNETOMETER, [], "json", 1, None)
     with pytest.raises(BadInput, match="--export ros takes no --device-id"):
         written(ACCELEROMETER, [], "ros", None, 7)
+
+
+def turned_by(vector: np.ndarray, sensor: str) -> Parameters:
+    if sensor == "magnetometer":
+        return replace(MAGNETOMETER, turned_rad=vector)
+    return replace(ACCELEROMETER, gyro_turned_rad=vector)
+
+
+#: Small, of any size up to half a turn, none, and those of a sensor that lies on another side: the pitch is 90 deg.
+TURNS = [
+    np.zeros(3), np.array([1e-9, 0.0, -2e-9]), np.radians([0.874, -0.389, -0.009]), np.array([0.0, np.pi / 2, 0.0]),
+    np.array([0.0, -np.pi / 2, 0.0]), Rotation.from_euler("xyz", [40, 90, 0], degrees=True).as_rotvec(),
+    np.array([np.pi, 0.0, 0.0]), *np.random.default_rng(4).uniform(-1.8, 1.8, (20, 3)),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("sensor", "child"), [("accelerometer", "gyro"), ("magnetometer", "magnetometer")])
+@pytest.mark.parametrize("vector", TURNS, ids=str)
+def test_a_static_transform_is_the_rotation_of_scipy(sensor: str, child: str, vector: np.ndarray) -> None:
+    true, found = Rotation.from_rotvec(vector), turned_by(vector, sensor)
+    script = written(found, ["turned -- by hand"], "tf2", None, None).splitlines()[-1]
+    words = shlex.split(script)
+    options = dict(zip(words[4::2], words[5::2], strict=True))
+    assert words[:4] == ["ros2", "run", "tf2_ros", "static_transform_publisher"]
+    assert (options["--frame-id"], options["--child-frame-id"]) == ("accelerometer", child)
+    quaternion = np.array([float(options[f"--q{name}"]) for name in "xyzw"])
+    assert (Rotation.from_quat(quaternion).inv() * true).magnitude() < 1e-8
+    assert np.linalg.norm(quaternion) == pytest.approx(1, abs=1e-8)
+    root = ElementTree.fromstring(written(found, ["turned -- by hand"], "urdf", None, None))
+    joint = root.find("joint")
+    assert joint is not None
+    origin, parent = joint.find("origin"), joint.find("parent")
+    assert origin is not None
+    assert parent is not None
+    assert {each.get("name") for each in root.findall("link")} == {"accelerometer", child}
+    assert (joint.get("type"), parent.get("link")) == ("fixed", "accelerometer")
+    angles = [float(value) for value in str(origin.get("rpy")).split()]
+    assert (Rotation.from_euler("xyz", angles).inv() * true).magnitude() < 1e-8
+
+
+def test_a_transform_turns_a_vector_of_the_child_into_the_parents_axes() -> None:
+    # a magnetometer turned by +90 deg about z has its x axis along the accelerometer's y axis
+    found = turned_by(np.array([0.0, 0.0, np.pi / 2]), "magnetometer")
+    assert isinstance(found, MagnetometerParameters)
+    assert found.alignment is not None
+    assert found.alignment @ [1.0, 0.0, 0.0] == pytest.approx([0.0, 1.0, 0.0], abs=1e-12)
+    assert "--qz 0.707106781 --qw 0.707106781" in written(found, [], "tf2", None, None)
+    assert 'rpy="0 0 1.5707963267' in written(found, [], "urdf", None, None)
+
+
+@pytest.mark.parametrize("name", ["tf2", "urdf"])
+def test_a_transform_without_an_alignment_is_refused_with_what_to_do(name: str) -> None:
+    with pytest.raises(BadInput, match=f"--export {name}: the alignment of the gyro is unknown; calibrate by the"):
+        written(ACCELEROMETER, [], name, None, None)
 
 
 def test_ros_gets_the_turn_of_the_gyro_triad_and_kalibr_is_told_that_it_is_lost() -> None:

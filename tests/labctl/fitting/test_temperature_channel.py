@@ -157,11 +157,11 @@ def test_means_kept_without_their_readings_get_rows_of_the_pieces() -> None:
     }  # fmt: skip
     asked: list[int] = []
 
-    def readings(dataset: int) -> dict[str, np.ndarray]:
+    def pieces_of(dataset: int) -> Recording:
         asked.append(dataset)
-        return dict(long.columns)
+        return to_points(long)
 
-    points = with_pieces(Recording(long.info.model_copy(update={"kind": "points"}), whole), readings)
+    points = with_pieces(Recording(long.info.model_copy(update={"kind": "points"}), whole), pieces_of)
     assert asked == [1]
     assert points.columns["dataset"].tolist() == [0] + [1] * 240
     assert points.columns["gyro_z"][1:] == pytest.approx(to_points(long).columns["gyro_z"])

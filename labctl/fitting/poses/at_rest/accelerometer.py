@@ -47,6 +47,7 @@ class Accelerometer:
     used: NDArray[np.bool_]  #: (k,) rests that agree with gravity
     residual_g: float  #: root mean square of what is left of the rests' sizes
     gravity_g: float
+    freedom: int  #: used rests, and what was known before, beyond the parameters
 
 
 def calibrate_accelerometer(readings: PoseReadings, rests: Rests) -> Accelerometer:
@@ -61,7 +62,7 @@ def calibrate_accelerometer(readings: PoseReadings, rests: Rests) -> Acceleromet
     errors, bias = matrices(theta)
     return Accelerometer(
         errors, bias, covariance, unit(corrected(rests.accel_g, errors, bias)), sigma, used,
-        float(np.sqrt(np.mean(left**2))), gravity,
+        float(np.sqrt(np.mean(left**2))), gravity, int(np.count_nonzero(used)) - PARAMETERS,
     )  # fmt: skip
 
 

@@ -96,7 +96,7 @@ def by_fewer_poses(readings: PoseReadings, rests: Rests, known: Known) -> ByFewe
     left = np.linalg.norm(force, axis=1) - gravity
     found = Accelerometer(
         errors, bias, np.asarray(covariance, dtype=np.float64), unit(force), np.sqrt(white + extra),
-        np.ones(len(rests), dtype=np.bool_), float(np.sqrt(np.mean(left**2))), gravity,
+        np.ones(len(rests), dtype=np.bool_), float(np.sqrt(np.mean(left**2))), gravity, freedom,
     )  # fmt: skip
     return ByFewer(found, float(chdtrc(freedom, first)))
 

@@ -6,7 +6,7 @@ reference temperature they are the nine parameters of `accelerometer`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,6 +54,15 @@ class OverTemperature:
     adequacy: Adequacy
     constant_g: float  #: what nine parameters without temperature leave of the used rests, g
 
+    def at_reference_g(self, accel_g: NDArray[np.float64], warm_c: Array) -> NDArray[np.float64]:
+        """Return what readings (n, 3), g, at temperatures (n,), deg C, would be at the reference temperature, g."""
+        away = warm_c - self.reference_c
+        change = powers_of(away, len(self.scale_factor)) @ self.scale_factor
+        whole = np.eye(3) + self.reference.errors + change[:, :, None] * np.eye(3)
+        from_bias = accel_g - self.reference.bias_g - powers_of(away, len(self.bias_g)) @ self.bias_g
+        forces = np.linalg.solve(whole, from_bias[:, :, None])[:, :, 0]
+        return np.asarray(accel_g - powers_of(away, len(self.bias_g)) @ self.bias_g - change * forces)
+
 
 @dataclass(frozen=True)
 class TemperatureLaw:
@@ -95,11 +104,29 @@ class TemperatureLaw:
         return np.hstack([nine, *warmer])
 
     def _powers(self, which: int) -> NDArray[np.float64]:
-        return self.warm[:, None] ** np.arange(1, self.orders[which] + 1)
+        return powers_of(self.warm, self.orders[which])
 
     def _terms(self, theta: Array, which: int) -> NDArray[np.float64]:
         begin = PARAMETERS + 3 * sum(self.orders[:which])
         return theta[begin : begin + 3 * self.orders[which]].reshape(-1, 3)
+
+
+def powers_of(away: Array, order: int) -> NDArray[np.float64]:
+    """Return the powers 1 to `order` of differences (k,), (k, order)."""
+    return np.asarray(away[:, None] ** np.arange(1, order + 1), dtype=np.float64)
+
+
+def at_reference(readings: PoseReadings, rests: Rests, found: OverTemperature) -> tuple[PoseReadings, Rests]:
+    """Return readings and rests with the forces of the reference temperature: `found.reference` fits them.
+
+    Raises NotEnoughData without a thermometer.
+    """
+    warm = rest_temperatures(readings, rests)
+    assert readings.temperature_c is not None  # refused by the line before
+    return (
+        replace(readings, accel_g=found.at_reference_g(readings.accel_g, readings.temperature_c)),
+        replace(rests, accel_g=found.at_reference_g(rests.accel_g, warm)),
+    )
 
 
 def rest_temperatures(readings: PoseReadings, rests: Rests) -> Array:
@@ -152,7 +179,7 @@ def calibrate_over_temperature(readings: PoseReadings, rests: Rests) -> OverTemp
     errors, bias = matrices(theta[:PARAMETERS])
     at_reference = Accelerometer(
         errors, bias, covariance[:PARAMETERS, :PARAMETERS], unit(law.forces(theta)[0]), sigma, used,
-        float(np.sqrt(np.mean(left**2))), gravity,
+        float(np.sqrt(np.mean(left**2))), gravity, int(np.count_nonzero(used)) - law.parameters,
     )  # fmt: skip
     powers = np.concatenate([np.repeat(np.arange(1.0, order + 1), 3) for order in orders])
     per_k = np.concatenate([np.ones(PARAMETERS), half**-powers])

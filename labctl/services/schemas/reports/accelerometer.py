@@ -67,7 +67,7 @@ class AccelerometerResponse(ResponseModel):
     )
     alignment: AlignmentJson | None = Field(
         default=None,
-        description="Rotation of the gyro triad from the accelerometer triad, deg; null: no gyro, turns that do not "
-        "determine it, or a fit over temperature or with an earlier version.",
+        description="Rotation of the gyro triad from the accelerometer triad, deg; null: no gyro, rests and turns that "
+        "do not determine it, or rests that do not agree with the earlier version: `text` says which.",
     )
     text: Sentences

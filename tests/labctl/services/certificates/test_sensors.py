@@ -30,9 +30,11 @@ from labctl.store import Store, open_store
 from studies.accelerometer_simulation import TrueUnit, poses_at_temperatures
 from studies.poses import turned_deg
 from studies.poses_simulation import Session, simulate_session
+from studies.triads_simulation import vector_of
 from tests.helpers.certificates import AT, SERIAL, add_version, request
 from tests.helpers.magnetic_turns import FIELD_UT, HARD_IRON_UT, SOFT_IRON, fields, readings_of
 from tests.helpers.poses_at_rest import BIAS_G, ERRORS, poses, readings_in, write_readings
+from tests.helpers.turned_triads import unit_of, write_turned
 
 STANDARD = 9.80665
 #: Gravity where the readings below were made, and how well it is known, m/s2.
@@ -196,6 +198,38 @@ def test_the_alignment_of_the_gyro_triad_is_stated_with_its_uncertainty(tmp_path
         assert (each.value, each.unit) == (found.alignment["axes"][axis]["value"], "deg")
         assert abs(each.value - true) < 2 * each.expanded
         assert 0 < each.expanded < 0.03
+        assert each.expanded == pytest.approx(2 * found.alignment["axes"][axis]["u"], rel=1e-4)
+
+
+def test_the_alignment_of_the_magnetometer_is_in_all_three_forms(tmp_path: Path) -> None:
+    unit = unit_of(11)
+    folder = write_turned(tmp_path / "turned", unit, 20, serial=SERIAL)
+    source = FieldSource()
+    found = magnetometer_of_file(folder, source)
+    assert found.alignment is not None
+    with open_store(str(tmp_path / "lab.sqlite"), write=True) as store:
+        version = add_version(store)
+        data = measured_data([folder], source.text)
+        keep_magnetometer(store, SERIAL, MagnetometerRequest(data=data, result=found, by="Ada"), AT)
+        forms = store.certificates.forms(issue(store, SERIAL, version, request(magnetometer=MAGNETOMETER), AT).number)
+    given = Certificate.model_validate_json(forms.document)
+    (stated,) = given.sensors
+    by_name = {each.name: each for each in stated.coefficients}
+    for axis, true in zip("xyz", np.degrees(vector_of(unit.turned)), strict=True):
+        each, fitted = by_name[f"magnetometer about {axis}"], found.alignment["axes"][axis]
+        assert (each.value, each.unit) == (fitted["value"], "deg")
+        assert each.expanded == pytest.approx(2 * fitted["u"], rel=1e-4)
+        assert abs(each.value - true) < 2 * each.expanded
+    assert "rotation vector from the axes of the corrected force" in stated.formula
+    (page,) = json.loads(readable_certificate(given))["sensors"]
+    assert len(page["rows"]) == 12
+    assert forms.pdf.startswith(b"%PDF-1.7")
+    xml = forms.xml.decode()
+    assert "magnetometer about y" in xml
+    assert r"\degree" in xml
+    checked = SchematronValidator.for_dcc().validate_str(xml)
+    assert [each.text for each in [*checked.failed_assertions, *checked.successful_reports]
+            if each.role != "information"] == []  # fmt: skip
 
 
 def test_a_recording_whose_turns_do_not_tell_the_alignment_says_so(tmp_path: Path) -> None:

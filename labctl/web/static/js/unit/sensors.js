@@ -1,11 +1,14 @@
-// The accelerometer and the magnetometer of a unit: their versions, and each as a file.
+// The accelerometer and the magnetometer of a unit: their versions, each with its coefficients, alignment and files.
 
 import { download } from "../core/http/api.js";
 import { h } from "../core/elements.js";
 import { button, card, chip, table } from "../core/components.js";
-import { instant } from "../core/format.js";
+import { instant, withUncertainty } from "../core/format.js";
 
 /** @import { SensorVersion } from "../../../types/api.js" */
+
+/** Coverage factor: expanded uncertainty. */
+const K = 2;
 
 /**
  * A card of all versions; null for a unit without one.
@@ -27,6 +30,34 @@ export function sensorsCard(versions) {
       ],
       [...versions],
       { label: "Versions of accelerometer and magnetometer" },
+    ),
+    ...versions.map((version, place) => coefficients(version, versions[place - 1]?.sensor !== version.sensor)),
+  );
+}
+
+/**
+ * The coefficients of a version with their expanded uncertainty, and those of its alignment.
+ * @param {SensorVersion} version
+ * @param {boolean} newest of its sensor: it is open at first
+ */
+function coefficients({ sensor, version, verdict, coefficients: rows }, newest) {
+  const name = `${sensor[0]?.toUpperCase()}${sensor.slice(1)}, version ${version}`;
+  return h(
+    "details",
+    { open: newest },
+    h("summary", {}, verdict === "adequate" ? name : `${name}: ${verdict}`),
+    table(
+      [
+        { title: "Coefficient", cell: (row) => row.name },
+        {
+          title: "Value ± U, k = 2",
+          number: true,
+          cell: (row) =>
+            withUncertainty(row.value, row.u === null ? null : K * row.u, row.unit === "1" ? "" : row.unit),
+        },
+      ],
+      [...rows],
+      { dense: true, label: name },
     ),
   );
 }

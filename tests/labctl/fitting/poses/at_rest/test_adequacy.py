@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.linalg import rq
 
 from labctl.fitting.poses.at_rest.accelerometer import Accelerometer, calibrate_accelerometer
 from labctl.fitting.poses.at_rest.adequacy import Adequacy, adequacy_of
@@ -75,4 +76,11 @@ def test_an_xsens_is_what_imu_tk_prints_of_it() -> None:
     ours = IMU_TK_GRAVITY / 4070 * np.linalg.inv(np.eye(3) + found.errors)
     published = symmetric_root(IMU_TK_T @ IMU_TK_K)
     assert symmetric_root(ours) / published[0, 0] == pytest.approx(published / published[0, 0], abs=5e-4)
+    # in labctl's axes: words over force is upper triangular there
+    words, _ = rq(np.linalg.inv(IMU_TK_T @ IMU_TK_K))
+    errors = words * np.sign(np.diag(words)) * IMU_TK_GRAVITY / 4070 - np.eye(3)
+    u = np.sqrt(np.diag(found.covariance))
+    away = np.array([found.errors[place] - errors[place] for place in UPPER])
+    assert np.all(np.abs(away) <= 2.5 * u[3:])
+    assert u[3:].max() < 1e-3
     assert worth.heldout_g < 3e-4

@@ -1,0 +1,63 @@
+"""The coefficients of an accelerometer, a magnetometer and their alignment as one list: what is printed and shown."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+from labctl.json_types.poses import AccelerometerCoefficient
+from labctl.services.schemas.reports.accelerometer import AccelerometerResponse, AccelerometerTemperature
+from labctl.services.schemas.reports.magnetometer import Estimate, MagnetometerResponse
+from labctl.services.schemas.sensors import SensorCoefficientResponse
+
+
+def coefficients_of(answer: AccelerometerResponse | MagnetometerResponse) -> list[SensorCoefficientResponse]:
+    """Return every coefficient of a result with its standard uncertainty, those of the alignment last."""
+    found = _of_force(answer) if isinstance(answer, AccelerometerResponse) else _of_field(answer)
+    return list(found)
+
+
+def _of_force(answer: AccelerometerResponse) -> Iterator[SensorCoefficientResponse]:
+    yield from _named("bias", "g", answer.bias_g)
+    yield from _named("scale factor", "1", answer.scale_factor)
+    yield from _named("misalignment", "1", answer.misalignment)
+    if answer.temperature is not None:
+        yield from _over_temperature(answer.temperature)
+    if answer.alignment is not None:
+        yield from _turned("gyro triad", answer.alignment["axes"])
+
+
+def _of_field(answer: MagnetometerResponse) -> Iterator[SensorCoefficientResponse]:
+    yield from _named("hard iron", "uT", answer.hard_iron_ut)
+    yield from _named("soft iron", "1", answer.soft_iron)
+    yield SensorCoefficientResponse(name="field", unit="uT", value=answer.field_ut.value, u=answer.field_ut.u)
+    if answer.alignment is not None:
+        yield from _turned("magnetometer", answer.alignment["axes"])
+        yield _of("dip of the field", answer.alignment["dip"])
+
+
+def _over_temperature(warm: AccelerometerTemperature) -> Iterator[SensorCoefficientResponse]:
+    terms: Sequence[tuple[str, str, Mapping[str, Sequence[Estimate]]]] = (
+        ("bias", "g", warm.bias_g), ("scale factor", "1", warm.scale_factor)
+    )  # fmt: skip
+    for name, unit, by_axis in terms:
+        for axis in sorted(by_axis):
+            for power, each in enumerate(by_axis[axis], start=1):
+                per = f"{unit}/K" + (f"^{power}" if power > 1 else "")
+                yield SensorCoefficientResponse(
+                    name=f"{name} {axis}, power {power} of temperature", unit=per, value=each.value, u=each.u
+                )
+
+
+def _named(name: str, unit: str, values: Mapping[str, Estimate]) -> Iterator[SensorCoefficientResponse]:
+    for place in sorted(values, key=lambda name: (len(set(name)), name)):  # xx, yy, zz, xy: also of a stored result
+        each = values[place]
+        yield SensorCoefficientResponse(name=f"{name} {place}", unit=unit, value=each.value, u=each.u)
+
+
+def _turned(what: str, axes: Mapping[str, AccelerometerCoefficient]) -> Iterator[SensorCoefficientResponse]:
+    for axis in sorted(axes):
+        yield _of(f"{what} about {axis}", axes[axis])
+
+
+def _of(name: str, each: AccelerometerCoefficient) -> SensorCoefficientResponse:
+    return SensorCoefficientResponse(name=name, unit=each["unit"], value=each["value"], u=each["u"])
