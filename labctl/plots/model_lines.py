@@ -7,7 +7,7 @@ from typing import TypeVar
 
 import plotly.graph_objects as go
 
-from labctl.json_types.answers import ComparisonJson
+from labctl.answers.drawn import ComparisonJson
 from labctl.plots.temperature_scale import temperature_colour, temperature_marker
 from labctl.plots.theme import grid_of, place
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import plotly.graph_objects as go
 
-from labctl.json_types.answers import CriticismJson, LadderJson
-from labctl.json_types.noise import AllanJson
-from labctl.json_types.views import Numbers, Repeats, Views
+from labctl.answers.drawn import CriticismJson, LadderJson
+from labctl.answers.noise import AllanJson
+from labctl.answers.views import Numbers, Repeats, Views
 from labctl.plots.theme import ACCENT, INK, WARM, colour_of, grid_of, place
 
 

@@ -8,8 +8,8 @@ from typing import Generic, TypeVar
 
 import plotly.graph_objects as go
 
-from labctl.json_types.answers import ComparisonJson, CriticismJson, LadderJson
-from labctl.json_types.views import Views
+from labctl.answers.drawn import ComparisonJson, CriticismJson, LadderJson
+from labctl.answers.views import Views
 from labctl.plots import model_lines, noise, residual_lines, residual_maps, spectra
 
 AnswerT = TypeVar("AnswerT")

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from html import escape
 
-from labctl.json_types.answers import ComparisonJson, CriticismJson, LadderJson
-from labctl.json_types.criticism import CriticisedErrors, NotTestable, Suspect, WorstDataSet
+from labctl.answers.criticism import CriticisedErrors, NotTestable, Suspect, WorstDataSet
+from labctl.answers.drawn import ComparisonJson, CriticismJson, LadderJson
 from labctl.plots.page import figure_part, table_part, whole_page
 from labctl.plots.registry import pictures_of
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import plotly.graph_objects as go
 
-from labctl.json_types.answers import CriticismJson
-from labctl.json_types.views import DataSetColumns, Numbers, TimeLine, Views
+from labctl.answers.drawn import CriticismJson
+from labctl.answers.views import DataSetColumns, Numbers, TimeLine, Views
 from labctl.plots.theme import WARM, banded, colour_of, dots, grid_of, place
 
 HOUR_S = 3600.0

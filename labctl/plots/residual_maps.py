@@ -8,8 +8,8 @@ from typing import TypeVar
 
 import plotly.graph_objects as go
 
-from labctl.json_types.answers import CriticismJson
-from labctl.json_types.criticism import ResidualMap
+from labctl.answers.criticism import ResidualMap
+from labctl.answers.drawn import CriticismJson
 from labctl.plots.theme import DIMMED_BELOW, SCALE, SCALE_LIMITS, grid_of, place
 
 T = TypeVar("T")

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import plotly.graph_objects as go
 
-from labctl.json_types.answers import CriticismJson
-from labctl.json_types.views import AngleSpectrum, Numbers, Views
+from labctl.answers.drawn import CriticismJson
+from labctl.answers.views import AngleSpectrum, Numbers, Views
 from labctl.plots.theme import INK, colour_of, grid_of, place
 
 

@@ -6,13 +6,13 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Request
 
+from labctl.answers.datasheet import DatasheetResponse
+from labctl.answers.units import TrendResponse, UnitResponse
 from labctl.api.computation import while_connected
 from labctl.api.dependencies import ServiceDep
 from labctl.services.calibrations.due import span
 from labctl.services.criticism.trend import trend_unit
 from labctl.services.datasheet.sheet import datasheet
-from labctl.services.schemas.reports.datasheet import DatasheetResponse
-from labctl.services.schemas.units import TrendResponse, UnitResponse
 from labctl.services.units import list_units, unit
 
 router = APIRouter(prefix="/api", tags=["catalogue"])

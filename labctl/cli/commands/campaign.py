@@ -149,12 +149,12 @@ def start(
     With --at or --cron it is added to the schedule, which only a service (`labctl serve`) carries out. On a bench
     that is not simulated a person has to confirm first that the bench is clear, or will be at that time.
     """
+    from labctl.answers.campaigns import BENCH_CHECKS, CampaignRequest
     from labctl.cli.campaign_terminal import campaign_terminal
     from labctl.services.commands.acts.start import START_CAMPAIGN
     from labctl.services.commands.open import open_commands
     from labctl.services.commands.requests import CampaignStart
     from labctl.services.planning.loading import own_text
-    from labctl.services.schemas.campaigns import BENCH_CHECKS, CampaignRequest
 
     with one_clear_line():
         wanted = {"at": at, "cron": cron, "time_zone": time_zone, "late_limit_s": late_limit_s, "priority": priority}

@@ -14,7 +14,7 @@ from labctl.cli.printing.campaigns import print_campaign, print_drafts, print_en
 from labctl.cli.turn_text import turn_text
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.campaigns import CampaignResponse
+    from labctl.answers.campaigns import CampaignResponse
 
 #: How long an abort is followed until the bench is safe, and how often it is read, s.
 SAFE_WITHIN_S, LOOK_S = 120.0, 0.2
@@ -69,10 +69,10 @@ def pause(
     database: Database = None,
 ) -> None:
     """Pause a running campaign after the present data set; the bench is still monitored."""
+    from labctl.answers.campaigns import ReasonRequest
     from labctl.services.commands.acts.pause import PAUSE_CAMPAIGN
     from labctl.services.commands.open import execute
     from labctl.services.commands.requests import ToCampaign
-    from labctl.services.schemas.campaigns import ReasonRequest
 
     with one_clear_line():
         request = ReasonRequest(reason=reason, by=person(by))
@@ -107,11 +107,11 @@ def resume(
     database: Database = None,
 ) -> None:
     """Continue a paused campaign, or resume one that was interrupted, failed or aborted; safe state first."""
+    from labctl.answers.campaigns import ResumeRequest
     from labctl.cli.campaign_terminal import campaign_terminal
     from labctl.services.commands.acts.resume import RESUME_CAMPAIGN
     from labctl.services.commands.open import campaign_to_resume, open_commands
     from labctl.services.commands.requests import CampaignResume
-    from labctl.services.schemas.campaigns import ResumeRequest
 
     with one_clear_line():
         request = ResumeRequest.model_validate({"by": person(by), "power": power})
@@ -150,12 +150,12 @@ def abort(
 
 def _recorded(database: str | None, campaign: int, reason: str, was_stopped: bool) -> CampaignResponse:
     """Have an abort recorded; where the campaign has ended by the stop already, its own process has recorded it."""
+    from labctl.answers.campaigns import ReasonRequest
     from labctl.errors import Conflict
     from labctl.service_connection import ServiceRefused
     from labctl.services.commands.acts.abort import ABORT_CAMPAIGN
     from labctl.services.commands.open import current_status, execute
     from labctl.services.commands.requests import ToCampaign
-    from labctl.services.schemas.campaigns import ReasonRequest
 
     try:
         return execute(database, ABORT_CAMPAIGN, ToCampaign(campaign, ReasonRequest(reason=reason)))
@@ -206,11 +206,11 @@ def confirm(
     database: Database = None,
 ) -> None:
     """Answer a campaign's question: done, or cannot be done. An answer to an older question is refused."""
+    from labctl.answers.campaigns import ConfirmRequest
     from labctl.errors import BadInput
     from labctl.services.commands.acts.confirm import CONFIRM_PROMPT
     from labctl.services.commands.open import current_status, execute
     from labctl.services.commands.requests import ToCampaign
-    from labctl.services.schemas.campaigns import ConfirmRequest
 
     with one_clear_line():
         wanted = campaign if campaign is not None else current_status(database, None).id
@@ -230,10 +230,10 @@ def draft(
     database: Database = None,
 ) -> None:
     """Make the drafts of a campaign that is done, where they are still due. A running service does it by itself."""
+    from labctl.answers.drafts import DraftsRequest
     from labctl.services.commands.open import current_status, execute
     from labctl.services.commands.registry import MAKE_DRAFTS
     from labctl.services.commands.requests import ToCampaign
-    from labctl.services.schemas.reports.drafts import DraftsRequest
 
     with one_clear_line():
         wanted = campaign if campaign is not None else current_status(database, None).id

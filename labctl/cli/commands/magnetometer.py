@@ -48,11 +48,11 @@ def magnetometer(
     database: Database = None,
 ) -> None:
     """Calibrate a magnetometer: hard iron, soft iron, their uncertainty, and whether the field was constant."""
+    from labctl.answers.sensors import MagnetometerRequest
     from labctl.services.commands.open import execute
     from labctl.services.commands.requests import ToUnit
     from labctl.services.commands.sensors import KEEP_MAGNETOMETER
     from labctl.services.magnetometer import Source, magnetometer_of_file
-    from labctl.services.schemas.sensors import MagnetometerRequest
     from labctl.services.sensor_exports import check_export, write_export
     from labctl.services.sensor_versions import measured_data
 

@@ -12,7 +12,7 @@ from labctl.cli.options import Database, Json, Serial
 from labctl.cli.output import console, format_number, print_heading, print_json, table
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.units import AppliedVersion, TrendResponse
+    from labctl.answers.units import AppliedVersion, TrendResponse
 
 
 def units(

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from labctl.answers.certification import CertificationResponse, ReleaseRequestResponse
 from labctl.cli.output import console, format_number, print_heading, print_warnings, table
 from labctl.cli.printing.joint import print_joint
 from labctl.fitting.numeric.rounding import rounded_to_uncertainty
-from labctl.services.schemas.certification import CertificationResponse, ReleaseRequestResponse
 
 if TYPE_CHECKING:
-    from labctl.json_types.models import Coefficients, Entry, HeldJson
-    from labctl.json_types.poses import PosesJson
-    from labctl.services.schemas.calibrations import FitResponse
+    from labctl.answers.calibrations import FitResponse
+    from labctl.answers.fitted_model import Coefficients, Entry, HeldJson
+    from labctl.answers.poses import PosesJson
 
 
 def print_fit(answer: FitResponse) -> None:

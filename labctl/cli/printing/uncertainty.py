@@ -9,7 +9,7 @@ from labctl.cli.output import console, format_number, stderr, table
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from labctl.services.schemas.uncertainty import (
+    from labctl.answers.uncertainty import (
         AnyAxisUncertainty,
         BudgetLineResponse,
         BudgetResponse,

@@ -6,13 +6,8 @@ from datetime import datetime, timedelta
 from typing import Literal, cast
 
 from labctl.acting_user import acting_key
-from labctl.errors import BadInput, CertificationRefused
-from labctl.json_types.calibrations import JudgementDetail
-from labctl.services.calibrations.assessment import LEAST_REASON_CHARACTERS, LEAST_REASON_WORDS, assess
-from labctl.services.calibrations.due import interval_days
-from labctl.services.calibrations.fetch_log import fetched_by
-from labctl.services.calibrations.release import ask_for_release, key_of_person, needs_second_person, waiting_request
-from labctl.services.schemas.certification import (
+from labctl.answers.calibration_file import JudgementDetail
+from labctl.answers.certification import (
     AssessmentResponse,
     CertificationResponse,
     CertifyRequest,
@@ -20,6 +15,11 @@ from labctl.services.schemas.certification import (
     ReleaseRequestResponse,
     RevokeRequest,
 )
+from labctl.errors import BadInput, CertificationRefused
+from labctl.services.calibrations.assessment import LEAST_REASON_CHARACTERS, LEAST_REASON_WORDS, assess
+from labctl.services.calibrations.due import interval_days
+from labctl.services.calibrations.fetch_log import fetched_by
+from labctl.services.calibrations.release import ask_for_release, key_of_person, needs_second_person, waiting_request
 from labctl.store import CertificationRow, Judgement, Release, Store
 
 #: What is kept of an assessment beside its verdict.

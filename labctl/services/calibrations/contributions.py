@@ -8,10 +8,10 @@ from typing import cast
 
 import numpy as np
 
+from labctl.answers.budget import ContributionsOverJson
+from labctl.answers.uncertainty import ContributionLines, ContributionsOver, UncertaintyResponse
 from labctl.errors import BadInput
 from labctl.fitting.uncertainty import Budget, RateUncertainty
-from labctl.json_types.budget import ContributionsOverJson
-from labctl.services.schemas.uncertainty import ContributionLines, ContributionsOver, UncertaintyResponse
 
 #: Points of a line.
 POINTS = 21

@@ -9,6 +9,14 @@ from typing import Literal
 
 import numpy as np
 
+from labctl.answers.uncertainty import (
+    AnyAxisUncertainty,
+    AxisUncertainty,
+    BudgetResponse,
+    UncertaintyGrid,
+    UncertaintyResponse,
+    VectorUncertainty,
+)
 from labctl.calibration import Calibration, read_calibration
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import BODY_AXES
@@ -33,14 +41,6 @@ from labctl.fitting.uncertainty.largest_error import widening
 from labctl.fitting.uncertainty.vector_bound import PLACES
 from labctl.services.calibrations.contributions import contributions_over
 from labctl.services.criticism.versions import version_of
-from labctl.services.schemas.uncertainty import (
-    AnyAxisUncertainty,
-    AxisUncertainty,
-    BudgetResponse,
-    UncertaintyGrid,
-    UncertaintyResponse,
-    VectorUncertainty,
-)
 from labctl.store import Store
 
 

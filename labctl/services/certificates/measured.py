@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.answers.certificates import RoomConditions
+from labctl.answers.fitted_model import Coefficients
 from labctl.calibration import Calibration
 from labctl.certificates.document import (
     AnyAxisResult,
@@ -23,13 +25,11 @@ from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.uncertainty.budget import Budget
 from labctl.fitting.uncertainty.combination import LEVEL
-from labctl.json_types.models import Coefficients
 from labctl.recording import Recording
 from labctl.services.calibrations.surface import errors_on_grid
 from labctl.services.calibrations.uncertainty import coefficients_at, over_any_axis, places_of, uncertainty_of
 from labctl.services.criticism.measurements import Measurements
 from labctl.services.criticism.verification.of_version import applied_errors, mounting_angles_of
-from labctl.services.schemas.documents.certificates import RoomConditions
 from labctl.store import CalibrationRecord, RoomSpan, Store
 
 Array = NDArray[np.float64]

@@ -12,6 +12,8 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.answers.comparison import ComparisonColumns, ComparisonResponse, ModelLines
+from labctl.answers.drawn import ComparisonJson
 from labctl.calibration import Calibration, read_calibration
 from labctl.error_per_turn import AT_REST_DPS, LEAST_RATE_DPS, bias_at_rest, turn_errors
 from labctl.errors import BadInput, LabctlError
@@ -22,13 +24,11 @@ from labctl.fitting.data.levels import level_centres, rate_levels, temperature_r
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.models.true_rate_error import errors_at_true_rates
 from labctl.fitting.numeric.arrays import Array
-from labctl.json_types.answers import ComparisonJson
 from labctl.recording.positions import axis_in
 from labctl.services.criticism.measurements import Measurements
 from labctl.services.criticism.residuals import own_numbers
 from labctl.services.criticism.verification.of_version import applied_errors
 from labctl.services.recordings.loading import chosen_rows
-from labctl.services.schemas.comparison import ComparisonColumns, ComparisonResponse, ModelLines
 from labctl.store import Store
 
 #: Points of a line, besides those at the measured rates or temperatures themselves.

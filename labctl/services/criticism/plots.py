@@ -6,13 +6,14 @@ import hashlib
 import json
 from typing import cast
 
-from labctl.json_types.answers import CriticismJson, LadderJson
+from labctl.answers.criticism import CriticismResponse
+from labctl.answers.drawn import CriticismJson, LadderJson
+from labctl.answers.ladder import LadderResponse
+from labctl.answers.views import PictureResponse, PicturesResponse
 from labctl.services.cache import cached
 from labctl.services.criticism.comparison import comparison_json
 from labctl.services.criticism.criticise import criticise_unit
 from labctl.services.criticism.ladder import ladder
-from labctl.services.schemas.criticism import CriticismResponse, PictureResponse, PicturesResponse
-from labctl.services.schemas.reports.ladder import LadderResponse
 from labctl.store import Store
 
 

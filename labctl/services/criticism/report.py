@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from labctl.answers.criticism import CriticismResponse
 from labctl.plots import report_html
 from labctl.services.criticism.comparison import comparison_json
 from labctl.services.criticism.ladder import ladder
 from labctl.services.criticism.plots import criticism_json, ladder_json
-from labctl.services.schemas.criticism import CriticismResponse
 from labctl.store import Store
 
 

@@ -7,8 +7,7 @@ from datetime import date, datetime
 from typing import cast, get_args
 
 from instruments.standards import UNITS, Quantity
-from labctl.errors import BadInput, Conflict, NotFound
-from labctl.services.schemas.standards import (
+from labctl.answers.standards import (
     CertifiedPointRequest,
     CertifiedPointResponse,
     StandardBadRequest,
@@ -21,6 +20,7 @@ from labctl.services.schemas.standards import (
     StandardState,
     WithdrawFindingRequest,
 )
+from labctl.errors import BadInput, Conflict, NotFound
 from labctl.services.standards.checks import charted, check_answer, out_text, to_be_checked
 from labctl.services.standards.predictions import prediction_answer, predictions_of
 from labctl.services.standards.usage import finding_text, same_issuer

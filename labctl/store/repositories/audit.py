@@ -11,7 +11,7 @@ from typing import Any
 import sqlalchemy as sa
 
 from labctl.acting_user import actor
-from labctl.json_types import JsonObject
+from labctl.answers.json_object import JsonObject
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.manifests import chain

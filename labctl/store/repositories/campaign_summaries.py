@@ -9,7 +9,7 @@ from typing import Any
 
 import sqlalchemy as sa
 
-from labctl.json_types.steps import StepJson
+from labctl.answers.steps import StepJson
 from labctl.store.connection.database import Database
 from labctl.store.schema import tables
 

@@ -9,9 +9,9 @@ from typing import Literal
 
 import sqlalchemy as sa
 
+from labctl.answers.json_object import JsonObject
+from labctl.answers.steps import StepJson
 from labctl.errors import NotFound
-from labctl.json_types import JsonObject
-from labctl.json_types.steps import StepJson
 from labctl.recording import RecordingInfo
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction

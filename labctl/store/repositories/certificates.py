@@ -11,8 +11,8 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy import exc
 
+from labctl.answers.json_object import JsonDocument
 from labctl.errors import Conflict, NotFound
-from labctl.json_types import JsonDocument
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.manifests.contents import CERTIFICATE

@@ -15,9 +15,9 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy import exc
 
+from labctl.answers.json_object import JsonObject
+from labctl.answers.recordings import RawChannelJson
 from labctl.errors import Conflict
-from labctl.json_types import JsonObject
-from labctl.json_types.recordings import RawChannelJson
 from labctl.recording import RecordingInfo
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction

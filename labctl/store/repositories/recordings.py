@@ -15,8 +15,8 @@ import numpy as np
 import sqlalchemy as sa
 from numpy.typing import NDArray
 
+from labctl.answers.json_object import JsonObject
 from labctl.errors import LabctlError, NotFound
-from labctl.json_types import JsonObject
 from labctl.recording import Recording, RecordingInfo, refuse_too_many_data_sets
 from labctl.recording.columns import RATE_TIME_U, READING_TIMES, VERIFICATION
 from labctl.store.connection.database import Database

@@ -5368,7 +5368,7 @@ export interface components {
              * Left Out
              * @description Effects of the fit that are not exported with the calibration.
              */
-            left_out: components["schemas"]["labctl__json_types__models__LeftOut"][];
+            left_out: components["schemas"]["LeftOutEffect"][];
             /**
              * Least Turn Rate Dps
              * @description The error per turn is computed where the magnitude of the rate is at least this, deg/s.
@@ -7479,7 +7479,7 @@ export interface components {
              * Left Out
              * @description Readings that were left out by choice, with how many and why.
              */
-            left_out: components["schemas"]["labctl__recording__info__LeftOut"][];
+            left_out: components["schemas"]["LeftOut"][];
             /**
              * New Unit
              * @description Whether this is the first recording of its unit.
@@ -7617,7 +7617,7 @@ export interface components {
              * Left Out
              * @description Effects in the fitted model that the exported calibration leaves out.
              */
-            left_out: components["schemas"]["labctl__json_types__models__LeftOut"][];
+            left_out: components["schemas"]["LeftOutEffect"][];
             /** @description Of a thermal lag that was added at rest and is not certain: what it leaves of stretches left out, and why it is not certain; else null. */
             thermal_hint: components["schemas"]["ThermalHintJson"] | null;
             /**
@@ -7719,7 +7719,7 @@ export interface components {
              * Left Out
              * @description Effects in the fitted model that an export leaves out, each with the RMS of its contribution to the rate, deg/s.
              */
-            left_out: components["schemas"]["labctl__json_types__models__LeftOut"][];
+            left_out: components["schemas"]["LeftOutEffect"][];
             /** @description Of a thermal lag that was added at rest and is not certain: what it leaves of stretches left out, and why it is not certain; else null. */
             thermal_hint: components["schemas"]["ThermalHintJson"] | null;
             /**
@@ -7817,7 +7817,7 @@ export interface components {
              * Left Out
              * @description Readings that were left out by choice when it was imported.
              */
-            left_out: components["schemas"]["labctl__recording__info__LeftOut"][];
+            left_out: components["schemas"]["LeftOut"][];
             /**
              * Courses
              * @description Each channel in bins: least and largest reading; all readings are in them.
@@ -8176,6 +8176,65 @@ export interface components {
              * @description Latest such time by the 95 % interval of the line; null: not within 50 years, or not known.
              */
             latest: string | null;
+        };
+        /**
+         * LeftOut
+         * @description Readings that were left out by choice when a recording was imported: they are marked with valid = 0.
+         */
+        LeftOut: {
+            /**
+             * What
+             * @description Kind of the finding, as a fixed word for programs, such as spikes.
+             */
+            what: string;
+            /**
+             * Channel
+             * @description Column whose readings were left out; empty: the whole rows.
+             * @default
+             */
+            channel?: string;
+            /**
+             * N
+             * @description Number of readings that were left out.
+             */
+            n: number;
+            /**
+             * Of
+             * @description Number of readings of the recording.
+             */
+            of: number;
+            /**
+             * Why
+             * @description What was found, in words.
+             */
+            why: string;
+        };
+        /**
+         * LeftOutEffect
+         * @description An effect of a fit that no correction by output and temperature contains.
+         */
+        LeftOutEffect: {
+            /**
+             * Effect
+             * @description Id of the effect.
+             */
+            effect: string;
+            /**
+             * Origin
+             * @description What the effect belongs to.
+             * @enum {string}
+             */
+            origin: "sensor" | "package" | "fixture" | "bench" | "environment";
+            /**
+             * Term
+             * @description Standard term of the effect (IEEE Std 528).
+             */
+            term: string;
+            /**
+             * Rms Dps
+             * @description RMS of what it adds to the data sets of the fit, deg/s; null or absent: unknown.
+             */
+            rms_dps?: number | null;
         };
         /**
          * LegError
@@ -10283,7 +10342,7 @@ export interface components {
              * Left Out
              * @description Effects in the fitted model that the exported calibration leaves out.
              */
-            left_out: components["schemas"]["labctl__json_types__models__LeftOut"][];
+            left_out: components["schemas"]["LeftOutEffect"][];
             /** @description Of a thermal lag that was added at rest and is not certain: what it leaves of stretches left out, and why it is not certain; else null. */
             thermal_hint: components["schemas"]["ThermalHintJson"] | null;
             /** @description Residuals of the changed model, by data set. */
@@ -11884,7 +11943,7 @@ export interface components {
              * Left Out
              * @description Readings that were left out by choice, with how many and why.
              */
-            left_out: components["schemas"]["labctl__recording__info__LeftOut"][];
+            left_out: components["schemas"]["LeftOut"][];
             /**
              * New Unit
              * @description Whether this is the first recording of its unit.
@@ -12579,7 +12638,7 @@ export interface components {
              * Left Out
              * @description Effects in the fitted model that the exported calibration leaves out.
              */
-            left_out: components["schemas"]["labctl__json_types__models__LeftOut"][];
+            left_out: components["schemas"]["LeftOutEffect"][];
             /**
              * Axes
              * @description For each axis: the error over rate and temperature.
@@ -13658,7 +13717,7 @@ export interface components {
              * Left Out
              * @description Effects in the fitted model that an export leaves out, each with the RMS of its contribution to the rate, deg/s.
              */
-            left_out: components["schemas"]["labctl__json_types__models__LeftOut"][];
+            left_out: components["schemas"]["LeftOutEffect"][];
             /**
              * Remembers
              * @description Temperature states (thermal lag or hysteresis) that must be updated with the temperature of every sample.
@@ -13867,65 +13926,6 @@ export interface components {
              * @description Residual divided by its noise floor, with the sign of the residual.
              */
             over_floor: number;
-        };
-        /**
-         * LeftOut
-         * @description An effect of a fit that no correction by output and temperature contains.
-         */
-        labctl__json_types__models__LeftOut: {
-            /**
-             * Effect
-             * @description Id of the effect.
-             */
-            effect: string;
-            /**
-             * Origin
-             * @description What the effect belongs to.
-             * @enum {string}
-             */
-            origin: "sensor" | "package" | "fixture" | "bench" | "environment";
-            /**
-             * Term
-             * @description Standard term of the effect (IEEE Std 528).
-             */
-            term: string;
-            /**
-             * Rms Dps
-             * @description RMS of what it adds to the data sets of the fit, deg/s; null or absent: unknown.
-             */
-            rms_dps?: number | null;
-        };
-        /**
-         * LeftOut
-         * @description Readings that were left out by choice when a recording was imported: they are marked with valid = 0.
-         */
-        labctl__recording__info__LeftOut: {
-            /**
-             * What
-             * @description Kind of the finding, as a fixed word for programs, such as spikes.
-             */
-            what: string;
-            /**
-             * Channel
-             * @description Column whose readings were left out; empty: the whole rows.
-             * @default
-             */
-            channel?: string;
-            /**
-             * N
-             * @description Number of readings that were left out.
-             */
-            n: number;
-            /**
-             * Of
-             * @description Number of readings of the recording.
-             */
-            of: number;
-            /**
-             * Why
-             * @description What was found, in words.
-             */
-            why: string;
         };
     };
     responses: never;

@@ -10,6 +10,7 @@ from fastapi import APIRouter
 from fastapi.testclient import TestClient
 
 from instruments.clock import VirtualClock
+from labctl.answers.campaigns import CampaignRequest, CampaignResponse, ReasonRequest
 from labctl.api import create_app
 from labctl.api.act_routes import add_act_route
 from labctl.processes.bench_calls import BENCH_ACTS
@@ -22,7 +23,6 @@ from labctl.services.commands.context import CommandContext, Foreground, Service
 from labctl.services.commands.requests import ToCampaign
 from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.campaigns import CampaignRequest, CampaignResponse, ReasonRequest
 from labctl.store import Store, open_store
 
 Asked = ToCampaign[ReasonRequest]

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeVar
 
+from labctl.answers.base import Request
+from labctl.answers.campaigns import CampaignResponse
 from labctl.services.commands.command import Command
 from labctl.services.commands.context import BenchAct
 from labctl.services.commands.requests import ToCampaign
-from labctl.services.schemas.base import Request
-from labctl.services.schemas.campaigns import CampaignResponse
 
 BodyT = TypeVar("BodyT", bound=Request)
 

@@ -9,7 +9,7 @@ from typing import Literal
 
 import sqlalchemy as sa
 
-from labctl.json_types import JsonObject
+from labctl.answers.json_object import JsonObject
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.manifests.contents import CAMPAIGN

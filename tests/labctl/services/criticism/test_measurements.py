@@ -10,10 +10,10 @@ from typing import Any
 
 import pytest
 
+from labctl.answers.calibrations import FitRequest
 from labctl.services import forked
 from labctl.services.calibrations.fitting import fit_unit
 from labctl.services.criticism.criticise import criticise_unit
-from labctl.services.schemas.calibrations import FitRequest
 from labctl.store import open_store
 from labctl.store.repositories.recordings import Recordings
 from tests.helpers.simulated_recordings import single_axis
