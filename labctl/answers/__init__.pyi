@@ -68,8 +68,6 @@ from labctl.answers.calibration_file import (
     AxisEvidenceJson as AxisEvidenceJson,
     CalibrationJson as CalibrationJson,
     CertificationJson as CertificationJson,
-    JudgementDetail as JudgementDetail,
-    ObjectionJson as ObjectionJson,
     OutputUnitJson as OutputUnitJson,
     SoftwareJson as SoftwareJson,
     UnitJson as UnitJson,
@@ -139,6 +137,7 @@ from labctl.answers.certification import (
     CertifyRequest as CertifyRequest,
     DueSource as DueSource,
     FetchResponse as FetchResponse,
+    JudgementDetail as JudgementDetail,
     Objection as Objection,
     ReleaseRequest as ReleaseRequest,
     ReleaseRequestResponse as ReleaseRequestResponse,
@@ -189,14 +188,6 @@ from labctl.answers.drafts import (
     DriftFromVersion as DriftFromVersion,
     LimitResult as LimitResult,
     RemainingLine as RemainingLine,
-)
-from labctl.answers.drawn import (
-    ComparisonColumnsJson as ComparisonColumnsJson,
-    ComparisonJson as ComparisonJson,
-    CriticismJson as CriticismJson,
-    LadderJson as LadderJson,
-    LadderStep as LadderStep,
-    ModelLinesJson as ModelLinesJson,
 )
 from labctl.answers.effects import (
     CataloguedEffect as CataloguedEffect,
@@ -404,11 +395,6 @@ from labctl.answers.steps import StepJson as StepJson
 from labctl.answers.uncertainty import (
     AnyAxisUncertainty as AnyAxisUncertainty,
     AxisUncertainty as AxisUncertainty,
-    BudgetLineResponse as BudgetLineResponse,
-    BudgetResponse as BudgetResponse,
-    ContributionLines as ContributionLines,
-    ContributionsOver as ContributionsOver,
-    CrossRates as CrossRates,
     Surface as Surface,
     SurfaceResponse as SurfaceResponse,
     UncertaintyGrid as UncertaintyGrid,

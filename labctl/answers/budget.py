@@ -77,7 +77,7 @@ class BudgetLineJson(TypedDict):
     type: Literal["A", "B"]
     """Evaluated by statistics (A) or otherwise (B), GUM 2.3.2 and 2.3.3."""
     distribution: str
-    """Probability distribution of the input."""
+    """Distribution that is assumed of the input: normal, rectangular, triangular or u-shaped."""
     u: float | None
     """Standard uncertainty of the input, in `unit`; null: not stated or unknown."""
     unit: str
@@ -91,13 +91,13 @@ class BudgetLineJson(TypedDict):
     uncorrected: float
     """Known error that is not corrected, in the unit of the result."""
     common_to_all_rates: bool
-    """Whether the error is the same at all rates, so that no mean over rates reduces it."""
+    """Whether the error is the same at all rates, so that it adds linearly and no mean reduces it."""
     stated: bool
-    """Whether anything states the input; if not, the line is not in the result."""
+    """Whether the bench states this standard; if not, it is not in the result."""
     overdue: bool
     """Whether the standard was past its due date when it was used."""
     due: str | None
-    """Due date of the standard, ISO 8601; null: none."""
+    """Day until which the standard may be used, ISO 8601; null: no due date, or no standard."""
     why: str
     """Why a number is null or 0, or how it was evaluated."""
 
@@ -106,9 +106,9 @@ class BudgetJson(TypedDict):
     """A result with its lines (GUM)."""
 
     result: str
-    """Quantity of the budget: corrected_rate, or the name of a coefficient."""
+    """Quantity of the budget: corrected_rate, bias, scale_factor, misalignment with an axis, delay or time_constant."""
     unit: str
-    """Unit of the result and of every contribution; 1: a ratio."""
+    """Unit of the result and of every contribution; 1: a ratio to the rate."""
     value: float | None
     """Value of a coefficient, in `unit`; null: the budget is that of a corrected rate."""
     lines: list[BudgetLineJson]

@@ -156,29 +156,3 @@ class CalibrationJson(TypedDict):
     """How to apply the model, in words."""
     hash: str
     """SHA-256 of the canonical file without this field."""
-
-
-class ObjectionJson(TypedDict):
-    """One objection to certifying a version."""
-
-    what: str
-    """Kind of objection: verdict, worse, data or standard."""
-    text: str
-    """The objection, with figures in deg/s."""
-    do: str
-    """What to do instead of certifying the version."""
-
-
-class JudgementDetail(TypedDict, total=False):
-    """What is stored beside a verdict."""
-
-    verdict_reason: str
-    """Why there is no verdict; empty if there is one."""
-    verdict_text: str
-    """The verdict in words; empty if there is none."""
-    error: dict[str, float | None]
-    """Name -> RMS error that the version states, deg/s; null: unknown."""
-    objections: list[ObjectionJson]
-    """Objections that were overridden; empty: none."""
-    due_from: str | None
-    """Where the due date is from; null: no due date."""

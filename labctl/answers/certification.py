@@ -6,6 +6,7 @@ from datetime import datetime
 from typing import Literal
 
 from pydantic import Field
+from typing_extensions import TypedDict
 
 from labctl.answers.base import BY_KEY, Request, ResponseModel
 from labctl.answers.common_fields import (
@@ -79,15 +80,31 @@ class ReleaseRequestResponse(ResponseModel):
     )
 
 
-class Objection(ResponseModel):
+class Objection(TypedDict):
     """One objection to certifying a version."""
 
-    what: Literal["verdict", "worse", "data", "standard"] = Field(
-        description="verdict: the model lacks something, or there is no verdict; worse: an error without compensation "
-        "or of another version is smaller; data: the data are certainly wrong; standard: a reference standard was bad."
-    )
-    text: str = Field(description="The objection, with figures in deg/s.")
-    do: str = Field(description="What to do instead of certifying this version.")
+    what: Literal["verdict", "worse", "data", "standard"]
+    """verdict: the model lacks something, or there is no verdict; worse: an error without compensation or of another
+    version is smaller; data: the data are certainly wrong; standard: a reference standard was bad."""
+    text: str
+    """The objection, with figures in deg/s."""
+    do: str
+    """What to do instead of certifying the version."""
+
+
+class JudgementDetail(TypedDict, total=False):
+    """What is stored beside a verdict."""
+
+    verdict_reason: str
+    """Why there is no verdict; empty if there is one."""
+    verdict_text: str
+    """The verdict in words; empty if there is none."""
+    error: dict[str, float | None]
+    """Name -> RMS error that the version states, deg/s; null: unknown."""
+    objections: list[Objection]
+    """Objections that were overridden; empty: none."""
+    due_from: str | None
+    """Where the due date is from; null: no due date."""
 
 
 class CertifiedErrors(ResponseModel):

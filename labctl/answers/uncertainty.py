@@ -2,87 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 from pydantic import Field
 
 from labctl.answers.base import ResponseModel
+from labctl.answers.budget import BudgetJson, ContributionsOverJson, CrossRatesJson
 from labctl.answers.calibrations import Validity
 from labctl.answers.common_fields import Serial, VersionNumber
 from labctl.answers.fitted_model import LeftOutEffect
-
-
-class BudgetLineResponse(ResponseModel):
-    """One source of uncertainty; null is unknown, never 0."""
-
-    source: str = Field(
-        description="Source of the uncertainty: `coefficients` of the fit, `model` (its form), `repeatability`, or the "
-        "quantity that a reference standard realises, such as `clock`; `table_time` and `table_time_common`: time of a "
-        "reference rate that changes."
-    )
-    name: str = Field(description="Name of the reference standard, with the number of its certificate.")
-    type: Literal["A", "B"] = Field(description="Evaluated by statistics (A) or otherwise (B).")
-    distribution: str = Field(
-        description="Distribution that is assumed of the input: normal, rectangular, triangular or u-shaped."
-    )
-    u: float | None = Field(description="Standard uncertainty of the input, in `unit`; null: not stated or unknown.")
-    unit: str = Field(description="Unit of the input.")
-    sensitivity: float | None = Field(description="Derivative of the result along the input, per `unit`.")
-    contribution: float | None = Field(description="Magnitude of sensitivity times u, in the unit of the result.")
-    degrees_of_freedom: float | None = Field(description="null: infinite.")
-    uncorrected: float = Field(description="Known error that is not corrected, in the unit of the result.")
-    common_to_all_rates: bool = Field(
-        description="Whether the error is the same at all rates, so that it adds linearly and no mean reduces it."
-    )
-    stated: bool = Field(description="Whether the bench states this standard; if not, it is not in the result.")
-    overdue: bool = Field(description="Whether the standard was past its due date when it was used.")
-    due: str | None = Field(
-        description="Day until which the standard may be used, ISO 8601; null: no due date, or no standard."
-    )
-    why: str = Field(description="Why a number is null or 0, or how it was evaluated.")
-
-
-class BudgetResponse(ResponseModel):
-    """A result with its lines (GUM)."""
-
-    result: str = Field(
-        description="Quantity of the budget: corrected_rate, bias, scale_factor, misalignment with an axis, delay or "
-        "time_constant."
-    )
-    unit: str = Field(description="Unit of the result and of every contribution; 1: a ratio to the rate.")
-    value: float | None = Field(description="Of a coefficient.")
-    lines: list[BudgetLineResponse] = Field(description="Each source of uncertainty.")
-    combined: float | None = Field(description="Combined standard uncertainty; null: a line of type A is unknown.")
-    effective_degrees_of_freedom: float | None = Field(description="Welch-Satterthwaite; null: infinite.")
-    k: float | None = Field(description="Coverage factor for a probability of 95.45 %.")
-    expanded: float | None = Field(
-        description="Expanded uncertainty: k times `combined`, widened so that it covers with the same probability "
-        "where known errors are not corrected."
-    )
-    not_stated: list[str] = Field(description="Standards that are not stated and therefore not in the result.")
-    overdue: bool = Field(description="Whether a standard was past its due date when it was used.")
-
-
-class ContributionLines(ResponseModel):
-    """Contributions along one variable, deg/s."""
-
-    at: list[float] = Field(description="Rates, deg/s, or temperatures, deg C, at which the budget was computed.")
-    contributions: dict[str, list[float | None]] = Field(
-        description="For each source: its contribution, deg/s; null: not stated."
-    )
-    combined: list[float | None] = Field(
-        description="Combined standard uncertainty at each point, deg/s; null: a line of type A is unknown."
-    )
-    expanded: list[float | None] = Field(description="Expanded uncertainty at each point, deg/s; null: unknown.")
-
-
-class ContributionsOver(ResponseModel):
-    """Contributions to the uncertainty of one axis, over rate and over temperature."""
-
-    temperature_c: float = Field(description="Temperature at which `over_rate` was computed, deg C.")
-    rate_dps: float = Field(description="Rate at which `over_temperature` was computed, deg/s.")
-    over_rate: ContributionLines = Field(description="Contributions over the rate, at `temperature_c`.")
-    over_temperature: ContributionLines = Field(description="Contributions over the temperature, at `rate_dps`.")
 
 
 class AxisUncertainty(ResponseModel):
@@ -136,7 +62,7 @@ class UncertaintyGrid(ResponseModel):
     axes: dict[str, list[list[AxisUncertainty]]] = Field(
         description="For each axis: one row per temperature, one entry per rate in each row."
     )
-    contributions: dict[str, ContributionsOver] = Field(
+    contributions: dict[str, ContributionsOverJson] = Field(
         default_factory=dict, description="For each axis: the lines of the budget over rate and over temperature."
     )
 
@@ -162,17 +88,6 @@ class VectorUncertainty(ResponseModel):
     )
 
 
-class CrossRates(ResponseModel):
-    """What rates about axes without an output add to a corrected rate: nothing can correct it."""
-
-    about: list[str] = Field(description="Body axes without an output.")
-    per_dps: float | None = Field(
-        description="Error of the corrected rate per deg/s about these axes, in the worst direction, with the coverage "
-        "of U; null: unknown."
-    )
-    why: str = Field(description="Why it is unknown; empty where it is known.")
-
-
 class AnyAxisUncertainty(ResponseModel):
     """Largest U of one output over all rate vectors up to the calibrated rate, about any axis."""
 
@@ -182,7 +97,7 @@ class AnyAxisUncertainty(ResponseModel):
     rates_dps: dict[str, float] = Field(description="Rate vector where U is largest, or unknown, deg/s.")
     temperature_c: float = Field(description="Temperature there, deg C.")
     why: str = Field(description="Why it is unknown; empty where it is known.")
-    cross_rates: CrossRates | None = Field(description="null: every body axis has an output.")
+    cross_rates: CrossRatesJson | None = Field(description="null: every body axis has an output.")
 
 
 class UncertaintyResponse(ResponseModel):
@@ -196,8 +111,8 @@ class UncertaintyResponse(ResponseModel):
     coverage: float = Field(description="Probability that the interval contains the true value.")
     inside: bool = Field(description="Whether rate and temperature are within the calibrated range.")
     axes: dict[str, AxisUncertainty] = Field(description="For each axis: the uncertainty of its corrected rate.")
-    budget: dict[str, BudgetResponse] = Field(description="For each axis: the budget of the corrected rate, deg/s.")
-    coefficients: dict[str, dict[str, BudgetResponse]] = Field(
+    budget: dict[str, BudgetJson] = Field(description="For each axis: the budget of the corrected rate, deg/s.")
+    coefficients: dict[str, dict[str, BudgetJson]] = Field(
         description="For each axis: the budgets of bias, scale factor and misalignments at this temperature."
     )
     vector: VectorUncertainty | None = Field(

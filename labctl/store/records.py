@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Literal
 
-from labctl.answers.calibration_file import JudgementDetail
+from labctl.answers.certification import JudgementDetail
 from labctl.answers.json_object import JsonDocument, JsonObject
 from labctl.answers.kept_answers import KeptAnswer
 from labctl.answers.recordings import RawChannelJson

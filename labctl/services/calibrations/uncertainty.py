@@ -12,7 +12,6 @@ import numpy as np
 from labctl.answers.uncertainty import (
     AnyAxisUncertainty,
     AxisUncertainty,
-    BudgetResponse,
     UncertaintyGrid,
     UncertaintyResponse,
     VectorUncertainty,
@@ -93,7 +92,7 @@ def uncertainty_answer(
     coefficients = coefficient_budgets(
         known.fitted, temperature_c, evidence=known.evidence, name=known.name, bench=known.bench
     )
-    budgets = {axis: BudgetResponse.model_validate(one.budget.to_json()) for axis, one in found.items()}
+    budgets = {axis: one.budget.to_json() for axis, one in found.items()}
     response = calibration.document.get("response", {})
     return UncertaintyResponse(
         serial=calibration.serial,
@@ -107,15 +106,15 @@ def uncertainty_answer(
         budget=budgets,
         coefficients={
             axis: {
-                **{name: BudgetResponse.model_validate(one.to_json()) for name, one in named.items()},
-                **{name: BudgetResponse.model_validate(one) for name, one in response.get(axis, {}).items()},
+                **{name: one.to_json() for name, one in named.items()},
+                **response.get(axis, {}),
             }
             for axis, named in coefficients.items()
         },
         vector=None if vector is None else _vector_response(vector),
         any_axis=over_any_axis(calibration),
-        not_stated=list(dict.fromkeys(name for one in budgets.values() for name in one.not_stated)),
-        overdue=any(one.overdue for one in budgets.values()),
+        not_stated=list(dict.fromkeys(name for one in budgets.values() for name in one["not_stated"])),
+        overdue=any(one["overdue"] for one in budgets.values()),
         grid=uncertainty_grid(calibration) if grid else None,
     )
 

@@ -133,8 +133,8 @@ def _any_axis(calibration: Calibration) -> tuple[AnyAxisResult, ...]:
         AnyAxisResult(
             output=output, reach_dps=found.reach_dps, expanded_dps=found.bound_dps,
             aligned_expanded_dps=found.aligned_bound_dps,
-            across=() if found.cross_rates is None else tuple(found.cross_rates.about),
-            per_dps_across=None if found.cross_rates is None else found.cross_rates.per_dps, why=found.why,
+            across=() if found.cross_rates is None else tuple(found.cross_rates["about"]),
+            per_dps_across=None if found.cross_rates is None else found.cross_rates["per_dps"], why=found.why,
         )
         for output, found in over_any_axis(calibration).items()
     )  # fmt: skip

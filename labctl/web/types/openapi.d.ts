@@ -2695,7 +2695,7 @@ export interface components {
              */
             why: string;
             /** @description null: every body axis has an output. */
-            cross_rates: components["schemas"]["CrossRates"] | null;
+            cross_rates: components["schemas"]["CrossRatesJson"] | null;
         };
         /**
          * AppliedDraft
@@ -3532,23 +3532,79 @@ export interface components {
             modified_ms?: number | null;
         };
         /**
-         * BudgetLineResponse
+         * BudgetJson
+         * @description A result with its lines (GUM).
+         */
+        BudgetJson: {
+            /**
+             * Result
+             * @description Quantity of the budget: corrected_rate, bias, scale_factor, misalignment with an axis, delay or time_constant.
+             */
+            result: string;
+            /**
+             * Unit
+             * @description Unit of the result and of every contribution; 1: a ratio to the rate.
+             */
+            unit: string;
+            /**
+             * Value
+             * @description Value of a coefficient, in `unit`; null: the budget is that of a corrected rate.
+             */
+            value: number | null;
+            /**
+             * Lines
+             * @description The sources of uncertainty.
+             */
+            lines: components["schemas"]["BudgetLineJson"][];
+            /**
+             * Combined
+             * @description Combined standard uncertainty, in `unit`; null: a line of type A is unknown.
+             */
+            combined: number | null;
+            /**
+             * Effective Degrees Of Freedom
+             * @description By Welch-Satterthwaite; null: infinite, or unknown.
+             */
+            effective_degrees_of_freedom: number | null;
+            /**
+             * K
+             * @description Coverage factor for a probability of 95.45 %; null: unknown.
+             */
+            k: number | null;
+            /**
+             * Expanded
+             * @description Expanded uncertainty, k times `combined`, widened for known errors that are not corrected, in `unit`; null: unknown.
+             */
+            expanded: number | null;
+            /**
+             * Not Stated
+             * @description Sources that nothing states and that are not in the result.
+             */
+            not_stated: string[];
+            /**
+             * Overdue
+             * @description Whether a standard was past its due date when it was used.
+             */
+            overdue: boolean;
+        };
+        /**
+         * BudgetLineJson
          * @description One source of uncertainty; null is unknown, never 0.
          */
-        BudgetLineResponse: {
+        BudgetLineJson: {
             /**
              * Source
-             * @description Source of the uncertainty: `coefficients` of the fit, `model` (its form), `repeatability`, or the quantity that a reference standard realises, such as `clock`; `table_time` and `table_time_common`: time of a reference rate that changes.
+             * @description coefficients, model, repeatability, or the quantity of a reference standard.
              */
             source: string;
             /**
              * Name
-             * @description Name of the reference standard, with the number of its certificate.
+             * @description Name of the standard with its certificate, or of the data evaluated.
              */
             name: string;
             /**
              * Type
-             * @description Evaluated by statistics (A) or otherwise (B).
+             * @description Evaluated by statistics (A) or otherwise (B), GUM 2.3.2 and 2.3.3.
              * @enum {string}
              */
             type: "A" | "B";
@@ -3564,22 +3620,22 @@ export interface components {
             u: number | null;
             /**
              * Unit
-             * @description Unit of the input.
+             * @description Unit of `u`.
              */
             unit: string;
             /**
              * Sensitivity
-             * @description Derivative of the result along the input, per `unit`.
+             * @description Derivative of the result along the input, per `unit`; null: unknown.
              */
             sensitivity: number | null;
             /**
              * Contribution
-             * @description Magnitude of sensitivity times u, in the unit of the result.
+             * @description Magnitude of sensitivity times u, in the unit of the result; null: unknown.
              */
             contribution: number | null;
             /**
              * Degrees Of Freedom
-             * @description null: infinite.
+             * @description Degrees of freedom of `u`; null: infinite.
              */
             degrees_of_freedom: number | null;
             /**
@@ -3612,62 +3668,6 @@ export interface components {
              * @description Why a number is null or 0, or how it was evaluated.
              */
             why: string;
-        };
-        /**
-         * BudgetResponse
-         * @description A result with its lines (GUM).
-         */
-        BudgetResponse: {
-            /**
-             * Result
-             * @description Quantity of the budget: corrected_rate, bias, scale_factor, misalignment with an axis, delay or time_constant.
-             */
-            result: string;
-            /**
-             * Unit
-             * @description Unit of the result and of every contribution; 1: a ratio to the rate.
-             */
-            unit: string;
-            /**
-             * Value
-             * @description Of a coefficient.
-             */
-            value: number | null;
-            /**
-             * Lines
-             * @description Each source of uncertainty.
-             */
-            lines: components["schemas"]["BudgetLineResponse"][];
-            /**
-             * Combined
-             * @description Combined standard uncertainty; null: a line of type A is unknown.
-             */
-            combined: number | null;
-            /**
-             * Effective Degrees Of Freedom
-             * @description Welch-Satterthwaite; null: infinite.
-             */
-            effective_degrees_of_freedom: number | null;
-            /**
-             * K
-             * @description Coverage factor for a probability of 95.45 %.
-             */
-            k: number | null;
-            /**
-             * Expanded
-             * @description Expanded uncertainty: k times `combined`, widened so that it covers with the same probability where known errors are not corrected.
-             */
-            expanded: number | null;
-            /**
-             * Not Stated
-             * @description Standards that are not stated and therefore not in the result.
-             */
-            not_stated: string[];
-            /**
-             * Overdue
-             * @description Whether a standard was past its due date when it was used.
-             */
-            overdue: boolean;
         };
         /**
          * CalibrationRow
@@ -5427,25 +5427,25 @@ export interface components {
             reason?: string;
         };
         /**
-         * ContributionLines
-         * @description Contributions along one variable, deg/s.
+         * ContributionLinesJson
+         * @description Contributions along one variable.
          */
-        ContributionLines: {
+        ContributionLinesJson: {
             /**
              * At
-             * @description Rates, deg/s, or temperatures, deg C, at which the budget was computed.
+             * @description Points of the variable: rate, deg/s, or temperature, deg C.
              */
             at: number[];
             /**
              * Contributions
-             * @description For each source: its contribution, deg/s; null: not stated.
+             * @description Source -> contribution at each point, deg/s; null: not stated or unknown.
              */
             contributions: {
                 [key: string]: (number | null)[];
             };
             /**
              * Combined
-             * @description Combined standard uncertainty at each point, deg/s; null: a line of type A is unknown.
+             * @description Combined standard uncertainty at each point, deg/s; null: unknown.
              */
             combined: (number | null)[];
             /**
@@ -5455,24 +5455,24 @@ export interface components {
             expanded: (number | null)[];
         };
         /**
-         * ContributionsOver
-         * @description Contributions to the uncertainty of one axis, over rate and over temperature.
+         * ContributionsOverJson
+         * @description Contributions to the uncertainty of one axis.
          */
-        ContributionsOver: {
+        ContributionsOverJson: {
             /**
              * Temperature C
-             * @description Temperature at which `over_rate` was computed, deg C.
+             * @description Temperature of `over_rate`, deg C.
              */
             temperature_c: number;
             /**
              * Rate Dps
-             * @description Rate at which `over_temperature` was computed, deg/s.
+             * @description Rate of `over_temperature`, deg/s.
              */
             rate_dps: number;
-            /** @description Contributions over the rate, at `temperature_c`. */
-            over_rate: components["schemas"]["ContributionLines"];
-            /** @description Contributions over the temperature, at `rate_dps`. */
-            over_temperature: components["schemas"]["ContributionLines"];
+            /** @description Contributions over the rate. */
+            over_rate: components["schemas"]["ContributionLinesJson"];
+            /** @description Contributions over the temperature. */
+            over_temperature: components["schemas"]["ContributionLinesJson"];
         };
         /**
          * CourseJson
@@ -5727,10 +5727,10 @@ export interface components {
             views: components["schemas"]["Views"];
         };
         /**
-         * CrossRates
-         * @description What rates about axes without an output add to a corrected rate: nothing can correct it.
+         * CrossRatesJson
+         * @description What rates about axes without an output add to a corrected rate.
          */
-        CrossRates: {
+        CrossRatesJson: {
             /**
              * About
              * @description Body axes without an output.
@@ -5738,7 +5738,7 @@ export interface components {
             about: string[];
             /**
              * Per Dps
-             * @description Error of the corrected rate per deg/s about these axes, in the worst direction, with the coverage of U; null: unknown.
+             * @description Error per deg/s about these axes, in the worst direction, with the coverage of U, 1; null: see `why`.
              */
             per_dps: number | null;
             /**
@@ -9694,7 +9694,7 @@ export interface components {
             text: string;
             /**
              * Do
-             * @description What to do instead of certifying this version.
+             * @description What to do instead of certifying the version.
              */
             do: string;
         };
@@ -13265,7 +13265,7 @@ export interface components {
              * @description For each axis: the lines of the budget over rate and over temperature.
              */
             contributions: {
-                [key: string]: components["schemas"]["ContributionsOver"];
+                [key: string]: components["schemas"]["ContributionsOverJson"];
             };
         };
         /**
@@ -13320,7 +13320,7 @@ export interface components {
              * @description For each axis: the budget of the corrected rate, deg/s.
              */
             budget: {
-                [key: string]: components["schemas"]["BudgetResponse"];
+                [key: string]: components["schemas"]["BudgetJson"];
             };
             /**
              * Coefficients
@@ -13328,7 +13328,7 @@ export interface components {
              */
             coefficients: {
                 [key: string]: {
-                    [key: string]: components["schemas"]["BudgetResponse"];
+                    [key: string]: components["schemas"]["BudgetJson"];
                 };
             };
             /** @description null where one rate was given: about one axis after the other, the others at rest. */
