@@ -85,6 +85,16 @@ class DataSetHead(TypedDict):
     verification: bool
 
 
+def head_of(row: sa.RowMapping) -> DataSetHead:
+    """Return a row of the data sets, as far as its readings need it. Raises KeyError for a column that is absent."""
+    return DataSetHead(
+        recording_id=row["recording_id"], number=row["number"], position=row["position"], run=row["run"],
+        mounting=row["mounting"], table_rate_dps=row["table_rate_dps"], table_angle_deg=row["table_angle_deg"],
+        gate_from_s=row["gate_from_s"], power_on_s=row["power_on_s"], turn_deg=row["turn_deg"],
+        turn_u_deg=row["turn_u_deg"], encoder=row["encoder"], verification=row["verification"],
+    )  # fmt: skip
+
+
 def blocks_of(connection: sa.Connection, recording: int, number: int) -> list[dict[str, NDArray[np.generic]]]:
     """Return the unpacked blocks of a data set, in order."""
     return blocks_of_sets(connection, recording, [number]).get(number, [])

@@ -12,6 +12,7 @@ import sqlalchemy as sa
 from labctl.errors import NotFound
 from labctl.store.connection.database import Database
 from labctl.store.records import CertificationRow, ServedCalibration, Unit, Withdrawal
+from labctl.store.repositories.records_by_name import record_of, records_of
 from labctl.store.schema import tables
 
 
@@ -63,10 +64,11 @@ class Units:
     def get(self, serial: str) -> Unit:
         """Return a unit; raises NotFound, which says how a unit is added."""
         with self._database.reading() as connection:
-            row = connection.execute(sa.select(tables.units).where(tables.units.c.serial == serial, SEEN)).first()
+            wanted = sa.select(tables.units).where(tables.units.c.serial == serial, SEEN)
+            row = connection.execute(wanted).mappings().first()
         if row is None:
             raise NotFound(f"unit {serial!r} is not in this database; `labctl import DIR` or a campaign adds it")
-        return Unit(*row)
+        return record_of(Unit, row)
 
     def has(self, serial: str) -> bool:
         """Return whether a unit is there."""
@@ -97,7 +99,7 @@ class Units:
         """Return every unit, by serial number."""
         with self._database.reading() as connection:
             rows = connection.execute(sa.select(tables.units).where(SEEN).order_by(tables.units.c.serial))
-            return [Unit(*row) for row in rows]
+            return records_of(Unit, rows)
 
 
 _C, _X = tables.calibrations.c, tables.certifications.c
