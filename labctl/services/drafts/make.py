@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import cast
 
 from labctl.answers.calibrations import FitRequest
 from labctl.answers.drafts import DraftsRequest, DraftsResponse
-from labctl.answers.json_object import JsonObject
 from labctl.errors import Conflict, DataRefused, LabctlError
 from labctl.log import get_logger
 from labctl.progress import report_stage
@@ -61,7 +59,7 @@ def _make(store: Store, draft: DraftRow, rules: FitRules, at: datetime) -> None:
             return
     report = report_on(store, store.calibrations.get(draft.serial, version), draft.recording, rules)
     is_well = report.within_limits is not False and not report.objections
-    document = cast(JsonObject, report.model_dump(mode="json"))
+    document = report.model_dump(mode="json")
     event = DraftEvent(report.text, "info" if is_well else "warning")
     if store.drafts.conclude(draft.recording, document, event, at):
         log.info(
