@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from labctl.cli.campaign_acts import CampaignGroup
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import BenchName, CampaignId, Database, Json, SimulatedStart, WireLog, simulated_start
 from labctl.cli.output import console, print_json, table
@@ -14,7 +15,9 @@ from labctl.cli.printing.campaigns import print_campaign, print_plan, print_star
 if TYPE_CHECKING:
     pass
 
-app = typer.Typer(no_args_is_help=True, help="Campaigns: one run of a recipe on a bench with its units.")
+app = typer.Typer(
+    cls=CampaignGroup, no_args_is_help=True, help="Campaigns: one run of a recipe on a bench with its units."
+)
 
 Recipe = Annotated[str, typer.Argument(metavar="RECIPE", help="Recipe file, or the name of a shipped recipe.")]
 Clip = Annotated[

@@ -1,12 +1,15 @@
-"""`labctl campaign` watch, pause, resume, abort, confirm, draft: a campaign that runs, or was interrupted."""
+"""`labctl campaign` watch, resume, abort, confirm, draft: a campaign that runs, or was interrupted.
+
+A command that only sends the request of its act is no function here: `labctl.cli.campaign_acts` makes it.
+"""
 
 from __future__ import annotations
 
-import getpass
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from labctl.cli.campaign_acts import By, Id, Reason, person
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import BenchName, CampaignId, Database, Json, WireLogOnly
 from labctl.cli.output import console, print_json, stderr
@@ -18,19 +21,6 @@ if TYPE_CHECKING:
 
 #: How long an abort is followed until the bench is safe, and how often it is read, s.
 SAFE_WITHIN_S, LOOK_S = 120.0, 0.2
-
-Id = Annotated[int, typer.Argument(metavar="ID", help="Number of the campaign.")]
-By = Annotated[
-    str | None, typer.Option("--by", metavar="NAME", help="Name of the person; default: the user who is logged in.")
-]
-
-
-def person(by: str | None) -> str:
-    """Return who acts: the given name, or else the user who is logged in."""
-    try:
-        return by or getpass.getuser()
-    except (KeyError, OSError):
-        return "a person"
 
 
 def watch(campaign: CampaignId = None, as_json: Json = False, database: Database = None) -> None:
@@ -56,27 +46,6 @@ def watch(campaign: CampaignId = None, as_json: Json = False, database: Database
             if not answer.active:
                 break
             clock.sleep(1.0)
-    print_json(answer) if as_json else print_campaign(answer)
-
-
-def pause(
-    campaign: Id,
-    reason: Annotated[
-        str, typer.Option("--reason", metavar="TEXT", help="Reason for this action; it is recorded.")
-    ] = "paused from the command line",
-    by: By = None,
-    as_json: Json = False,
-    database: Database = None,
-) -> None:
-    """Pause a running campaign after the present data set; the bench is still monitored."""
-    from labctl.answers.campaigns import ReasonRequest
-    from labctl.services.commands.acts.pause import PAUSE_CAMPAIGN
-    from labctl.services.commands.open import execute
-    from labctl.services.commands.requests import ToCampaign
-
-    with one_clear_line():
-        request = ReasonRequest(reason=reason, by=person(by))
-        answer = execute(database, PAUSE_CAMPAIGN, ToCampaign(campaign, request))
     print_json(answer) if as_json else print_campaign(answer)
 
 
@@ -123,9 +92,7 @@ def resume(
 
 def abort(
     campaign: Id,
-    reason: Annotated[
-        str, typer.Option("--reason", metavar="TEXT", help="Reason for this action; it is recorded.")
-    ] = "aborted from the command line",
+    reason: Reason = "aborted from the command line",
     as_json: Json = False,
     database: Database = None,
 ) -> None:
@@ -250,5 +217,5 @@ def draft(
 
 def add_to(app: typer.Typer) -> None:
     """Put these commands beside the others of `labctl campaign`."""
-    for command in (watch, pause, resume, abort, confirm, draft):
+    for command in (watch, resume, abort, confirm, draft):
         app.command(command.__name__)(command)

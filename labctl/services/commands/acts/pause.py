@@ -30,8 +30,9 @@ PAUSE = CampaignAct(
     summary="Hold a campaign",
     description="Hold after the present data set. `wish` says that it was asked; `state` becomes `paused` when it "
     "holds.",
+    command_help="Pause a running campaign after the present data set; the bench is still monitored.",
+    command_defaults={"reason": "paused from the command line"},
     in_service=_in_service,
     in_foreground=_in_foreground,
     is_urgent=True,
 )
-PAUSE_CAMPAIGN = PAUSE.command
