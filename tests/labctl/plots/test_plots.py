@@ -236,7 +236,7 @@ def test_the_command_writes_the_report(tmp_path: Path) -> None:
     lab.run("fit", "FOG-0001", "--model", "ojeda2000")
     file = tmp_path / "report.html"
     shown = lab.json("criticise", "FOG-0001", "--report", str(file))
-    assert shown.views["sets"]["of"] == 121
+    assert shown["views"]["sets"]["of"] == 121
     text = file.read_text(encoding="utf-8")
     assert shown["text"][0] in text
     assert 'data-figure="numbers-ladder"' in text
