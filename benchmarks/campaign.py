@@ -8,9 +8,9 @@ import time
 from pathlib import Path
 
 from benchmarks.machine import describe
+from labctl.answers.campaigns import StartRequest
 from labctl.fitting import fit
 from labctl.services.campaigns.execution import run_here
-from labctl.services.schemas.campaigns import StartRequest
 from labctl.store import open_store
 
 #: Limits that the project has set itself.

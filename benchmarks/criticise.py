@@ -13,8 +13,8 @@ import time
 from pathlib import Path
 
 from benchmarks.machine import describe
+from labctl.answers.campaigns import StartRequest
 from labctl.services.campaigns.execution import run_here
-from labctl.services.schemas.campaigns import StartRequest
 
 #: Limits that the project has set itself, on two free cores.
 LIMITS = {"triaxial_first_s": 5.0, "triaxial_again_s": 2.0, "single_axis_first_s": 2.0, "memory_gib": 2.0}

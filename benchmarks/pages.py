@@ -12,8 +12,8 @@ import httpx
 from benchmarks.browser import chromium, marked_s, opened, version
 from benchmarks.machine import describe
 from benchmarks.served import serve
+from labctl.answers.campaigns import StartRequest
 from labctl.services.campaigns.execution import run_here
-from labctl.services.schemas.campaigns import StartRequest
 
 if TYPE_CHECKING:
     from playwright.sync_api import Page

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 
-from labctl.json_types import JsonObject
+from labctl.answers.json_object import JsonObject
 
 _ENCODER = json.JSONEncoder(sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
 

@@ -20,14 +20,9 @@ import httpx
 from httpx_sse import ServerSentEvent, connect_sse
 
 from instruments.clock import Clock, SystemClock
-from labctl.calibration import Calibration, read_calibration
-from labctl.calibration.certification import warn
-from labctl.errors import CalibrationWithdrawn
-from labctl.recording.files import recording_parts
-from labctl.service_connection import TIMEOUT_S, ServiceConnection, ServiceRefused, json_of, refusal
-from labctl.services.schemas.base import Request
-from labctl.services.schemas.calibrations import CalibrationRow, FitRequest, FitResponse
-from labctl.services.schemas.campaigns import (
+from labctl.answers.base import Request
+from labctl.answers.calibrations import CalibrationRow, FitRequest, FitResponse
+from labctl.answers.campaigns import (
     CampaignRequest,
     CampaignResponse,
     ConfirmRequest,
@@ -35,11 +30,16 @@ from labctl.services.schemas.campaigns import (
     ReasonRequest,
     ResumeRequest,
 )
-from labctl.services.schemas.certification import CalibrationStateResponse
-from labctl.services.schemas.documents.fixed import FixedCoefficients
-from labctl.services.schemas.recordings import ImportResponse, RecordingResponse
-from labctl.services.schemas.schedule import ScheduledResponse
-from labctl.services.schemas.units import UnitResponse
+from labctl.answers.certification import CalibrationStateResponse
+from labctl.answers.fixed_coefficients import FixedCoefficients
+from labctl.answers.recordings import ImportResponse, RecordingResponse
+from labctl.answers.schedule import ScheduledResponse
+from labctl.answers.units import UnitResponse
+from labctl.calibration import Calibration, read_calibration
+from labctl.calibration.certification import warn
+from labctl.errors import CalibrationWithdrawn
+from labctl.recording.files import recording_parts
+from labctl.service_connection import TIMEOUT_S, ServiceConnection, ServiceRefused, json_of, refusal
 from labctl.withdrawal import HEADER, Withdrawn, read_withdrawn
 
 __all__ = [

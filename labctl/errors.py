@@ -36,7 +36,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from labctl.json_types import JsonObject
+from labctl.answers.json_object import JsonObject
 from labctl.withdrawal import Withdrawn
 
 

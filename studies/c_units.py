@@ -8,10 +8,10 @@ from functools import partial
 
 import numpy as np
 
+from labctl.answers.fitted_model import Coefficient
 from labctl.calibration import Calibration, build_calibration, hash_of
 from labctl.fitting import fit
 from labctl.fitting.models.force_sensitivity import ForceSensitivity
-from labctl.json_types.models import Coefficient
 from labctl.recording import Recording, RecordingInfo
 from studies import hand_turns
 from studies.poses_simulation import Session, simulate_session

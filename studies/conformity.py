@@ -16,7 +16,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from labctl.certificates.document import AnyAxisResult, DecisionRule
+from labctl.answers.certificates import DecisionRule, OrderedConformity
+from labctl.certificates.document import AnyAxisResult
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.data.temperature.channel import with_temperature
 from labctl.fitting.estimation.fit import fit_preset
@@ -36,7 +37,6 @@ from labctl.fitting.uncertainty.vector_bound import PLACES, vector_bounds
 from labctl.recording import Recording
 from labctl.services.certificates.conformity import NoAcceptance, NoDecision, conformity
 from labctl.services.certificates.evidence import Errors, VerifiedError
-from labctl.services.schemas.documents.certificates import OrderedConformity
 from studies.rate_vector_coverage import CASES, HIDDEN_DPS, MODEL, corrected, info_of
 from studies.rate_vector_simulation import AXES, Bench, Noise, Plan, Statement, Unit, campaign, in_ball
 from studies.report_tables import wilson

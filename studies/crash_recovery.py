@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from instruments.bench_config import BenchFile
+from labctl.answers.campaigns import ResumeRequest
 from labctl.services.campaigns import execution
 from labctl.services.campaigns.preparation import prepare
 from labctl.services.campaigns.resume import prepare_resume
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.campaigns import ResumeRequest
 from labctl.store import Store
 from studies.crashable_process import Killed, Life, MortalDatabase, World, all_readings, complete_data_sets
 from studies.databases import close_server, new_database

@@ -20,6 +20,8 @@ from fastapi.testclient import TestClient
 from typer.testing import CliRunner
 
 from instruments.clock import VirtualClock
+from labctl.answers.calibrations import FitRequest
+from labctl.answers.certificates import CertificateOrder, CertificateRequest
 from labctl.api.app import create_app
 from labctl.certificates.document import Certificate
 from labctl.certificates.readable import readable_certificate
@@ -30,8 +32,6 @@ from labctl.services.calibrations.served import calibration_file
 from labctl.services.certificates.issue import issue
 from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import limits_of, load_bench, load_recipe
-from labctl.services.schemas.calibrations import FitRequest
-from labctl.services.schemas.documents.certificates import CertificateOrder, CertificateRequest
 from labctl.services.simulation.plan_simulation import hidden_recording
 from labctl.store import Store, open_store
 from procedures.planning.plan import make_plan

@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, Any
 import httpx
 import numpy as np
 
-from labctl.services.schemas.campaigns import BENCH_CHECKS
+from labctl.answers.campaigns import BENCH_CHECKS
 from studies.stop_browser import Shown, chromium, opened, picture, press_stop, shown_over
 from studies.stop_rig import RECIPE, Heard, Table, simulators
 from studies.stops import SAID_S, TOLD_S, Service

@@ -25,7 +25,7 @@ from typing import Any
 import httpx
 import numpy as np
 
-from labctl.services.schemas.campaigns import BENCH_CHECKS
+from labctl.answers.campaigns import BENCH_CHECKS
 from labctl.store.connection.database import Database
 from studies.crashable_process import all_readings, complete_data_sets
 from studies.databases import close_server, new_database

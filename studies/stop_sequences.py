@@ -27,11 +27,11 @@ import httpx
 import numpy as np
 
 from instruments.errors import InstrumentError
+from labctl.answers.campaigns import BENCH_CHECKS, CampaignRequest, ResumeRequest
 from labctl.errors import LabctlError
 from labctl.processes.calls import Caller
 from labctl.processes.settings import CALLS, ServeRequest
 from labctl.services.commands.requests import CampaignResume, CampaignStart
-from labctl.services.schemas.campaigns import BENCH_CHECKS, CampaignRequest, ResumeRequest
 from labctl.stop.places import places_of
 from studies import forked_service
 from studies.stop_rig import RECIPE, Heard, simulators

@@ -28,7 +28,7 @@ from pathlib import Path
 import httpx
 import numpy as np
 
-from labctl.services.schemas.campaigns import BENCH_CHECKS
+from labctl.answers.campaigns import BENCH_CHECKS
 from studies.attack_kinds import criticisms_of
 from studies.stop_rig import RECIPE, Table, family, simulators
 

@@ -10,6 +10,7 @@ from functools import cache
 from pathlib import Path
 
 import typer.main
+from typer._click.core import Context
 from typer.core import TyperCommand, TyperGroup, TyperOption
 
 from labctl.cli.app import app
@@ -193,7 +194,7 @@ def faults_of(line: str) -> Iterator[str]:
             if name != "--help" and not any(name in option for option in options_of(at)):
                 yield f"{word} in {line!r}"
         elif groups and re.match(r"^[a-z|-]+$", word) and word != "|":
-            found = [(name, [group.commands.get(name) for group in groups]) for name in word.split("|")]
+            found = [(name, [group.get_command(Context(group), name) for group in groups]) for name in word.split("|")]
             yield from (f"{name} in {line!r}" for name, commands in found if not any(commands))
             at = [command for _, commands in found for command in commands if command]
         elif groups:  # an argument where a command is due: the line goes on as text

@@ -71,7 +71,7 @@ WORDS = {phrase: re.compile(rf"\b(?:{phrase})\b", re.IGNORECASE) for phrase in B
 KEPT = {
     ("labctl/api/middleware.py", "nobody"),
     ("labctl/services/lab_service.py", "look at the bench"),
-    ("labctl/services/schemas/service.py", "look at the bench"),
+    ("labctl/answers/service.py", "look at the bench"),
 }
 #: Recognises reasons that older versions wrote into the database.
 OLD_REASONS = "labctl/services/campaigns/advice.py"

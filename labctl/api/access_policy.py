@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from fastapi import Depends, Request, Security
 from fastapi.security import HTTPBearer
 
+from labctl.answers.admin import Role
 from labctl.services.admin.api_keys import require_role
-from labctl.services.schemas.admin import Role
 
 READING = frozenset({"GET", "HEAD", "OPTIONS"})
 #: Paths that may need a computation; everything else that is read is a file or a few figures.

@@ -6,11 +6,11 @@ from collections.abc import Callable
 
 from fastapi import APIRouter
 
+from labctl.answers.campaigns import CampaignResponse
 from labctl.api.dependencies import ControlPoolDep, ServiceDep, command_route
 from labctl.services.commands.acts.campaign_act import BodyT, CampaignAct
 from labctl.services.commands.requests import ToCampaign
 from labctl.services.lab_service import LabService
-from labctl.services.schemas.campaigns import CampaignResponse
 
 
 def add_act_route(router: APIRouter, act: CampaignAct[BodyT]) -> None:

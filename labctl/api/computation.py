@@ -16,6 +16,8 @@ import anyio.to_thread
 from fastapi import Request
 from starlette.exceptions import HTTPException
 
+from labctl.answers.base import ResponseModel
+from labctl.answers.criticism import StageResponse
 from labctl.api.event_stream import EventStream
 from labctl.api.problems import as_problem
 from labctl.errors import LabctlError
@@ -25,8 +27,6 @@ from labctl.services.commands.command import Command, RequestT, ResponseT
 from labctl.services.computation.computation import Work
 from labctl.services.computation.job import Call
 from labctl.services.lab_service import LabService
-from labctl.services.schemas.base import ResponseModel
-from labctl.services.schemas.criticism import StageResponse
 
 #: An open stream says that it is alive after this long without a stage, s.
 HEARTBEAT_S = 10.0

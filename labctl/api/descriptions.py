@@ -16,7 +16,7 @@ from typing import Any, get_type_hints
 from fastapi import FastAPI
 from typing_extensions import Doc, get_original_bases, is_typeddict
 
-from labctl import json_types
+from labctl import answers
 
 
 class DescribedAPI(FastAPI):
@@ -35,13 +35,13 @@ class DescribedAPI(FastAPI):
 
 
 def typed_dictionaries() -> dict[str, dict[str, str]]:
-    """Return name -> field -> description of the typed dictionaries of `labctl.json_types`.
+    """Return name -> field -> description of the typed dictionaries of `labctl.answers`.
 
     Each is there under its name and under the one that an OpenAPI document gives it where two classes share a name.
     """
     kinds: dict[str, type] = {}
     own: dict[str, dict[str, str]] = {}
-    for found in pkgutil.walk_packages(json_types.__path__, f"{json_types.__name__}."):
+    for found in pkgutil.walk_packages(answers.__path__, f"{answers.__name__}."):
         module = import_module(found.name)
         classes = {
             node.name: node for node in ast.parse(inspect.getsource(module)).body if isinstance(node, ast.ClassDef)

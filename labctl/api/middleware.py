@@ -11,6 +11,7 @@ from starlette.exceptions import HTTPException
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from labctl.acting_user import Actor, acting
+from labctl.answers.admin import Caller, Role
 from labctl.api.access_policy import API, OPEN, PROVEN, READING, STOPS, UPLOADS, AccessPolicy, role_needed
 from labctl.api.connection_limits import RESERVED
 from labctl.api.problems import as_problem
@@ -19,7 +20,6 @@ from labctl.service_connection import USER_HEADER
 from labctl.services.admin.api_keys import identify, require_role
 from labctl.services.admin.key_memory import KeyMemory
 from labctl.services.lab_service import LabService
-from labctl.services.schemas.admin import Caller, Role
 from labctl.web import is_page
 
 #: Uploads at once: while one comes, each of its files is a file here.

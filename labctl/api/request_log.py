@@ -15,11 +15,11 @@ from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from instruments.clock import Clock, SystemClock
+from labctl.answers.admin import Role
 from labctl.api.access_policy import role_needed
 from labctl.log import get_logger
 from labctl.log.context import begin_request, new_request_id
 from labctl.log.repetition import RepetitionLimit
-from labctl.services.schemas.admin import Role
 
 log = get_logger()
 

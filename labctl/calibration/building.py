@@ -6,6 +6,9 @@ from collections.abc import Mapping, Sequence
 from datetime import date, datetime
 from importlib.metadata import version as package_version
 
+from labctl.answers.budget import BudgetJson, UncertaintyJson
+from labctl.answers.calibration_file import AxisEvidenceJson, CalibrationJson, OutputUnitJson
+from labctl.answers.json_object import JsonObject
 from labctl.calibration.document import SCHEMA, Calibration, limits
 from labctl.canonical_json import hash_of
 from labctl.fitting import FitResult, FittedModel, coefficients_json
@@ -14,9 +17,6 @@ from labctl.fitting.models.memory import state_json
 from labctl.fitting.models.paper_units import in_paper_units
 from labctl.fitting.uncertainty import AxisEvidence, BenchConditions, conditions_of, response_budgets
 from labctl.fitting.uncertainty.document import Covered, uncertainty_json
-from labctl.json_types import JsonObject
-from labctl.json_types.budget import BudgetJson, UncertaintyJson
-from labctl.json_types.calibrations import AxisEvidenceJson, CalibrationJson, OutputUnitJson
 from labctl.recording import OutputUnit, RecordingInfo
 
 HOW_TO_USE = (

@@ -12,7 +12,7 @@ import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import Literal, cast, get_args
+from typing import Literal, get_args
 
 from labctl.canonical_json import with_own_hash
 
@@ -67,11 +67,13 @@ class Certification:
 
 def read_certification(given: Mapping[str, object]) -> Certification:
     """Read the value of `certification`. Raises LookupError, TypeError or ValueError for one that is not whole."""
-    state, due = given["state"], given["due"]
-    if state not in get_args(State):
-        raise ValueError(f"the state is {str(state)[:80]!r}, but must be one of {', '.join(get_args(State))}")
+    states: tuple[State, ...] = get_args(State)
+    stated, due = given["state"], given["due"]
+    state = next((each for each in states if each == stated), None)
+    if state is None:
+        raise ValueError(f"the state is {str(stated)[:80]!r}, but must be one of {', '.join(states)}")
     return Certification(
-        cast(State, state), str(given["by"]), str(given["reason"]), _instant(given["at"]),
+        state, str(given["by"]), str(given["reason"]), _instant(given["at"]),
         None if due is None else _instant(due), str(given["calibration_hash"]),
     )  # fmt: skip
 

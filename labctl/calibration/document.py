@@ -13,17 +13,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 from instruments.configuration import changed
+from labctl.answers.calibration_file import CalibrationJson
 from labctl.calibration.certification import Certification, read_certification
 from labctl.canonical_json import canonical, canonical_and_hash
 from labctl.errors import BadCalibrationFile, OtherConfiguration
 from labctl.fitting.data.channels import BODY_AXES
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.models.force_sensitivity import ForceSensitivity
-from labctl.json_types.calibrations import CalibrationJson
 
 if TYPE_CHECKING:  # need pydantic, which costs as much to load as the rest of a robot's program
+    from labctl.answers.recording_head import OutputUnit
     from labctl.fitting.uncertainty.conditions import BenchConditions
-    from labctl.recording.info import OutputUnit
 
 SCHEMA = "labctl-calibration/1"
 #: The largest calibration file that is read; one of 6 axes' temperature tables has a fiftieth of it.
@@ -99,7 +99,7 @@ class Calibration:
     @property
     def output(self) -> dict[str, OutputUnit]:
         """How each axis's output becomes a rate before it is corrected."""
-        from labctl.recording.info import OutputUnit  # noqa: PLC0415  needs pydantic
+        from labctl.answers.recording_head import OutputUnit  # noqa: PLC0415  needs pydantic
 
         with _reading("output"):
             units = {axis: OutputUnit.model_validate(unit) for axis, unit in self.document["output"].items()}

@@ -11,17 +11,12 @@ from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from instruments.laboratory import Contact, Laboratory
+from instruments.laboratory import Laboratory
+from labctl.answers.certificates import Customer, DecisionRule, Use
 from labctl.canonical_json import canonical
 
 SCHEMA = "labctl-certificate/1"
 TITLE = "Calibration certificate"
-#: Of ILAC-G8:09/2019: 4.2.1 simple acceptance; 4.2.2 a guard band as wide as the expanded uncertainty.
-DecisionRule = Literal["simple", "guard-band"]
-#: Rotations that a statement holds for: about any axis, or about the axis of each output with the others at rest.
-Use = Literal["any axis", "own axis"]
-
-
 #: What a statement rests on: data sets that were measured to verify, or those that were fitted.
 Evidence = Literal["verification", "fitted"]
 
@@ -30,13 +25,6 @@ class Part(BaseModel):
     """A part of the certificate; it is written once and not changed."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-class Customer(Contact):
-    """Who ordered the calibration."""
-
-    contact: str = Field(default="", description="Person to ask.")
-    order: str = Field(default="", description="Order number of the customer.")
 
 
 class Item(Part):

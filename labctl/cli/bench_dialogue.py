@@ -11,7 +11,7 @@ from labctl.cli.output import console
 from labctl.services.benches.new_bench import parse_setting
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.benches import FoundResponse
+    from labctl.answers.benches import FoundResponse
 
 
 def asking(section: str, key: str, what: str, proposal: object) -> object:

@@ -14,7 +14,7 @@ from rich.table import Table
 from rich.text import Text
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.warnings import DataWarning
+    from labctl.answers.inspection import DataWarning
 
 #: Without a terminal, lines are not cut to its width. Texts are printed as they are: a word in brackets is no markup.
 console = Console(highlight=False, markup=False, emoji=False, width=None if sys.stdout.isatty() else 160)

@@ -14,7 +14,7 @@ from labctl.cli.output import stderr
 from labctl.cli.turn_text import turn_text
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.campaigns import CampaignResponse
+    from labctl.answers.campaigns import CampaignResponse
 
 #: Widths of the bar: the other columns of its line take 27 characters.
 BAR_WIDTH, LEAST_BAR_WIDTH, OTHER_COLUMNS = 28, 8, 27

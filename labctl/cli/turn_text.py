@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.campaigns import CampaignResponse
+    from labctl.answers.campaigns import CampaignResponse
 
 
 def turn_text(answer: CampaignResponse) -> str:

@@ -7,6 +7,7 @@ import pprint
 
 import numpy as np
 
+from labctl.answers.json_object import JsonObject
 from labctl.calibration import Calibration
 from labctl.compensator import MARGIN_C, output_limits_dps
 from labctl.errors import BadInput
@@ -31,7 +32,6 @@ from labctl.fitting.models.matrix_form import linear_of
 from labctl.fitting.models.memory import split_memory
 from labctl.fitting.models.polynomial_surface import surface_of
 from labctl.fitting.models.sine_form import FOLLOWED, STEPS, sine_form_of
-from labctl.json_types import JsonObject
 
 NAME = "python"
 #: Python's floats are labctl's; sums in another order differ by this, deg/s at most (tests hold it to this).

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
+from labctl.answers.budget import UncertaintyJson, VectorBoundJson
 from labctl.calibration import Calibration
-from labctl.json_types.budget import UncertaintyJson, VectorBoundJson
 
 
 def bounds_dps(calibration: Calibration) -> dict[str, float | None]:

@@ -8,7 +8,7 @@ from html import escape
 import plotly.graph_objects as go
 from plotly.colors import qualitative
 
-from labctl.json_types.budget import ContributionLinesJson, ContributionsOverJson
+from labctl.answers.budget import ContributionLinesJson, ContributionsOverJson
 from labctl.plots.theme import INK, grid_of, place
 
 #: Colours of the sources, in the order in which they appear first; the sums are drawn in the colour of the text.

@@ -7,7 +7,7 @@ from html import escape
 
 import plotly.graph_objects as go
 
-from labctl.json_types.inspection import CourseJson, MarkJson
+from labctl.answers.inspection import CourseJson, MarkJson
 from labctl.plots.page import figure_part, whole_page
 from labctl.plots.registry import Picture
 from labctl.plots.theme import ACCENT, GAP_PX, TEMPLATE, WARM, colour_of, grid_of, place, translucent

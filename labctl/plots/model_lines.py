@@ -7,7 +7,7 @@ from typing import TypeVar
 
 import plotly.graph_objects as go
 
-from labctl.json_types.answers import ComparisonJson
+from labctl.answers.comparison import ComparisonResponse
 from labctl.plots.temperature_scale import temperature_colour, temperature_marker
 from labctl.plots.theme import grid_of, place
 
@@ -18,30 +18,30 @@ CAMERA = {"eye": {"x": 1.55, "y": 1.55, "z": 0.9}, "center": {"x": 0.0, "y": 0.0
 ASPECT = {"x": 1.0, "y": 1.0, "z": 0.8}
 
 
-def error_over_rate(comparison: ComparisonJson) -> go.Figure | None:
+def error_over_rate(comparison: ComparisonResponse) -> go.Figure | None:
     """Return a panel for each output and position: measured errors as dots, a line for each temperature level."""
-    columns = comparison["columns"]
-    if not columns["dataset"]:
+    columns = comparison.columns
+    if not columns.dataset:
         return None
-    axes, positions = _in_order(columns["axis"]), _in_order(columns["position"])
+    axes, positions = _in_order(columns.axis), _in_order(columns.position)
     panels = [(axis, there) for axis in axes for there in positions]
-    low, high = min(columns["temperature_c"]), max(columns["temperature_c"])
+    low, high = min(columns.temperature_c), max(columns.temperature_c)
     figure = grid_of([f"output {a}, turning about {p}" for a, p in panels], len(positions), horizontal_spacing=0.09)
-    pairs = list(zip(columns["axis"], columns["position"], strict=True))
-    lines = {(line["axis"], line["position"]): line for line in comparison["over_rate"]}
+    pairs = list(zip(columns.axis, columns.position, strict=True))
+    lines = {(line.axis, line.position): line for line in comparison.over_rate}
     for panel, (axis, there) in enumerate(panels):
         where, line = place(panel, len(positions)), lines[axis, there]
-        for level, error in zip(line["level"], line["error_dps"], strict=True):
+        for level, error in zip(line.level, line.error_dps, strict=True):
             shade = {"color": temperature_colour(level, low, high), "width": 1.5}
             figure.add_trace(
-                go.Scatter(x=line["at"], y=error, mode="lines", line=shade, name=f"{level:.3g} deg C"), **where
+                go.Scatter(x=line.at, y=error, mode="lines", line=shade, name=f"{level:.3g} deg C"), **where
             )
         rows = [k for k, pair in enumerate(pairs) if pair == (axis, there)]
         figure.add_trace(
             go.Scatter(
-                x=_of(columns["table_rate_dps"], rows), y=_of(columns["measured_error_dps"], rows), mode="markers",
-                name=f"{axis} about {there}", customdata=_of(columns["dataset"], rows),
-                marker=temperature_marker(_of(columns["temperature_c"], rows), low, high, size=4),
+                x=_of(columns.table_rate_dps, rows), y=_of(columns.measured_error_dps, rows), mode="markers",
+                name=f"{axis} about {there}", customdata=_of(columns.dataset, rows),
+                marker=temperature_marker(_of(columns.temperature_c, rows), low, high, size=4),
                 hovertemplate="data set %{customdata}<br>%{x:.5g} deg/s: %{y:.4g} deg/s<extra></extra>",
             ),
             **where,
@@ -51,31 +51,31 @@ def error_over_rate(comparison: ComparisonJson) -> go.Figure | None:
     return figure
 
 
-def full_turn(comparison: ComparisonJson) -> go.Figure | None:
+def full_turn(comparison: ComparisonResponse) -> go.Figure | None:
     """Return the error after a full turn over rate and temperature, before and after; None where nothing turns."""
-    columns = comparison["columns"]
-    rows = [k for k, error in enumerate(columns["turn_before_deg"]) if error is not None]
+    columns = comparison.columns
+    rows = [k for k, error in enumerate(columns.turn_before_deg) if error is not None]
     if not rows:
         return None
-    axes = _in_order(_of(columns["axis"], rows))
+    axes = _in_order(_of(columns.axis, rows))
     words = ("only static bias subtracted", "after the calibration")
     figure = grid_of(
         [f"{axis}: {word}" for axis in axes for word in words], 2, specs=[[{"type": "scene"}] * 2 for _ in axes]
     )
-    low, high = min(columns["temperature_c"]), max(columns["temperature_c"])
+    low, high = min(columns.temperature_c), max(columns.temperature_c)
     for row, axis in enumerate(axes, 1):
-        own = [k for k in rows if columns["axis"][k] == axis]
+        own = [k for k in rows if columns.axis[k] == axis]
         errors = {
-            "turn_before_deg": _known(_of(columns["turn_before_deg"], own)),
-            "turn_after_deg": _known(_of(columns["turn_after_deg"], own)),
+            "turn_before_deg": _known(_of(columns.turn_before_deg, own)),
+            "turn_after_deg": _known(_of(columns.turn_after_deg, own)),
         }
         least, most = (end(value for values in errors.values() for value in values) for end in (min, max))
         for col, (name, values) in enumerate(errors.items(), 1):
-            marker = temperature_marker(_of(columns["temperature_c"], own), low, high, size=3)
+            marker = temperature_marker(_of(columns.temperature_c, own), low, high, size=3)
             figure.add_trace(
                 go.Scatter3d(
-                    x=_of(columns["own_rate_dps"], own), y=_of(columns["temperature_c"], own), z=values,
-                    mode="markers", name=f"{axis} {name}", customdata=_of(columns["dataset"], own), marker=marker,
+                    x=_of(columns.own_rate_dps, own), y=_of(columns.temperature_c, own), z=values,
+                    mode="markers", name=f"{axis} {name}", customdata=_of(columns.dataset, own), marker=marker,
                     hovertemplate="data set %{customdata}<br>%{x:.4g} deg/s, %{y:.3g} deg C: %{z:.3g} deg",
                 ),
                 row=row, col=col,

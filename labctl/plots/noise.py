@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import plotly.graph_objects as go
 
-from labctl.json_types.answers import CriticismJson, LadderJson
-from labctl.json_types.noise import AllanJson
-from labctl.json_types.views import Numbers, Repeats, Views
+from labctl.answers.criticism import CriticismResponse
+from labctl.answers.ladder import LadderResponse
+from labctl.answers.noise import AllanJson
+from labctl.answers.views import Numbers, Repeats
 from labctl.plots.theme import ACCENT, INK, WARM, colour_of, grid_of, place
 
 
-def allan(answer: CriticismJson) -> go.Figure | None:
+def allan(answer: CriticismResponse) -> go.Figure | None:
     """Return the Allan deviation with its 95 % interval and the fitted terms; None without a static record."""
-    noise = answer.get("noise")
-    static = noise["static"] if noise else None
+    static = answer.noise["static"]
     if not static:
         return None
     axes = static["axes"]
@@ -58,9 +58,9 @@ def _figures_text(axis: str, line: AllanJson) -> str:
     return f"{axis}: {', '.join(said) or 'no slope shows'}"
 
 
-def repeats(answer: CriticismJson) -> go.Figure | None:
+def repeats(answer: CriticismResponse) -> go.Figure | None:
     """Return the differences of points measured again against the time between; None where nothing was repeated."""
-    views = answer.get("views") or Views()
+    views = answer.views
     lines = views.get("repeats") or []
     if not lines:
         return None
@@ -97,23 +97,23 @@ def _repeats_text(line: Repeats) -> str:
     return f"{line['axis']}: {line['over_floor'] or 0.0:.2f} of the floor{drawn}"
 
 
-def ladder(answer: LadderJson) -> go.Figure | None:
+def ladder(answer: LadderResponse) -> go.Figure | None:
     """Return the errors of every version down to the noise floor; None without any error."""
-    steps = [step for step in answer["steps"] if step["rms_dps"] is not None]
+    steps = [step for step in answer.steps if step.rms_dps is not None]
     if not steps:
         return None
     figure = grid_of([""], 1)
-    names = [f"{step['version']}: {step['model']}" for step in steps]
-    own, unseen = [step["rms_dps"] for step in steps], [step["heldout_rms_dps"] for step in steps]
+    names = [f"{step.version}: {step.model}" for step in steps]
+    own, unseen = [step.rms_dps for step in steps], [step.heldout_rms_dps for step in steps]
     for errors, word, colour in ((own, "on its own data", ACCENT), (unseen, "held out", WARM)):
         figure.add_trace(
             go.Scatter(
                 x=names, y=errors, mode="lines+markers", line={"color": colour, "shape": "hv"},
-                name=word, text=[", ".join(step["effects"]) for step in steps],
+                name=word, text=[", ".join(step.effects) for step in steps],
                 hovertemplate="%{y:.4g} deg/s<br>%{text}<extra></extra>",
             )
         )  # fmt: skip
-    floor = answer["noise_floor_dps"]
+    floor = answer.noise_floor_dps
     if floor:
         line = {"color": INK, "dash": "dash"}
         figure.add_trace(

@@ -7,7 +7,7 @@ from html import escape
 
 import plotly.graph_objects as go
 
-from labctl.json_types.reproduction import PaperFigure, PaperNumber, PaperPage, PaperPanel, PaperTrace
+from labctl.answers.reproduction import PaperFigure, PaperNumber, PaperPage, PaperPanel, PaperTrace
 from labctl.plots.page import figure_part, table_part, whole_page
 from labctl.plots.registry import Picture
 from labctl.plots.temperature_scale import TEMPERATURE_SCALE

@@ -8,8 +8,9 @@ from typing import Generic, TypeVar
 
 import plotly.graph_objects as go
 
-from labctl.json_types.answers import ComparisonJson, CriticismJson, LadderJson
-from labctl.json_types.views import Views
+from labctl.answers.comparison import ComparisonResponse
+from labctl.answers.criticism import CriticismResponse
+from labctl.answers.ladder import LadderResponse
 from labctl.plots import model_lines, noise, residual_lines, residual_maps, spectra
 
 AnswerT = TypeVar("AnswerT")
@@ -150,12 +151,9 @@ COMPARED = (
 
 
 def pictures_of(
-    criticism: CriticismJson, ladder: LadderJson | None = None, comparison: ComparisonJson | None = None
+    criticism: CriticismResponse, ladder: LadderResponse | None = None, comparison: ComparisonResponse | None = None
 ) -> list[Picture]:
-    """Return the pictures of a criticism, a ladder and a comparison, as far as there is something to draw.
-
-    All three as JSON.
-    """
+    """Return the pictures of a criticism, a ladder and a comparison, as far as there is something to draw."""
     found = [_picture(kind, criticism, _effects(kind.id, criticism)) for kind in KINDS]
     found += [_picture(kind, comparison, ()) for kind in COMPARED if comparison is not None]
     if ladder is not None:
@@ -168,8 +166,8 @@ def _picture(kind: _Kind[AnswerT], answer: AnswerT, effects: tuple[str, ...]) ->
     return Picture(kind.id, kind.title, kind.caption, figure, effects) if figure is not None else None
 
 
-def _effects(view: str, criticism: CriticismJson) -> tuple[str, ...]:
-    views = criticism.get("views") or Views()
+def _effects(view: str, criticism: CriticismResponse) -> tuple[str, ...]:
+    views = criticism.views
     draws = views.get("draws") or {}
     if view != "channels":
         return tuple(draws.get(view, ()))

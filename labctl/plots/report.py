@@ -5,29 +5,30 @@ from __future__ import annotations
 from collections.abc import Sequence
 from html import escape
 
-from labctl.json_types.answers import ComparisonJson, CriticismJson, LadderJson
-from labctl.json_types.criticism import CriticisedErrors, NotTestable, Suspect, WorstDataSet
+from labctl.answers.comparison import ComparisonResponse
+from labctl.answers.criticism import CriticisedErrors, CriticismResponse, NotTestable, Suspect, WorstDataSet
+from labctl.answers.ladder import LadderResponse
 from labctl.plots.page import figure_part, table_part, whole_page
 from labctl.plots.registry import pictures_of
 
 
 def report_html(
-    criticism: CriticismJson, ladder: LadderJson | None = None, comparison: ComparisonJson | None = None
+    criticism: CriticismResponse, ladder: LadderResponse | None = None, comparison: ComparisonResponse | None = None
 ) -> str:
     """Return the page: the verdict in words, the figures behind it, then the pictures with how to read them."""
     pictures = pictures_of(criticism, ladder, comparison)
-    title = f"{criticism['serial']}, version {criticism['version']}, against recording {criticism['recording']}"
-    first, *others = [escape(line) for line in criticism["text"]]
+    title = f"{criticism.serial}, version {criticism.version}, against recording {criticism.recording}"
+    first, *others = [escape(line) for line in criticism.text]
     parts = [
         f"<h1>{escape(title)}</h1>",
         f'<p class="verdict">{first}</p>',
         *(f"<p>{line}</p>" for line in others),
-        _errors(criticism["error"]),
-        _suspects(criticism["suspects"]),
-        *(f"<p>To distinguish them:  {escape(str(e['do']))}.</p>" for e in criticism["experiments"]),
+        _errors(criticism.error),
+        _suspects(criticism.suspects),
+        *(f"<p>To distinguish them:  {escape(str(e['do']))}.</p>" for e in criticism.experiments),
         *(figure_part(picture) for picture in pictures),
-        _worst(criticism.get("worst", ())),
-        _not_testable(criticism["not_testable"]),
+        _worst(criticism.worst),
+        _not_testable(criticism.not_testable),
     ]
     return whole_page(title, parts, drawn=bool(pictures))
 
@@ -38,9 +39,9 @@ def _number(value: float | None) -> str:
 
 def _errors(error: CriticisedErrors) -> str:
     figures = (
-        ("left after the fit", error.get("rms_dps")),
-        ("at temperatures left out of the fit", error.get("heldout_rms_dps")),
-        ("noise floor", error.get("noise_floor_dps")),
+        ("left after the fit", error["rms_dps"]),
+        ("at temperatures left out of the fit", error["heldout_rms_dps"]),
+        ("noise floor", error["noise_floor_dps"]),
     )
     return table_part(("RMS error", "deg/s"), [(word, _number(figure)) for word, figure in figures])
 

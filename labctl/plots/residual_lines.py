@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import plotly.graph_objects as go
 
-from labctl.json_types.answers import CriticismJson
-from labctl.json_types.views import DataSetColumns, Numbers, TimeLine, Views
+from labctl.answers.criticism import CriticismResponse
+from labctl.answers.views import DataSetColumns, Numbers, TimeLine
 from labctl.plots.theme import WARM, banded, colour_of, dots, grid_of, place
 
 HOUR_S = 3600.0
@@ -31,9 +31,9 @@ def label_of(channel: str) -> str:
     return LABELS.get(channel, channel)
 
 
-def channels(answer: CriticismJson) -> go.Figure | None:
+def channels(answer: CriticismResponse) -> go.Figure | None:
     """Return the residual against every channel; None without any."""
-    views = answer.get("views") or Views()
+    views = answer.views
     lines = views.get("channels") or []
     if not lines:
         return None
@@ -77,12 +77,12 @@ def _dots(
     )  # fmt: skip
 
 
-def time(answer: CriticismJson) -> go.Figure | None:
+def time(answer: CriticismResponse) -> go.Figure | None:
     """Return the residual of each axis against time, power-ons as lines, and the temperature below.
 
     Where no time is known it is against the order of the data sets. None where there is nothing to draw.
     """
-    views = answer.get("views") or Views()
+    views = answer.views
     lines, sets = views.get("time") or [], views.get("sets") or DataSetColumns()
     if not lines or not sets:
         return None
@@ -126,9 +126,9 @@ def _time_title(line: TimeLine) -> str:
     return f"{line['axis']}: {', '.join(said)} (drift taken out)" if said else line["axis"]
 
 
-def previous_rate(answer: CriticismJson) -> go.Figure | None:
+def previous_rate(answer: CriticismResponse) -> go.Figure | None:
     """Return the residual against the rate before; None where it is not known."""
-    views = answer.get("views") or Views()
+    views = answer.views
     lines = views.get("previous_rate") or []
     if not lines:
         return None
@@ -144,9 +144,9 @@ def previous_rate(answer: CriticismJson) -> go.Figure | None:
     return figure
 
 
-def legs(answer: CriticismJson) -> go.Figure | None:
+def legs(answer: CriticismResponse) -> go.Figure | None:
     """Return the residual reached from below minus that from above, by temperature and rate; None without both."""
-    lines = (answer.get("views") or Views()).get("legs") or []
+    lines = answer.views.get("legs") or []
     if not lines:
         return None
     figure = grid_of([_title(line["axis"], line["z"]) for line in lines], 2)
@@ -158,9 +158,9 @@ def legs(answer: CriticismJson) -> go.Figure | None:
     return figure
 
 
-def time_in_set(answer: CriticismJson) -> go.Figure | None:
+def time_in_set(answer: CriticismResponse) -> go.Figure | None:
     """Return the mean course within data sets, plain and by the step in rate; None for means."""
-    lines = (answer.get("views") or Views()).get("time_in_set") or []
+    lines = answer.views.get("time_in_set") or []
     if not lines:
         return None
     figure = grid_of(["mean of all data sets", "by the step in rate before"], 2, horizontal_spacing=0.12)

@@ -8,8 +8,7 @@ from typing import TypeVar
 
 import plotly.graph_objects as go
 
-from labctl.json_types.answers import CriticismJson
-from labctl.json_types.criticism import ResidualMap
+from labctl.answers.criticism import CriticismResponse, ResidualMap
 from labctl.plots.theme import DIMMED_BELOW, SCALE, SCALE_LIMITS, grid_of, place
 
 T = TypeVar("T")
@@ -19,9 +18,9 @@ HOVER = "%{x} deg/s, %{y} deg C: %{z:.2f} floors<br>data set %{customdata}<extra
 DIM = "rgba(128,128,128,0.5)"
 
 
-def maps(answer: CriticismJson) -> go.Figure | None:
+def maps(answer: CriticismResponse) -> go.Figure | None:
     """Return the maps; None without any."""
-    drawn = [picture for picture in answer.get("maps", ()) if picture["over_floor"]]
+    drawn = [picture for picture in answer.maps if picture["over_floor"]]
     if not drawn:
         return None
     columns = min(len({picture["axis"] for picture in drawn}), 3)

@@ -6,14 +6,14 @@ from collections.abc import Mapping, Sequence
 
 import plotly.graph_objects as go
 
-from labctl.json_types.answers import CriticismJson
-from labctl.json_types.views import AngleSpectrum, Numbers, Views
+from labctl.answers.criticism import CriticismResponse
+from labctl.answers.views import AngleSpectrum, Numbers
 from labctl.plots.theme import INK, colour_of, grid_of, place
 
 
-def angle(answer: CriticismJson) -> go.Figure | None:
+def angle(answer: CriticismResponse) -> go.Figure | None:
     """Return the periodogram in table angle; None where no angle was logged."""
-    lines = (answer.get("views") or Views()).get("angle") or []
+    lines = answer.views.get("angle") or []
     if not lines:
         return None
     figure = grid_of([_lines_text(line) for line in lines], 1)
@@ -45,9 +45,9 @@ def _limit(figure: go.Figure, x: Sequence[float | None], y: Numbers, where: Mapp
     )
 
 
-def frequency(answer: CriticismJson) -> go.Figure | None:
+def frequency(answer: CriticismResponse) -> go.Figure | None:
     """Return the periodograms in time, within data sets and between them; None where there is neither."""
-    views = answer.get("views") or Views()
+    views = answer.views
     within, between = views.get("frequency_within") or [], views.get("frequency") or []
     if not within and not between:
         return None

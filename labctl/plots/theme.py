@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from labctl.json_types.views import Numbers
+from labctl.answers.views import Numbers
 
 INK = "#7d8590"
 GRID = "rgba(128,128,128,0.25)"

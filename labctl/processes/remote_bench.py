@@ -11,6 +11,9 @@ from typing import Any, cast
 
 from instruments.bench_config import BenchFile
 from labctl.acting_user import actor
+from labctl.answers.benches import BenchDescription, StopResponse
+from labctl.answers.campaigns import CampaignResponse, ReasonRequest
+from labctl.answers.live import LiveHistoryResponse, LiveStateResponse
 from labctl.errors import BenchSilent, Conflict, NotStopped
 from labctl.log import get_logger
 from labctl.processes.bench_calls import Beat
@@ -24,9 +27,6 @@ from labctl.services.commands.acts.abort import ABORT
 from labctl.services.commands.context import WRITES_S, BenchAct, CommandContext, RequestT, ResponseT
 from labctl.services.commands.requests import CampaignStart, ToCampaign
 from labctl.services.commands.service_control import NO_BENCH
-from labctl.services.schemas.benches import BenchDescription, StopResponse
-from labctl.services.schemas.campaigns import CampaignResponse, ReasonRequest
-from labctl.services.schemas.live import LiveHistoryResponse, LiveStateResponse
 from labctl.stop.client import StopAttempt, not_stopped_text
 from labctl.stop.latch import LatchState, StopRequest
 from labctl.stop.places import BenchPlace, place_of

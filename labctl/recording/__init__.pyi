@@ -7,7 +7,8 @@ from labctl.recording.importer import (
     TableImporter as TableImporter,
     TableOptions as TableOptions,
 )
-from labctl.recording.info import OutputUnit as OutputUnit, RecordingInfo as RecordingInfo
+from labctl.answers.recording_head import OutputUnit as OutputUnit
+from labctl.recording.info import RecordingInfo as RecordingInfo
 from labctl.recording.points import dataset_starts as dataset_starts, to_points as to_points
 from labctl.recording.raw_table import RawColumn as RawColumn, RawTable as RawTable
 from labctl.recording.recording import Columns as Columns, Recording as Recording

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 if TYPE_CHECKING:
-    from labctl.recording.info import Motion, RecordingInfo
+    from labctl.answers.recording_head import Motion
+    from labctl.recording.info import RecordingInfo
 
 Kind = Literal["integer", "number", "text"]
 

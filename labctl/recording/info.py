@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from datetime import UTC, datetime
-from typing import Any, Literal
+from typing import Literal
 
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, model_validator
 
 from instruments.datasheet import Convention, DatasheetFigure, datasheet_figure, undeclared
 from instruments.standards import Standard
+from labctl.answers.recording_head import Axis, LeftOut, Motion, OutputUnit
 
-Axis = Literal["x", "y", "z"]
 #: Serial number of a unit.
 SERIAL_PATTERN = r"^[A-Za-z0-9][A-Za-z0-9._+# -]{0,63}$"
-#: What moves the unit, and so what its true rate is known from: `rates` a table, at one rate in each data set; `rest`
-#: nothing; `turns` a hand or a table, by a known angle in each data set; `profile` a table whose rate changes and is
-#: known reading by reading; `poses` a hand, between rests that gravity distinguishes.
-Motion = Literal["rates", "rest", "turns", "profile", "poses"]
-
 #: What the rate of the table is known from, as a table says it, and in words.
 RateReference = Literal["computed", "demanded", "measured"]
 REFERENCES: dict[RateReference, str] = {
@@ -28,65 +22,12 @@ REFERENCES: dict[RateReference, str] = {
     "measured": "measured by the encoder",
 }
 
-#: Units that are rates already: what one deg/s is in them.
-RATE_UNITS = {"deg/s": 1.0, "rad/s": math.pi / 180.0, "deg/h": 3600.0}
-
-
 #: `started_at` of a recording without a date that is not in a store yet: the store puts the time of the import there.
 NO_DATE = datetime(1970, 1, 1, tzinfo=UTC)
 #: What the notes of a recording say that an earlier version of labctl gave the date of its file.
 DATE_OF_FILE = "the time at which the file was last written is used as started_at"
 #: What to do about a date that is not known.
 GIVE_DATE = "import it again with `--option started_at=2026-01-05T08:00:00Z`, or with started_at in the column map"
-
-
-class OutputUnit(BaseModel):
-    """How a gyro column becomes a rate: rate_dps = (column - offset) / scale.
-
-    For deg/s, rad/s and deg/h both have defaults; for V, mV, count and arb the nominal scale must be given.
-    """
-
-    model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True)
-
-    unit: Literal["deg/s", "rad/s", "deg/h", "V", "mV", "count", "arb"] = Field(
-        default="deg/s", description="Unit of the gyro column."
-    )
-    offset: float = Field(default=0.0, description="Value of the column at rate 0, in `unit`.")
-    scale: float = Field(
-        default=1.0,
-        description="Change of the column per deg/s, in `unit`, not 0; default for deg/s, rad/s and deg/h: that of "
-        "the unit.",
-    )
-
-    @model_validator(mode="before")
-    @classmethod
-    def _default_scale(cls, given: Any) -> Any:
-        if isinstance(given, dict) and "scale" not in given:
-            unit = given.get("unit", "deg/s")
-            if unit in RATE_UNITS:
-                return {**given, "scale": RATE_UNITS[unit]}
-            raise ValueError(f"unit {unit!r} needs a scale: the output's change, in that unit, per deg/s")
-        return given
-
-    @model_validator(mode="after")
-    def _usable(self) -> OutputUnit:
-        if self.scale == 0 or not math.isfinite(self.scale) or not math.isfinite(self.offset):
-            raise ValueError(
-                f"scale = {self.scale} and offset must be finite numbers, and scale must not be 0; correct them"
-            )
-        return self
-
-
-class LeftOut(BaseModel):
-    """Readings that were left out by choice when a recording was imported: they are marked with valid = 0."""
-
-    model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True)
-
-    what: str = Field(description="Kind of the finding, as a fixed word for programs, such as spikes.")
-    channel: str = Field(default="", description="Column whose readings were left out; empty: the whole rows.")
-    n: int = Field(ge=0, description="Number of readings that were left out.")
-    of: int = Field(ge=0, description="Number of readings of the recording.")
-    why: str = Field(description="What was found, in words.")
 
 
 class RecordingInfo(BaseModel):

@@ -15,9 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field
 
+from labctl.answers.recording_head import Axis
 from labctl.errors import BadRecording
 from labctl.recording.importer import Importer
-from labctl.recording.info import Axis, RecordingInfo
+from labctl.recording.info import RecordingInfo
 from labctl.recording.recording import Column, Recording
 
 #: Temperatures of the table: between them a calibration goes on a parabola, which leaves under 1e-5 of the cubic.

@@ -15,7 +15,7 @@ from labctl.recording.recording import Columns, Recording
 from labctl.recording.spread import LEAST_FOR_SPECTRUM, white_std
 
 if TYPE_CHECKING:
-    from labctl.recording.info import Motion
+    from labctl.answers.recording_head import Motion
 
 #: Columns that one data set has one value of: its first reading's.
 FIRST = (

@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.answers.accelerometer import AccelerometerResponse, AccelerometerTemperature
+from labctl.answers.magnetometer import Estimate
 from labctl.errors import BadInput, BadRecording, NotEnoughData
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.poses.at_rest.accelerometer import Accelerometer, calibrate_accelerometer, different_poses
@@ -26,11 +28,6 @@ from labctl.recording.data_files import read_table
 from labctl.recording.files import read_recording
 from labctl.recording.info import NO_DATE
 from labctl.services.pose_triads import Earlier, require_one, solve_even, solve_with_earlier
-from labctl.services.schemas.reports.accelerometer import (
-    AccelerometerResponse,
-    AccelerometerTemperature,
-)
-from labctl.services.schemas.reports.magnetometer import Estimate
 from labctl.services.table_readings import numbers_of
 
 #: Units of readings, in g.

@@ -6,11 +6,11 @@ from collections.abc import Callable
 from typing import Protocol
 
 from instruments.bench_config import BenchFile
+from labctl.answers.benches import BenchDescription, StopResponse
+from labctl.answers.campaigns import CampaignResponse
+from labctl.answers.live import LiveHistoryResponse, LiveStateResponse
 from labctl.services.benches.bench_left import BenchLeft
 from labctl.services.commands.context import CampaignControl
-from labctl.services.schemas.benches import BenchDescription, StopResponse
-from labctl.services.schemas.campaigns import CampaignResponse
-from labctl.services.schemas.live import LiveHistoryResponse, LiveStateResponse
 
 
 class BenchAccess(Protocol):

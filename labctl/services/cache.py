@@ -21,7 +21,7 @@ from zipfile import BadZipFile
 
 from platformdirs import user_cache_path
 
-from labctl.services.schemas.base import ResponseModel
+from labctl.answers.base import ResponseModel
 from labctl.services.single_flight import single_flight
 from labctl.store.connection.private_files import make_private_folder
 

@@ -12,6 +12,7 @@ from datetime import date, datetime
 from functools import lru_cache
 from typing import Literal
 
+from labctl.answers.validity import CheckGyroChart, CheckGyroPoint, CheckGyroRequest, CheckGyroResponse
 from labctl.calibration import read_calibration
 from labctl.errors import BadInput, LabctlError, NotEnoughData
 from labctl.metrology.control_chart import ChartPoint, Judged, judged
@@ -19,7 +20,6 @@ from labctl.recording.checks import POSSIBLE
 from labctl.recording.info import GIVE_DATE, measured_at, ordered_at
 from labctl.services.cache import UNNAMED, compute
 from labctl.services.calibrations.uncertainty import coefficients_at
-from labctl.services.schemas.validity import CheckGyroChart, CheckGyroPoint, CheckGyroRequest, CheckGyroResponse
 from labctl.services.standards.checks import limits_answer, out_text
 from labctl.store import CheckGyroRow, RecordingRow, Store
 

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cache
 
+from labctl.answers.calibrations import CatalogueResponse
+from labctl.answers.effects import CataloguedEffect
 from labctl.errors import BadInput
 from labctl.fitting import describe_effects, describe_presets
 from labctl.fitting.effects import CATALOGUE, Effect, Formula, Term, checked_formulas, formulas
 from labctl.fitting.effects.trial import first_column
 from labctl.fitting.models.error_model import is_exported
-from labctl.json_types.effects import CataloguedEffect
-from labctl.services.schemas.calibrations import CatalogueResponse
 
 #: Sizes that are not given as a coefficient: how far the thermometer is off.
 OTHER_UNITS = {"thermometer_error": "K"}

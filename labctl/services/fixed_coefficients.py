@@ -8,6 +8,8 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from instruments.toml_documents import listed, read_toml, shown
+from labctl.answers.fixed_coefficients import LONGEST, FixedCoefficients
+from labctl.answers.json_object import JsonObject
 from labctl.calibration import Calibration, read_calibration
 from labctl.errors import BadInput
 from labctl.fitting.estimation.held import Fixed
@@ -15,8 +17,6 @@ from labctl.fitting.models.fitted_model import AxisFit, FittedModel
 from labctl.fitting.models.held import HeldCoefficient
 from labctl.fitting.models.temperature import LagrangeTable
 from labctl.fitting.numeric.json_numbers import none_for_nan
-from labctl.json_types import JsonObject
-from labctl.services.schemas.documents.fixed import LONGEST, FixedCoefficients
 
 AXES = ("x", "y", "z")
 #: How a file begins that is a calibration; no TOML document does.

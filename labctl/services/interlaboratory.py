@@ -8,13 +8,13 @@ from dataclasses import dataclass
 
 from instruments.bench_config import BenchFile
 from instruments.standards import Standard
+from labctl.answers.validity import ComparedCalibration, ComparedResult, LaboratoryComparison
 from labctl.calibration import Calibration, read_calibration
 from labctl.errors import BadInput, Conflict
 from labctl.fitting.uncertainty import Budget
 from labctl.metrology.interlaboratory import Result, en_number, en_performance, zeta_performance, zeta_score
 from labctl.services.cache import UNNAMED, compute
 from labctl.services.calibrations.uncertainty import coefficients_at
-from labctl.services.schemas.validity import ComparedCalibration, ComparedResult, LaboratoryComparison
 from labctl.services.standards.usage import performed, same_issuer
 from labctl.store import CalibrationRecord, Store
 

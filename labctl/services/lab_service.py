@@ -11,6 +11,11 @@ from pathlib import Path
 
 from instruments.bench_config import BenchFile
 from instruments.clock import Clock
+from labctl.answers.benches import BenchResponse, StopResponse
+from labctl.answers.campaigns import CampaignResponse, EventResponse
+from labctl.answers.drafts import DraftsRequest, DraftsResponse
+from labctl.answers.live import LiveStateResponse
+from labctl.answers.service import HealthResponse, HeartbeatResponse, PulseResponse
 from labctl.services.bench_access import BenchAccess
 from labctl.services.benches.bench_left import BenchLeft
 from labctl.services.benches.start_confirmation import start_questions
@@ -31,14 +36,6 @@ from labctl.services.drafts.watch import DraftWatch
 from labctl.services.live.live_stream import LiveEventStream
 from labctl.services.local_bench import LocalBench
 from labctl.services.recordings.staging import remove_abandoned
-from labctl.services.schemas.benches import BenchResponse, StopResponse
-from labctl.services.schemas.campaigns import (
-    CampaignResponse,
-    EventResponse,
-)
-from labctl.services.schemas.live import LiveStateResponse
-from labctl.services.schemas.reports.drafts import DraftsRequest, DraftsResponse
-from labctl.services.schemas.service import HealthResponse, HeartbeatResponse, PulseResponse
 from labctl.services.standards.register import count_by_state
 from labctl.services.units import count_due
 from labctl.store import Store

@@ -8,6 +8,9 @@ from contextlib import suppress
 from instruments.bench_config import BenchFile
 from instruments.clock import Clock
 from labctl.acting_user import ITSELF, acting, actor
+from labctl.answers.benches import BenchDescription, StopResponse
+from labctl.answers.campaigns import CampaignResponse
+from labctl.answers.live import LiveHistoryResponse, LiveStateResponse
 from labctl.errors import Conflict, NotStopped, StoreError
 from labctl.services.benches.bench_left import BenchLeft
 from labctl.services.benches.confirmation import describe_bench, describe_safe_state
@@ -16,9 +19,6 @@ from labctl.services.campaigns.stop_requests import NotHere
 from labctl.services.commands.service_control import NO_BENCH, ServiceControl
 from labctl.services.live.live_sessions import LiveSessions
 from labctl.services.schedule.scheduler import REAL_BENCH_LATE_LIMIT_S, Scheduler
-from labctl.services.schemas.benches import BenchDescription, StopResponse
-from labctl.services.schemas.campaigns import CampaignResponse
-from labctl.services.schemas.live import LiveHistoryResponse, LiveStateResponse
 from labctl.stop.client import not_stopped_text
 from labctl.stop.latch import StopRequest
 from labctl.stop.page import BenchNow

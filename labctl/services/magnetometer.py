@@ -9,17 +9,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.answers.magnetometer import Estimate, MagnetometerResponse
+from labctl.answers.poses import FieldAlignmentJson
 from labctl.errors import BadInput, BadRecording, NotEnoughData
 from labctl.fitting.magnetometer.alignment import FieldAlignment, align_field
 from labctl.fitting.magnetometer.calibrate import AXES, MOST_LEFT_OUT, Magnetometer, calibrate_magnetometer
 from labctl.fitting.magnetometer.ellipsoid import PLACES
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.poses.readings import PoseReadings, readings_of
-from labctl.json_types.poses import FieldAlignmentJson
 from labctl.recording.data_files import read_table
 from labctl.recording.files import read_recording
 from labctl.services.pose_triads import Earlier, require_one, solved_of
-from labctl.services.schemas.reports.magnetometer import Estimate, MagnetometerResponse
 from labctl.services.table_readings import numbers_of
 
 #: Units of readings, in uT.

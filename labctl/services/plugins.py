@@ -9,12 +9,12 @@ from instruments.conformance import Outcome, try_driver
 from instruments.drivers.registry import DRIVERS
 from instruments.plugins import PluginError
 from instruments.simulation import simulation_plugins
+from labctl.answers.admin import DriverCheckResponse, DriverTestResponse, PluginResponse
 from labctl.errors import BadInput
 from labctl.exports import FORMATS
 from labctl.fitting.effects.catalogue import FAMILIES
 from labctl.services.planning.loading import load_bench
 from labctl.services.recordings.importers import IMPORTERS
-from labctl.services.schemas.admin import DriverCheckResponse, DriverTestResponse, PluginResponse
 
 
 def list_plugins() -> list[PluginResponse]:

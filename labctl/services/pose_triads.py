@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from labctl.answers.accelerometer import AccelerometerResponse, EarlierVersion
 from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting.poses.at_rest.accelerometer import LEAST_POSES
 from labctl.fitting.poses.at_rest.fewer_poses import DISAGREE, ByFewer, Known, by_fewer_poses
@@ -14,7 +15,6 @@ from labctl.fitting.poses.at_rest.temperature import OverTemperature, at_referen
 from labctl.fitting.poses.fit import Solved, solve
 from labctl.fitting.poses.readings import AXES, PoseReadings
 from labctl.fitting.poses.triad import UPPER
-from labctl.services.schemas.reports.accelerometer import AccelerometerResponse, EarlierVersion
 
 
 @dataclass(frozen=True)

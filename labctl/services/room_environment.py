@@ -7,14 +7,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 
-from labctl.errors import BadInput
-from labctl.services.schemas.validity import (
+from labctl.answers.validity import (
     RoomEnvironmentRequest,
     RoomEnvironmentResponse,
     RoomReadingResponse,
     RoomSpanResponse,
     RoomValue,
 )
+from labctl.errors import BadInput
 from labctl.store import RoomReading, RoomSpan, Store
 
 MOST_READINGS = 1000

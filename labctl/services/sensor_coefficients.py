@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from labctl.json_types.poses import AccelerometerCoefficient
-from labctl.services.schemas.reports.accelerometer import AccelerometerResponse, AccelerometerTemperature
-from labctl.services.schemas.reports.magnetometer import Estimate, MagnetometerResponse
-from labctl.services.schemas.sensors import SensorCoefficientResponse
+from labctl.answers.accelerometer import AccelerometerResponse, AccelerometerTemperature
+from labctl.answers.magnetometer import Estimate, MagnetometerResponse
+from labctl.answers.poses import AccelerometerCoefficient
+from labctl.answers.sensors import SensorCoefficientResponse
 
 
 def coefficients_of(answer: AccelerometerResponse | MagnetometerResponse) -> list[SensorCoefficientResponse]:

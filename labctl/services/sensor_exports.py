@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from labctl.answers.accelerometer import AccelerometerResponse, AccelerometerTemperature
+from labctl.answers.magnetometer import MagnetometerResponse
 from labctl.errors import BadInput
 from labctl.exports.sensors.formats import written
 from labctl.exports.sensors.parameters import (
@@ -16,8 +18,6 @@ from labctl.exports.sensors.parameters import (
 from labctl.fitting.magnetometer.calibrate import AXES
 from labctl.fitting.magnetometer.ellipsoid import PLACES
 from labctl.fitting.poses.triad import UPPER
-from labctl.services.schemas.reports.accelerometer import AccelerometerResponse, AccelerometerTemperature
-from labctl.services.schemas.reports.magnetometer import MagnetometerResponse
 
 Calibrated = AccelerometerResponse | MagnetometerResponse
 

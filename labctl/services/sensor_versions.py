@@ -11,18 +11,10 @@ from pathlib import Path
 
 import numpy as np
 
-from labctl.canonical_json import canonical
-from labctl.errors import BadInput, NotFound
-from labctl.exports.sensors.formats import SENSOR_FORMATS
-from labctl.fitting.magnetometer.calibrate import AXES
-from labctl.fitting.magnetometer.ellipsoid import PLACES
-from labctl.fitting.poses.triad import UPPER
-from labctl.json_types import JsonDocument
-from labctl.recording.files import FILE_NAMES
-from labctl.recording.info import SERIAL_PATTERN
-from labctl.services.schemas.reports.accelerometer import AccelerometerResponse, AccelerometerTemperature
-from labctl.services.schemas.reports.magnetometer import Estimate, MagnetometerResponse
-from labctl.services.schemas.sensors import (
+from labctl.answers.accelerometer import AccelerometerResponse, AccelerometerTemperature
+from labctl.answers.json_object import JsonDocument
+from labctl.answers.magnetometer import Estimate, MagnetometerResponse
+from labctl.answers.sensors import (
     AccelerometerRequest,
     AccelerometerVersion,
     MagnetometerRequest,
@@ -32,6 +24,14 @@ from labctl.services.schemas.sensors import (
     SensorName,
     SensorVersionResponse,
 )
+from labctl.canonical_json import canonical
+from labctl.errors import BadInput, NotFound
+from labctl.exports.sensors.formats import SENSOR_FORMATS
+from labctl.fitting.magnetometer.calibrate import AXES
+from labctl.fitting.magnetometer.ellipsoid import PLACES
+from labctl.fitting.poses.triad import UPPER
+from labctl.recording.files import FILE_NAMES
+from labctl.recording.info import SERIAL_PATTERN
 from labctl.services.sensor_coefficients import coefficients_of
 from labctl.services.sensor_exports import export_of
 from labctl.store import NewSensorVersion, SensorVersionRow, Store

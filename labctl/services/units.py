@@ -5,11 +5,11 @@ from __future__ import annotations
 from datetime import datetime, timedelta
 from functools import cache
 
+from labctl.answers.units import ExportFormatResponse, RecalibrationResponse, UnitResponse
 from labctl.exports import export_formats
 from labctl.services.calibrations.due import campaign_of
 from labctl.services.campaigns.plan_view import recipe_text
 from labctl.services.drafts.answers import newest_draft
-from labctl.services.schemas.units import ExportFormatResponse, RecalibrationResponse, UnitResponse
 from labctl.services.standards.usage import Notices
 from labctl.store import CertificationRow, Store, Unit
 from labctl.store.paging import Page, PageRequest

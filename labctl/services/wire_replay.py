@@ -17,6 +17,7 @@ from instruments.transport.wire_log.document import WireLogError
 from instruments.transport.wire_log.record import WireRecord
 from instruments.transport.wire_log.replay import Difference, Replay
 from instruments.transport.wire_log.replayed_links import ReplayedWire
+from labctl.answers.wire_logs import ReadingsDigest, RecordedSession, ReplayResponse, SessionResult
 from labctl.errors import BadBench, BadInput, LabctlError
 from labctl.services.benches.check import check_on_wire, said_of
 from labctl.services.campaigns.execution import run
@@ -24,7 +25,6 @@ from labctl.services.campaigns.preparation import prepare
 from labctl.services.campaigns.readings_digest import readings_digest
 from labctl.services.campaigns.recorded_operator import ReplayedOperator
 from labctl.services.planning.loading import with_drivers
-from labctl.services.schemas.wire_logs import ReadingsDigest, RecordedSession, ReplayResponse, SessionResult
 from labctl.store import Store, open_store
 from procedures.contracts.control import Control
 from procedures.contracts.errors import ProcedureError

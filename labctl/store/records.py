@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Literal
 
-from labctl.json_types import JsonDocument, JsonObject
-from labctl.json_types.calibrations import JudgementDetail
-from labctl.json_types.kept_answers import KeptAnswer
-from labctl.json_types.recordings import RawChannelJson
-from labctl.json_types.steps import StepJson
+from labctl.answers.certification import JudgementDetail
+from labctl.answers.json_object import JsonDocument, JsonObject
+from labctl.answers.kept_answers import KeptAnswer
+from labctl.answers.recordings import RawChannelJson
+from labctl.answers.steps import StepJson
 from procedures.contracts.campaign_state import CampaignState
 
 

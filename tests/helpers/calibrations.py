@@ -6,10 +6,10 @@ from datetime import UTC, datetime
 
 import numpy as np
 
+from labctl.answers.fitted_model import Coefficient
 from labctl.calibration import Calibration, build_calibration, hash_of
 from labctl.fitting import fit
 from labctl.fitting.models.force_sensitivity import ForceSensitivity
-from labctl.json_types.models import Coefficient
 from labctl.recording import Recording
 
 AT = datetime(2026, 1, 5, 8, tzinfo=UTC)

@@ -8,11 +8,11 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from labctl.answers.calibrations import FitRequest
+from labctl.answers.certificates import CertificateOrder, CertificateRequest, CertificateResponse
 from labctl.recording import Recording, to_points
 from labctl.services.calibrations.fitting import fit_unit
 from labctl.services.certificates.issue import issue
-from labctl.services.schemas.calibrations import FitRequest
-from labctl.services.schemas.documents.certificates import CertificateOrder, CertificateRequest, CertificateResponse
 from labctl.store import CertificateForms, Store, open_store
 from tests.helpers.simulated_recordings import single_axis
 

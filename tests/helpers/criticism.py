@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from labctl.answers.criticism import CriticisedErrors, CriticisedNoise, CriticismResponse, LackOfFit
 from labctl.fitting.criticism import Criticism, criticise
 from labctl.fitting.criticism.diagnostics import views_of
 from labctl.fitting.criticism.model_comparison import compare_models
@@ -28,3 +29,15 @@ def views(recording: Recording, model: str | None = "ojeda2000", effects: tuple[
     forward, _ = changed(fitted).build(context)
     comparison = compare_models(reduce_recording(recording), forward, {"bias_drift": CATALOGUE["bias_drift"]})
     return views_of(comparison, residuals_of(comparison, context.noise_floor), recording, CATALOGUE)
+
+
+def bare_criticism(**more: Any) -> CriticismResponse:
+    """Return a criticism without a verdict, with the fields that are given."""
+    given = {
+        "serial": "S</script>", "version": 1, "recording": 1, "verdict": "insufficient_data",
+        "text": ["Too little <data>."], "where": [], "named": [], "depends_on": [], "suspects": [], "experiments": [],
+        "not_testable": [], "noise": dict.fromkeys(CriticisedNoise.__annotations__),
+        "lack_of_fit": dict.fromkeys(LackOfFit.__annotations__),
+        "error": dict.fromkeys(CriticisedErrors.__annotations__) | {"noise_floor_source": "none"},
+    }  # fmt: skip
+    return CriticismResponse.model_validate(given | more)

@@ -7,15 +7,15 @@ from datetime import UTC, date, datetime, time
 from typing import Any
 
 from instruments.standards import Standard
-from labctl.services.calibrations.fitting import fit_unit
-from labctl.services.schemas.calibrations import FitRequest
-from labctl.services.schemas.standards import (
+from labctl.answers.calibrations import FitRequest
+from labctl.answers.standards import (
     StandardBadRequest,
     StandardCertificateRequest,
     StandardCheckRequest,
     StandardRequest,
     StandardResponse,
 )
+from labctl.services.calibrations.fitting import fit_unit
 from labctl.services.standards import register
 from labctl.store import Store
 from tests.helpers.certificates import simulated

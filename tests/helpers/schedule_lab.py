@@ -5,11 +5,11 @@ from __future__ import annotations
 from datetime import UTC, datetime, timedelta
 
 from instruments.clock import VirtualClock
+from labctl.answers.campaigns import CampaignRequest, CampaignResponse
 from labctl.errors import Conflict
 from labctl.services.planning.loading import load_bench
 from labctl.services.schedule.queue import add_start, start_status
 from labctl.services.schedule.scheduler import Scheduler
-from labctl.services.schemas.campaigns import CampaignRequest, CampaignResponse
 from labctl.store import Store
 
 BENCH = load_bench("single-axis-sim")

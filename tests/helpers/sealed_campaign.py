@@ -14,11 +14,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from instruments.clock import VirtualClock
+from labctl.answers.campaigns import ResumeRequest
 from labctl.services.campaigns.execution import run
 from labctl.services.campaigns.preparation import prepare
 from labctl.services.campaigns.resume import prepare_resume
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.campaigns import ResumeRequest
 from labctl.store import ResumePoint, open_store
 from procedures.contracts.control import Control
 from procedures.monitoring.progress import Progress

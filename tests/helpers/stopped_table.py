@@ -8,7 +8,7 @@ from typing import Any
 
 import httpx
 
-from labctl.services.schemas.campaigns import BENCH_CHECKS
+from labctl.answers.campaigns import BENCH_CHECKS
 from labctl.store import AuditRow, open_store
 from tests.helpers.processes import WAIT_S, ServiceProcess
 from tests.helpers.simulator_process import FIRST_DPS, RECIPE, Simulator

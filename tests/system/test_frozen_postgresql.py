@@ -16,8 +16,8 @@ from pathlib import Path
 import httpx
 import pytest
 
+from labctl.answers.admin import KeyRequest, Role
 from labctl.services.admin.api_keys import create_key
-from labctl.services.schemas.admin import KeyRequest, Role
 from labctl.store import open_store
 from studies.postgresql_cluster import Cluster
 from tests.helpers.postgresql import running_cluster

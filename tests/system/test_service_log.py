@@ -12,8 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from labctl.answers.admin import KeyRequest, Role
 from labctl.services.admin.api_keys import create_key
-from labctl.services.schemas.admin import KeyRequest, Role
 from labctl.store import open_store
 from tests.helpers.log_records import Record
 from tests.helpers.processes import WAIT_S, ServiceProcess, end_of, labctl, running

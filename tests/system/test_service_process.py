@@ -14,9 +14,9 @@ from typing import Any
 
 import pytest
 
+from labctl.answers.admin import KeyRequest, Role
 from labctl.config import os_user
 from labctl.services.admin.api_keys import create_key
-from labctl.services.schemas.admin import KeyRequest, Role
 from labctl.store import check, holder_of, open_store
 from tests.helpers.paths import EXAMPLES
 from tests.helpers.processes import WAIT_S, ServiceProcess, end_of, labctl, running

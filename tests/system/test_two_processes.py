@@ -15,8 +15,8 @@ import tomli_w
 from numpy.typing import NDArray
 
 from instruments.bench_config import read_bench
+from labctl.answers.campaigns import BENCH_CHECKS, StartRequest
 from labctl.services.campaigns.execution import run_here
-from labctl.services.schemas.campaigns import BENCH_CHECKS, StartRequest
 from labctl.store import open_store
 
 #: A unit counts as silent after 2 s of the bench, half a second of real time: a machine that is busy otherwise stalls

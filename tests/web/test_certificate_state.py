@@ -11,10 +11,10 @@ from urllib.parse import urlsplit
 
 import pytest
 
+from labctl.answers.certificates import CertificateRequest
 from labctl.services.certificates.issue import issue
 from labctl.services.certificates.served import certificate_file
 from labctl.services.certificates.states import list_certificates
-from labctl.services.schemas.documents.certificates import CertificateRequest
 from labctl.store import NewReleaseRequest, open_store
 from tests.helpers.browser import Faults, Service
 from tests.helpers.certificates import AT, SERIAL, add_version, request

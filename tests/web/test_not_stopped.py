@@ -15,9 +15,9 @@ from typing import TYPE_CHECKING
 import httpx
 import pytest
 
+from labctl.answers.admin import KeyRequest, Role
 from labctl.services.campaigns import preparation
 from labctl.services.commands.registry import CREATE_KEY
-from labctl.services.schemas.admin import KeyRequest, Role
 from tests.helpers.browser import NARROW, PATIENCE_MS, WIDE, Faults, Service
 from tests.helpers.forked_commands import run_labctl
 from tests.helpers.paced_hand import PacedClock, PacedPerson

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import httpx
 import pytest
 
+from labctl.answers.admin import KeyRequest, Role
 from labctl.services.commands.registry import CREATE_KEY
-from labctl.services.schemas.admin import KeyRequest, Role
 from tests.helpers.browser import Faults, Service, settled
 from tests.helpers.paths import EXAMPLES
 

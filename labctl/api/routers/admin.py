@@ -7,14 +7,14 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query
 
+from labctl.answers.admin import AuditResponse, BackupNote, KeyRequest, KeyResponse, NewKeyResponse
+from labctl.answers.campaigns import ReasonRequest
 from labctl.api.access_policy import NEEDS_APPROVER
 from labctl.api.dependencies import ServiceDep, command_route
 from labctl.services.admin.api_keys import list_keys
 from labctl.services.admin.audit import list_audit
 from labctl.services.commands.registry import CREATE_KEY, NOTE_BACKUP, REVOKE_KEY
 from labctl.services.commands.requests import ToKey
-from labctl.services.schemas.admin import AuditResponse, BackupNote, KeyRequest, KeyResponse, NewKeyResponse
-from labctl.services.schemas.campaigns import ReasonRequest
 
 router = APIRouter(prefix="/api", tags=["keys and audit"])
 

@@ -4,12 +4,7 @@ from __future__ import annotations
 
 from fastapi import APIRouter
 
-from labctl.api.dependencies import ControlPoolDep, ServiceDep, command_route
-from labctl.services.campaigns.bench_status import bench_statuses
-from labctl.services.commands.acts.check import CHECK_BENCH
-from labctl.services.commands.registry import CLEAR_BENCH
-from labctl.services.commands.requests import ToBench
-from labctl.services.schemas.benches import (
+from labctl.answers.benches import (
     BenchCheckResponse,
     BenchResponse,
     BenchStatus,
@@ -17,7 +12,12 @@ from labctl.services.schemas.benches import (
     ClearRequest,
     StopResponse,
 )
-from labctl.services.schemas.campaigns import ReasonRequest
+from labctl.answers.campaigns import ReasonRequest
+from labctl.api.dependencies import ControlPoolDep, ServiceDep, command_route
+from labctl.services.campaigns.bench_status import bench_statuses
+from labctl.services.commands.acts.check import CHECK_BENCH
+from labctl.services.commands.registry import CLEAR_BENCH
+from labctl.services.commands.requests import ToBench
 
 router = APIRouter(prefix="/api", tags=["catalogue"])
 

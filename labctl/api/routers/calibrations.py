@@ -8,6 +8,25 @@ from fastapi import APIRouter, Header, Query, Request, Response
 from starlette.background import BackgroundTask
 from starlette.concurrency import run_in_threadpool
 
+from labctl.answers.admin import Caller
+from labctl.answers.calibrations import (
+    CalibrationRow,
+    FitRequest,
+    FitResponse,
+    ImprovedVersionResponse,
+    ImproveRequest,
+    ImproveResponse,
+    PreviewResponse,
+    VersionResponse,
+)
+from labctl.answers.certification import CalibrationStateResponse, FetchResponse
+from labctl.answers.comparison import ComparisonResponse
+from labctl.answers.criticism import CriticismResponse, StageResponse
+from labctl.answers.ladder import LadderResponse
+from labctl.answers.residuals import ResidualsResponse
+from labctl.answers.uncertainty import SurfaceResponse, UncertaintyResponse
+from labctl.answers.verification import VerificationResponse
+from labctl.answers.views import PictureResponse
 from labctl.api.computation import execute, follow, while_connected
 from labctl.api.dependencies import ServiceDep, command_route
 from labctl.api.event_stream import EventStream
@@ -26,28 +45,6 @@ from labctl.services.criticism.criticise import criticise_unit, residuals_unit
 from labctl.services.criticism.ladder import ladder as ladder_of
 from labctl.services.criticism.plots import pictures_unit
 from labctl.services.criticism.verification.of_version import verify_unit
-from labctl.services.schemas.admin import Caller
-from labctl.services.schemas.calibrations import (
-    CalibrationRow,
-    FitRequest,
-    FitResponse,
-    ImprovedVersionResponse,
-    ImproveRequest,
-    ImproveResponse,
-    PreviewResponse,
-    VersionResponse,
-)
-from labctl.services.schemas.certification import CalibrationStateResponse, FetchResponse
-from labctl.services.schemas.comparison import ComparisonResponse
-from labctl.services.schemas.criticism import (
-    CriticismResponse,
-    PictureResponse,
-    ResidualsResponse,
-    StageResponse,
-    VerificationResponse,
-)
-from labctl.services.schemas.reports.ladder import LadderResponse
-from labctl.services.schemas.uncertainty import SurfaceResponse, UncertaintyResponse
 from labctl.store import is_url
 
 router = APIRouter(prefix="/api/units/{serial}", tags=["calibrations"])

@@ -8,6 +8,10 @@ from typing import Annotated
 from fastapi import APIRouter, Header, Request, Response
 from fastapi.concurrency import run_in_threadpool
 
+from labctl.answers.campaigns import CampaignRequest, CampaignResponse, EventResponse, ResumeRequest
+from labctl.answers.drafts import DraftsRequest, DraftsResponse
+from labctl.answers.plans import CampaignPlanResponse
+from labctl.answers.schedule import ScheduledResponse
 from labctl.api.act_routes import add_act_route
 from labctl.api.computation import execute
 from labctl.api.dependencies import ServiceDep, command_route
@@ -19,15 +23,6 @@ from labctl.services.commands.acts.resume import RESUME_CAMPAIGN
 from labctl.services.commands.acts.start import START_CAMPAIGN
 from labctl.services.commands.registry import MAKE_DRAFTS
 from labctl.services.commands.requests import CampaignResume, CampaignStart, ToCampaign
-from labctl.services.schemas.campaigns import (
-    CampaignRequest,
-    CampaignResponse,
-    EventResponse,
-    ResumeRequest,
-)
-from labctl.services.schemas.plans import CampaignPlanResponse
-from labctl.services.schemas.reports.drafts import DraftsRequest, DraftsResponse
-from labctl.services.schemas.schedule import ScheduledResponse
 from labctl.store.paging import PageRequest
 
 router = APIRouter(prefix="/api/campaigns", tags=["campaigns"])

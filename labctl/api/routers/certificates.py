@@ -6,6 +6,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Header, Query, Response
 
+from labctl.answers.certificates import CertificateRequest, CertificateResponse, PublicCertificate, WithdrawRequest
 from labctl.api.access_policy import NEEDS_APPROVER
 from labctl.api.computation import execute
 from labctl.api.dependencies import ServiceDep, command_route
@@ -13,12 +14,6 @@ from labctl.services.certificates.served import certificate_file, public_certifi
 from labctl.services.certificates.states import list_certificates
 from labctl.services.commands.registry import ISSUE_CERTIFICATE, WITHDRAW_CERTIFICATE
 from labctl.services.commands.requests import ToVersion
-from labctl.services.schemas.documents.certificates import (
-    CertificateRequest,
-    CertificateResponse,
-    PublicCertificate,
-    WithdrawRequest,
-)
 
 router = APIRouter(tags=["certificates"])
 UNIT = "/api/units/{serial}"

@@ -5,6 +5,14 @@ from __future__ import annotations
 from fastapi import APIRouter, Request
 from fastapi.responses import JSONResponse
 
+from labctl.answers.certification import (
+    AssessmentResponse,
+    CertificationResponse,
+    CertifyRequest,
+    ReleaseRequest,
+    ReleaseRequestResponse,
+    RevokeRequest,
+)
 from labctl.api.access_policy import NEEDS_APPROVER
 from labctl.api.computation import execute, while_connected
 from labctl.api.dependencies import ServiceDep, command_route
@@ -13,14 +21,6 @@ from labctl.services.calibrations.certification import list_certifications
 from labctl.services.calibrations.release import list_waiting
 from labctl.services.commands.registry import CERTIFY, RELEASE, REVOKE
 from labctl.services.commands.requests import ToVersion
-from labctl.services.schemas.certification import (
-    AssessmentResponse,
-    CertificationResponse,
-    CertifyRequest,
-    ReleaseRequest,
-    ReleaseRequestResponse,
-    RevokeRequest,
-)
 
 router = APIRouter(prefix="/api/units/{serial}", tags=["calibrations"])
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from fastapi import APIRouter
 
+from labctl.answers.calibrations import CatalogueResponse
 from labctl.services.effects import catalogue
-from labctl.services.schemas.calibrations import CatalogueResponse
 
 router = APIRouter(prefix="/api", tags=["catalogue"])
 

@@ -6,10 +6,10 @@ from fastapi import APIRouter, Request
 from fastapi.responses import PlainTextResponse
 from prometheus_client.exposition import CONTENT_TYPE_PLAIN_0_0_4
 
+from labctl.answers.service import HealthResponse, HeartbeatResponse, PulseResponse
 from labctl.api.access_policy import DECLARES_KEY
 from labctl.api.dependencies import ServiceDep
 from labctl.api.metrics import text_of
-from labctl.services.schemas.service import HealthResponse, HeartbeatResponse, PulseResponse
 
 router = APIRouter(tags=["service"])
 

@@ -7,10 +7,10 @@ from collections.abc import AsyncIterator
 from fastapi import APIRouter
 from fastapi.concurrency import run_in_threadpool
 
+from labctl.answers.live import LiveEndRequest, LiveHistoryResponse, LiveRequest, LiveStateResponse
 from labctl.api.dependencies import ServiceDep, command_route
 from labctl.api.event_stream import EventStream
 from labctl.services.commands.acts.live import END_LIVE, START_LIVE
-from labctl.services.schemas.live import LiveEndRequest, LiveHistoryResponse, LiveRequest, LiveStateResponse
 
 router = APIRouter(prefix="/api/live", tags=["live"])
 

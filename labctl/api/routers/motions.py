@@ -6,10 +6,10 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Request
 
+from labctl.answers.comparison import MotionResponse
 from labctl.api.computation import while_connected
 from labctl.api.dependencies import ServiceDep
 from labctl.services.criticism.by_motion import recording_by_motion, version_by_motion
-from labctl.services.schemas.comparison import MotionResponse
 
 router = APIRouter(prefix="/api")
 

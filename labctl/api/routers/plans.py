@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from fastapi import APIRouter, Request
 
+from labctl.answers.plans import PlannedResponse, PlanRequest, RecipeResponse
 from labctl.api.computation import while_connected
 from labctl.api.dependencies import ServiceDep
 from labctl.services.planning import planner as services
 from labctl.services.schedule.planned_start import planned_start
-from labctl.services.schemas.plans import PlannedResponse, PlanRequest, RecipeResponse
 from labctl.services.simulation.visibility import planned
 
 router = APIRouter(prefix="/api", tags=["campaigns"])

@@ -8,24 +8,10 @@ from fastapi import APIRouter, File, Form, Query, Request, Response, UploadFile
 from fastapi import Path as PathParameter
 from fastapi.responses import PlainTextResponse, StreamingResponse
 
-from labctl.api.computation import execute, while_connected, with_files
-from labctl.api.dependencies import ServiceDep, command_route
-from labctl.api.paging import AfterNumber, Limit, Search, in_parts
-from labctl.recording.column_map.templates import template
-from labctl.recording.info import Motion
-from labctl.services.calibrations.orientation import orientation_of_recording
-from labctl.services.commands.registry import IMPORT_EXAMPLE, IMPORT_LOG, IMPORT_RECORDING, SIMULATE_RECORDING
-from labctl.services.commands.requests import LogFile, RecordingFolder
-from labctl.services.recordings import catalogue
-from labctl.services.recordings.allan import allan_unit
-from labctl.services.recordings.examination import inspection_of_recording
-from labctl.services.recordings.importers import parsed_options
-from labctl.services.recordings.log_preview import preview_log
-from labctl.services.recordings.traces import trace as trace_of
-from labctl.services.recordings.transfer import import_files, zip_recording
-from labctl.services.recordings.uploads import sent_map, with_staged
-from labctl.services.schemas.inspection import InspectionResponse
-from labctl.services.schemas.recordings import (
+from labctl.answers.inspection import InspectionResponse
+from labctl.answers.orientation import OrientationQuery, OrientationResponse
+from labctl.answers.recording_head import Motion
+from labctl.answers.recordings import (
     AllanResponse,
     DataSetsResponse,
     ExampleRequest,
@@ -39,7 +25,21 @@ from labctl.services.schemas.recordings import (
     SimulatedRequest,
     TraceResponse,
 )
-from labctl.services.schemas.reports.orientation import OrientationQuery, OrientationResponse
+from labctl.api.computation import execute, while_connected, with_files
+from labctl.api.dependencies import ServiceDep, command_route
+from labctl.api.paging import AfterNumber, Limit, Search, in_parts
+from labctl.recording.column_map.templates import template
+from labctl.services.calibrations.orientation import orientation_of_recording
+from labctl.services.commands.registry import IMPORT_EXAMPLE, IMPORT_LOG, IMPORT_RECORDING, SIMULATE_RECORDING
+from labctl.services.commands.requests import LogFile, RecordingFolder
+from labctl.services.recordings import catalogue
+from labctl.services.recordings.allan import allan_unit
+from labctl.services.recordings.examination import inspection_of_recording
+from labctl.services.recordings.importers import parsed_options
+from labctl.services.recordings.log_preview import preview_log
+from labctl.services.recordings.traces import trace as trace_of
+from labctl.services.recordings.transfer import import_files, zip_recording
+from labctl.services.recordings.uploads import sent_map, with_staged
 from labctl.store.paging import PageRequest
 
 MapField = Annotated[

@@ -6,11 +6,11 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query
 
+from labctl.answers.schedule import ScheduledResponse
 from labctl.api.dependencies import ServiceDep, command_route
 from labctl.services.commands.registry import CANCEL_START
 from labctl.services.commands.requests import ToStart
 from labctl.services.schedule import queue
-from labctl.services.schemas.schedule import ScheduledResponse
 
 router = APIRouter(prefix="/api/schedule", tags=["campaigns"])
 

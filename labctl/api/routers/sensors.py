@@ -6,10 +6,7 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Response
 
-from labctl.api.dependencies import ServiceDep, command_route
-from labctl.services.commands.requests import ToUnit
-from labctl.services.commands.sensors import KEEP_ACCELEROMETER, KEEP_MAGNETOMETER
-from labctl.services.schemas.sensors import (
+from labctl.answers.sensors import (
     AccelerometerRequest,
     AccelerometerVersion,
     MagnetometerRequest,
@@ -17,6 +14,9 @@ from labctl.services.schemas.sensors import (
     SensorName,
     SensorVersionResponse,
 )
+from labctl.api.dependencies import ServiceDep, command_route
+from labctl.services.commands.requests import ToUnit
+from labctl.services.commands.sensors import KEEP_ACCELEROMETER, KEEP_MAGNETOMETER
 from labctl.services.sensor_versions import list_versions, one_accelerometer, one_magnetometer, version_file
 
 router = APIRouter(prefix="/api/units/{serial}/sensors", tags=["sensors"])

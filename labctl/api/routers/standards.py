@@ -7,6 +7,15 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query
 
+from labctl.answers.standards import (
+    AffectedResponse,
+    StandardBadRequest,
+    StandardCertificateRequest,
+    StandardCheckRequest,
+    StandardRequest,
+    StandardResponse,
+    WithdrawFindingRequest,
+)
 from labctl.api.access_policy import NEEDS_APPROVER
 from labctl.api.dependencies import ServiceDep, command_route
 from labctl.services.commands.requests import ToFinding, ToStandard
@@ -16,15 +25,6 @@ from labctl.services.commands.standards import (
     ADD_STANDARD_CHECK,
     MARK_STANDARD_BAD,
     WITHDRAW_FINDING,
-)
-from labctl.services.schemas.standards import (
-    AffectedResponse,
-    StandardBadRequest,
-    StandardCertificateRequest,
-    StandardCheckRequest,
-    StandardRequest,
-    StandardResponse,
-    WithdrawFindingRequest,
 )
 from labctl.services.standards import register, usage
 

@@ -6,14 +6,14 @@ from typing import Annotated
 
 from fastapi import APIRouter, Query, Request, Response
 
+from labctl.answers.datasheet import DatasheetResponse
+from labctl.answers.units import TrendResponse, UnitResponse
 from labctl.api.computation import while_connected
 from labctl.api.dependencies import ServiceDep
 from labctl.api.paging import AfterSerial, Limit, Search, in_parts
 from labctl.services.calibrations.due import span
 from labctl.services.criticism.trend import trend_unit
 from labctl.services.datasheet.sheet import datasheet
-from labctl.services.schemas.reports.datasheet import DatasheetResponse
-from labctl.services.schemas.units import TrendResponse, UnitResponse
 from labctl.services.units import page_of_units, unit, units_due
 from labctl.store.paging import PageRequest
 

@@ -8,6 +8,13 @@ from typing import Annotated
 from fastapi import APIRouter, Query, Request
 from pydantic import AwareDatetime
 
+from labctl.answers.validity import (
+    CheckGyroRequest,
+    CheckGyroResponse,
+    LaboratoryComparison,
+    RoomEnvironmentRequest,
+    RoomEnvironmentResponse,
+)
 from labctl.api.computation import while_connected
 from labctl.api.dependencies import ServiceDep, command_route
 from labctl.services.check_gyros import check_gyro, list_check_gyros
@@ -15,13 +22,6 @@ from labctl.services.commands.requests import ToUnit
 from labctl.services.commands.standards import ADD_ENVIRONMENT, SET_CHECK_GYRO
 from labctl.services.interlaboratory import compare, pair_of
 from labctl.services.room_environment import environment
-from labctl.services.schemas.validity import (
-    CheckGyroRequest,
-    CheckGyroResponse,
-    LaboratoryComparison,
-    RoomEnvironmentRequest,
-    RoomEnvironmentResponse,
-)
 
 router = APIRouter(prefix="/api", tags=["standards"])
 DAY = timedelta(days=1)

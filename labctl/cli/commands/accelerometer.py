@@ -14,8 +14,8 @@ from labctl.cli.output import print_json
 from labctl.cli.printing.sensors import print_kept, print_sensor
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.reports.accelerometer import AccelerometerResponse
-    from labctl.services.schemas.sensors import AccelerometerVersion, MeasuredData
+    from labctl.answers.accelerometer import AccelerometerResponse
+    from labctl.answers.sensors import AccelerometerVersion, MeasuredData
 
 
 def accelerometer(
@@ -67,10 +67,10 @@ def accelerometer(
 def _kept(
     database: str | None, serial: str, data: MeasuredData, answer: AccelerometerResponse, by: str | None
 ) -> AccelerometerVersion:
+    from labctl.answers.sensors import AccelerometerRequest
     from labctl.services.commands.open import execute
     from labctl.services.commands.requests import ToUnit
     from labctl.services.commands.sensors import KEEP_ACCELEROMETER
-    from labctl.services.schemas.sensors import AccelerometerRequest
 
     request = AccelerometerRequest(data=data, result=answer, by=who(by))
     return execute(database, KEEP_ACCELEROMETER, ToUnit(serial, request))

@@ -26,9 +26,9 @@ def list_(
     database: Database = None,
 ) -> None:
     """List who did what, when and why."""
+    from labctl.answers.admin import AuditResponse
     from labctl.services.admin.audit import list_audit
     from labctl.services.commands.open import open_readonly
-    from labctl.services.schemas.admin import AuditResponse
 
     answers: list[AuditResponse] = []
     with one_clear_line(), open_readonly(database) as store:

@@ -108,9 +108,9 @@ def new(
     database: Database = None,  # noqa: ARG001  every command takes it
 ) -> None:
     """Write a bench file: find which instrument answers on each port, ask for the rest. Nothing moves or is set."""
+    from labctl.answers.benches import NewBenchRequest
     from labctl.cli.bench_dialogue import asking, not_asking, print_search
     from labctl.services.benches.new_bench import new_bench, parse_setting
-    from labctl.services.schemas.benches import NewBenchRequest
 
     asks = asking if not yes and not as_json and is_terminal() else not_asking
     with one_clear_line():
@@ -190,10 +190,10 @@ def clear(
     database: Database = None,
 ) -> None:
     """Record that you have inspected a bench that was not confirmed safe; campaigns may start on it again."""
+    from labctl.answers.benches import ClearRequest
     from labctl.services.commands.open import execute
     from labctl.services.commands.registry import CLEAR_BENCH
     from labctl.services.commands.requests import ToBench
-    from labctl.services.schemas.benches import ClearRequest
 
     with one_clear_line():
         answer = execute(database, CLEAR_BENCH, ToBench(bench, ClearRequest(by=by, reason=reason)))

@@ -50,10 +50,10 @@ def fit(
     database: Database = None,
 ) -> None:
     """Fit a model to a recording, or to several together; it becomes the unit's next calibration version."""
+    from labctl.answers.calibrations import FitRequest
     from labctl.services.commands.open import execute
     from labctl.services.commands.registry import FIT
     from labctl.services.commands.requests import ToUnit
-    from labctl.services.schemas.calibrations import FitRequest
 
     names = [name.strip() for name in effects.split(",") if name.strip()] if effects else []
     with one_clear_line():
@@ -96,10 +96,10 @@ def certify(
     Refused where its verdict, its errors or its data give objections, unless --override. With
     $LABCTL_TWO_PERSON_RELEASE = 1, the version is in force once a second person has released it.
     """
+    from labctl.answers.certification import CertifyRequest
     from labctl.services.commands.open import execute
     from labctl.services.commands.registry import CERTIFY
     from labctl.services.commands.requests import ToVersion
-    from labctl.services.schemas.certification import CertifyRequest
 
     with one_clear_line():
         request = CertifyRequest(by=by, reason=reason, due_days=due_days, override=override)
@@ -116,10 +116,10 @@ def release(
     serial: Serial, version: Version, by: By, reason: Reason, as_json: Json = False, database: Database = None
 ) -> None:
     """Release a version as the second person, with another API key than the first: it is in force then."""
+    from labctl.answers.certification import ReleaseRequest
     from labctl.services.commands.open import execute
     from labctl.services.commands.registry import RELEASE
     from labctl.services.commands.requests import ToVersion
-    from labctl.services.schemas.certification import ReleaseRequest
 
     with one_clear_line():
         answer = execute(database, RELEASE, ToVersion(serial, version, ReleaseRequest(by=by, reason=reason)))
@@ -135,10 +135,10 @@ def revoke(
     serial: Serial, version: Version, by: By, reason: Reason, as_json: Json = False, database: Database = None
 ) -> None:
     """Revoke the certification of a version; its certificates are withdrawn, and who fetched it is listed."""
+    from labctl.answers.certification import RevokeRequest
     from labctl.services.commands.open import execute
     from labctl.services.commands.registry import REVOKE
     from labctl.services.commands.requests import ToVersion
-    from labctl.services.schemas.certification import RevokeRequest
 
     with one_clear_line():
         answer = execute(database, REVOKE, ToVersion(serial, version, RevokeRequest(by=by, reason=reason)))

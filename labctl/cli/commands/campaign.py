@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from labctl.cli.campaign_acts import CampaignGroup
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import (
     BenchName,
@@ -24,7 +25,9 @@ from labctl.cli.printing.campaigns import print_campaign, print_plan, print_star
 if TYPE_CHECKING:
     pass
 
-app = typer.Typer(no_args_is_help=True, help="Campaigns: one run of a recipe on a bench with its units.")
+app = typer.Typer(
+    cls=CampaignGroup, no_args_is_help=True, help="Campaigns: one run of a recipe on a bench with its units."
+)
 
 Recipe = Annotated[str, typer.Argument(metavar="RECIPE", help="Recipe file, or the name of a shipped recipe.")]
 Clip = Annotated[
@@ -159,12 +162,12 @@ def start(
     With --at or --cron it is added to the schedule, which only a service (`labctl serve`) carries out. On a bench
     that is not simulated a person has to confirm first that the bench is clear, or will be at that time.
     """
+    from labctl.answers.campaigns import BENCH_CHECKS, CampaignRequest
     from labctl.cli.campaign_terminal import campaign_terminal
     from labctl.services.commands.acts.start import START_CAMPAIGN
     from labctl.services.commands.open import open_commands
     from labctl.services.commands.requests import CampaignStart
     from labctl.services.planning.loading import own_text
-    from labctl.services.schemas.campaigns import BENCH_CHECKS, CampaignRequest
 
     with one_clear_line():
         wanted = {"at": at, "cron": cron, "time_zone": time_zone, "late_limit_s": late_limit_s, "priority": priority}

@@ -1,12 +1,15 @@
-"""`labctl campaign` watch, pause, resume, abort, confirm, draft: a campaign that runs, or was interrupted."""
+"""`labctl campaign` watch, resume, abort, confirm, draft: a campaign that runs, or was interrupted.
+
+A command that only sends the request of its act is no function here: `labctl.cli.campaign_acts` makes it.
+"""
 
 from __future__ import annotations
 
-import getpass
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from labctl.cli.campaign_acts import By, Id, Reason, person
 from labctl.cli.error_reporting import one_clear_line
 from labctl.cli.options import BenchName, CampaignId, Database, Json, WireLogOnly
 from labctl.cli.output import console, print_json, stderr
@@ -14,23 +17,10 @@ from labctl.cli.printing.campaigns import print_campaign, print_drafts, print_en
 from labctl.cli.turn_text import turn_text
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.campaigns import CampaignResponse
+    from labctl.answers.campaigns import CampaignResponse
 
 #: How long an abort is followed until the bench is safe, and how often it is read, s.
 SAFE_WITHIN_S, LOOK_S = 120.0, 0.2
-
-Id = Annotated[int, typer.Argument(metavar="ID", help="Number of the campaign.")]
-By = Annotated[
-    str | None, typer.Option("--by", metavar="NAME", help="Name of the person; default: the user who is logged in.")
-]
-
-
-def person(by: str | None) -> str:
-    """Return who acts: the given name, or else the user who is logged in."""
-    try:
-        return by or getpass.getuser()
-    except (KeyError, OSError):
-        return "a person"
 
 
 def watch(campaign: CampaignId = None, as_json: Json = False, database: Database = None) -> None:
@@ -56,27 +46,6 @@ def watch(campaign: CampaignId = None, as_json: Json = False, database: Database
             if not answer.active:
                 break
             clock.sleep(1.0)
-    print_json(answer) if as_json else print_campaign(answer)
-
-
-def pause(
-    campaign: Id,
-    reason: Annotated[
-        str, typer.Option("--reason", metavar="TEXT", help="Reason for this action; it is recorded.")
-    ] = "paused from the command line",
-    by: By = None,
-    as_json: Json = False,
-    database: Database = None,
-) -> None:
-    """Pause a running campaign after the present data set; the bench is still monitored."""
-    from labctl.services.commands.acts.pause import PAUSE_CAMPAIGN
-    from labctl.services.commands.open import execute
-    from labctl.services.commands.requests import ToCampaign
-    from labctl.services.schemas.campaigns import ReasonRequest
-
-    with one_clear_line():
-        request = ReasonRequest(reason=reason, by=person(by))
-        answer = execute(database, PAUSE_CAMPAIGN, ToCampaign(campaign, request))
     print_json(answer) if as_json else print_campaign(answer)
 
 
@@ -107,11 +76,11 @@ def resume(
     database: Database = None,
 ) -> None:
     """Continue a paused campaign, or resume one that was interrupted, failed or aborted; safe state first."""
+    from labctl.answers.campaigns import ResumeRequest
     from labctl.cli.campaign_terminal import campaign_terminal
     from labctl.services.commands.acts.resume import RESUME_CAMPAIGN
     from labctl.services.commands.open import campaign_to_resume, open_commands
     from labctl.services.commands.requests import CampaignResume
-    from labctl.services.schemas.campaigns import ResumeRequest
 
     with one_clear_line():
         request = ResumeRequest.model_validate({"by": person(by), "power": power})
@@ -123,9 +92,7 @@ def resume(
 
 def abort(
     campaign: Id,
-    reason: Annotated[
-        str, typer.Option("--reason", metavar="TEXT", help="Reason for this action; it is recorded.")
-    ] = "aborted from the command line",
+    reason: Reason = "aborted from the command line",
     as_json: Json = False,
     database: Database = None,
 ) -> None:
@@ -150,12 +117,12 @@ def abort(
 
 def _recorded(database: str | None, campaign: int, reason: str, was_stopped: bool) -> CampaignResponse:
     """Have an abort recorded; where the campaign has ended by the stop already, its own process has recorded it."""
+    from labctl.answers.campaigns import ReasonRequest
     from labctl.errors import Conflict
     from labctl.service_connection import ServiceRefused
     from labctl.services.commands.acts.abort import ABORT_CAMPAIGN
     from labctl.services.commands.open import current_status, execute
     from labctl.services.commands.requests import ToCampaign
-    from labctl.services.schemas.campaigns import ReasonRequest
 
     try:
         return execute(database, ABORT_CAMPAIGN, ToCampaign(campaign, ReasonRequest(reason=reason)))
@@ -206,11 +173,11 @@ def confirm(
     database: Database = None,
 ) -> None:
     """Answer a campaign's question: done, or cannot be done. An answer to an older question is refused."""
+    from labctl.answers.campaigns import ConfirmRequest
     from labctl.errors import BadInput
     from labctl.services.commands.acts.confirm import CONFIRM_PROMPT
     from labctl.services.commands.open import current_status, execute
     from labctl.services.commands.requests import ToCampaign
-    from labctl.services.schemas.campaigns import ConfirmRequest
 
     with one_clear_line():
         wanted = campaign if campaign is not None else current_status(database, None).id
@@ -230,10 +197,10 @@ def draft(
     database: Database = None,
 ) -> None:
     """Make the drafts of a campaign that is done, where they are still due. A running service does it by itself."""
+    from labctl.answers.drafts import DraftsRequest
     from labctl.services.commands.open import current_status, execute
     from labctl.services.commands.registry import MAKE_DRAFTS
     from labctl.services.commands.requests import ToCampaign
-    from labctl.services.schemas.reports.drafts import DraftsRequest
 
     with one_clear_line():
         wanted = campaign if campaign is not None else current_status(database, None).id
@@ -250,5 +217,5 @@ def draft(
 
 def add_to(app: typer.Typer) -> None:
     """Put these commands beside the others of `labctl campaign`."""
-    for command in (watch, pause, resume, abort, confirm, draft):
+    for command in (watch, resume, abort, confirm, draft):
         app.command(command.__name__)(command)

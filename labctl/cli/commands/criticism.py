@@ -128,11 +128,11 @@ def improve(
     database: Database = None,
 ) -> None:
     """Change a version's effects and fit again: a new version, with the error before and after."""
+    from labctl.answers.calibrations import ImproveRequest
     from labctl.services.commands.open import execute
     from labctl.services.commands.registry import IMPROVE
     from labctl.services.commands.requests import ToNewestOrVersion
     from labctl.services.effects import as_lines
-    from labctl.services.schemas.calibrations import ImproveRequest
 
     def names(given: list[str] | None) -> list[str]:
         return [name.strip() for text in given or [] for name in text.split(",") if name.strip()]

@@ -12,7 +12,7 @@ from labctl.cli.options import Database, Json
 from labctl.cli.output import console, print_json, stderr
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.admin import CheckResponse
+    from labctl.answers.admin import CheckResponse
 
 
 def backup(

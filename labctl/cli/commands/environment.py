@@ -38,10 +38,10 @@ def add(
 ) -> None:
     """Enter a reading of the room; certificates state the least and the largest of their campaign."""
     from labctl.acting_user import actor
+    from labctl.answers.validity import RoomEnvironmentRequest, RoomRecord, RoomValue
     from labctl.errors import BadInput
     from labctl.services.commands.open import execute
     from labctl.services.commands.standards import ADD_ENVIRONMENT
-    from labctl.services.schemas.validity import RoomEnvironmentRequest, RoomRecord, RoomValue
 
     with one_clear_line():
         given = [

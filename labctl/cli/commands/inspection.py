@@ -14,7 +14,7 @@ from labctl.cli.output import console, print_json
 from labctl.cli.printing.inspection import print_inspection
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.inspection import InspectionResponse
+    from labctl.answers.inspection import InspectionResponse
 
 
 def inspect(

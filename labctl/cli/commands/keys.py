@@ -26,9 +26,9 @@ def create(
     database: Database = None,
 ) -> None:
     """Make a key and print it once: only its digest is stored."""
+    from labctl.answers.admin import KeyRequest, Role
     from labctl.services.commands.open import execute
     from labctl.services.commands.registry import CREATE_KEY
-    from labctl.services.schemas.admin import KeyRequest, Role
 
     with one_clear_line():
         answer = execute(database, CREATE_KEY, KeyRequest.model_validate({"name": name, "role": role}))
@@ -67,10 +67,10 @@ def revoke(
     name: KeyName, reason: Reason = "revoked from the command line", as_json: Json = False, database: Database = None
 ) -> None:
     """Revoke a key, at once."""
+    from labctl.answers.campaigns import ReasonRequest
     from labctl.services.commands.open import execute
     from labctl.services.commands.registry import REVOKE_KEY
     from labctl.services.commands.requests import ToKey
-    from labctl.services.schemas.campaigns import ReasonRequest
 
     with one_clear_line():
         answer = execute(database, REVOKE_KEY, ToKey(name, ReasonRequest(reason=reason)))

@@ -14,8 +14,8 @@ from labctl.cli.output import print_json
 from labctl.cli.printing.sensors import print_kept, print_sensor
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.reports.magnetometer import MagnetometerResponse
-    from labctl.services.schemas.sensors import MagnetometerVersion, MeasuredData
+    from labctl.answers.magnetometer import MagnetometerResponse
+    from labctl.answers.sensors import MagnetometerVersion, MeasuredData
 
 Readings = Annotated[
     Path,
@@ -79,10 +79,10 @@ def magnetometer(
 def _kept(
     database: str | None, serial: str, data: MeasuredData, answer: MagnetometerResponse, by: str | None
 ) -> MagnetometerVersion:
+    from labctl.answers.sensors import MagnetometerRequest
     from labctl.services.commands.open import execute
     from labctl.services.commands.requests import ToUnit
     from labctl.services.commands.sensors import KEEP_MAGNETOMETER
-    from labctl.services.schemas.sensors import MagnetometerRequest
 
     request = MagnetometerRequest(data=data, result=answer, by=who(by))
     return execute(database, KEEP_MAGNETOMETER, ToUnit(serial, request))

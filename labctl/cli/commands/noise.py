@@ -14,7 +14,7 @@ from labctl.cli.output import console, format_number, print_json, stderr
 from labctl.cli.printing.noise import print_allan
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.reports.orientation import OrientationResponse
+    from labctl.answers.orientation import OrientationResponse
 
 
 WarmUp = Annotated[
@@ -163,10 +163,10 @@ def orientation(
     database: Database = None,
 ) -> None:
     """Follow the angle of one axis: static bias off (Ojeda 2000, eqs. 15-16), offset renewed at standstill (Weiss)."""
+    from labctl.answers.orientation import OrientationOptions
     from labctl.errors import BadInput
     from labctl.services.calibrations.orientation import orientation_of_file, orientation_of_unit
     from labctl.services.commands.open import open_readonly
-    from labctl.services.schemas.reports.orientation import OrientationOptions
 
     with one_clear_line():
         options = OrientationOptions(

@@ -99,8 +99,8 @@ def driver_checks(
 def _try_description(
     file: str, port: str | None, host: str | None, wire_log: Path | None, *, move: bool, as_json: bool
 ) -> None:
+    from labctl.answers.admin import DescribedCheckResponse
     from labctl.services.benches.described_instruments import check_description
-    from labctl.services.schemas.admin import DescribedCheckResponse
 
     sends = port is not None or host is not None
 
@@ -129,8 +129,8 @@ def _try_description(
 
 
 def _try_driver(name: str, bench: str | None, *, as_json: bool) -> None:
+    from labctl.answers.admin import DriverCheckResponse
     from labctl.services.plugins import check_driver
-    from labctl.services.schemas.admin import DriverCheckResponse
 
     def show(each: DriverCheckResponse) -> None:
         if not as_json:

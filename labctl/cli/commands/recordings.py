@@ -14,7 +14,7 @@ from labctl.cli.output import console, print_json, print_warnings
 from labctl.cli.printing.inspection import print_left_out
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.recordings import ImportResponse
+    from labctl.answers.recordings import ImportResponse
 
 export_app = typer.Typer(no_args_is_help=True, help="Export recordings from the database to files.")
 
@@ -124,9 +124,9 @@ def export_recording(
     database: Database = None,
 ) -> None:
     """Write a recording in the interchange format: every reading, unchanged."""
+    from labctl.answers.recordings import ExportedRecording
     from labctl.services.commands.open import open_readonly
     from labctl.services.recordings.transfer import export_recording as export
-    from labctl.services.schemas.recordings import ExportedRecording
 
     with one_clear_line(), open_readonly(database) as store:
         written = export(store, recording, out, "csv" if csv else "parquet", points=points)

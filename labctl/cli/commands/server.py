@@ -85,7 +85,7 @@ def serve(
 
 def _print_ready(service: Ready, request: ServeRequest, *, as_json: bool) -> None:
     """Print where a service answers, and how its bench was found."""
-    from labctl.services.schemas.service import ServiceReady
+    from labctl.answers.service import ServiceReady
 
     named, start_at = request.bench_name, request.simulated_start
     unconfirmed, cut_short = ("", "") if named is None else _found(named, request.database)
@@ -178,8 +178,8 @@ def simulator(
     database: Database = None,  # noqa: ARG001  every command takes it
 ) -> None:
     """Serve a bench's simulated instruments on pseudo-terminals and TCP ports, until Ctrl-C."""
+    from labctl.answers.service import SimulatorReady
     from labctl.services.benches.check import serve_simulator
-    from labctl.services.schemas.service import SimulatorReady
 
     def ready(addresses: dict[str, str]) -> None:
         if as_json:

@@ -12,7 +12,7 @@ from labctl.cli.output import print_json
 from labctl.cli.printing.standards import print_affected, print_check_gyro, print_comparison, print_list, print_standard
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.standards import CertifiedPointRequest
+    from labctl.answers.standards import CertifiedPointRequest
 
 app = typer.Typer(
     no_args_is_help=True, help="Reference standards: certificates over time, drift, checks, and where each was used."
@@ -59,9 +59,9 @@ def add(
     database: Database = None,
 ) -> None:
     """Enter a standard in the register."""
+    from labctl.answers.standards import StandardRequest
     from labctl.services.commands.open import execute
     from labctl.services.commands.standards import ADD_STANDARD
-    from labctl.services.schemas.standards import StandardRequest
 
     with one_clear_line():
         request = StandardRequest(
@@ -116,11 +116,11 @@ def certificate(
     database: Database = None,
 ) -> None:
     """Enter a certificate of a standard."""
+    from labctl.answers.standards import StandardCertificateRequest
     from labctl.errors import BadInput
     from labctl.services.commands.open import execute
     from labctl.services.commands.requests import ToStandard
     from labctl.services.commands.standards import ADD_STANDARD_CERTIFICATE
-    from labctl.services.schemas.standards import StandardCertificateRequest
 
     with one_clear_line():
         if (calibrated_on := day(calibrated, "--calibrated")) is None:
@@ -135,8 +135,8 @@ def certificate(
 
 def _point(text: str, k: float) -> CertifiedPointRequest:
     """Return the point of "[NOMINAL:]ERROR:U". Raises BadInput."""
+    from labctl.answers.standards import CertifiedPointRequest
     from labctl.errors import BadInput
-    from labctl.services.schemas.standards import CertifiedPointRequest
 
     parts = text.split(":")
     try:
@@ -163,10 +163,10 @@ def check(
     database: Database = None,
 ) -> None:
     """Enter an intermediate check; exit status 1 when it is out of the control limits."""
+    from labctl.answers.standards import StandardCheckRequest
     from labctl.services.commands.open import execute
     from labctl.services.commands.requests import ToStandard
     from labctl.services.commands.standards import ADD_STANDARD_CHECK
-    from labctl.services.schemas.standards import StandardCheckRequest
 
     with one_clear_line():
         request = StandardCheckRequest(
@@ -193,11 +193,11 @@ def bad(
     database: Database = None,
 ) -> None:
     """Say that a standard was found bad, and list the calibrations that it was used for on these days."""
+    from labctl.answers.standards import StandardBadRequest
     from labctl.errors import BadInput
     from labctl.services.commands.open import execute, open_readonly
     from labctl.services.commands.requests import ToStandard
     from labctl.services.commands.standards import MARK_STANDARD_BAD
-    from labctl.services.schemas.standards import StandardBadRequest
     from labctl.services.standards.usage import affected as affected_by
 
     with one_clear_line():
@@ -221,10 +221,10 @@ def withdraw(
     database: Database = None,
 ) -> None:
     """Withdraw a finding that was wrong."""
+    from labctl.answers.standards import WithdrawFindingRequest
     from labctl.services.commands.open import execute
     from labctl.services.commands.requests import ToFinding
     from labctl.services.commands.standards import WITHDRAW_FINDING
-    from labctl.services.schemas.standards import WithdrawFindingRequest
 
     with one_clear_line():
         request = WithdrawFindingRequest(reason=reason, by=who(by))
@@ -266,11 +266,11 @@ def check_gyro(
     database: Database = None,
 ) -> None:
     """Show the control charts of a check gyro; exit status 1 when its newest result is out of limits."""
+    from labctl.answers.validity import CheckGyroRequest
     from labctl.services.check_gyros import check_gyro as charts_of
     from labctl.services.commands.open import execute, open_readonly
     from labctl.services.commands.requests import ToUnit
     from labctl.services.commands.standards import SET_CHECK_GYRO
-    from labctl.services.schemas.validity import CheckGyroRequest
 
     with one_clear_line():
         if mark is None:

@@ -12,7 +12,7 @@ from labctl.cli.options import Database, Json, Limit, Search, Serial
 from labctl.cli.output import console, format_number, print_heading, print_json, print_part, table
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.units import AppliedVersion, TrendResponse
+    from labctl.answers.units import AppliedVersion, TrendResponse
 
 
 def units(

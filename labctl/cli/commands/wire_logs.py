@@ -12,7 +12,7 @@ from labctl.cli.options import Json
 from labctl.cli.output import console, print_json
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.wire_logs import ReadingsDigest, ReplayResponse
+    from labctl.answers.wire_logs import ReadingsDigest, ReplayResponse
 
 
 def replay(

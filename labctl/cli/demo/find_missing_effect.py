@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from instruments.clock import VirtualClock
+from labctl.answers.calibrations import ImproveRequest
+from labctl.answers.criticism import CriticismResponse
 from labctl.cli.demo.runner import DemoRunner
 from labctl.cli.printing.criticism import ladder_lines
 from labctl.services.calibrations.revision import improve_unit
 from labctl.services.criticism.criticise import criticise_unit
 from labctl.services.criticism.ladder import ladder
-from labctl.services.schemas.calibrations import ImproveRequest
-from labctl.services.schemas.criticism import CriticismResponse
 
 SERIAL = "FOG-0002"
 HIDDEN = {"scale_factor_asymmetry": 2e-4}

@@ -12,6 +12,8 @@ from rich.console import Console
 
 from instruments.bench_config import SimulationSettings
 from instruments.clock import VirtualClock
+from labctl.answers.calibrations import FitRequest, FitResponse
+from labctl.answers.campaigns import CampaignResponse
 from labctl.cli.progress_bar import CampaignProgress
 from labctl.fitting import FitData, fit_data_of
 from labctl.services.calibrations.fitting import fit_unit
@@ -19,8 +21,6 @@ from labctl.services.campaigns.execution import run
 from labctl.services.campaigns.preparation import prepare
 from labctl.services.campaigns.status import answer_of
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.calibrations import FitRequest, FitResponse
-from labctl.services.schemas.campaigns import CampaignResponse
 from labctl.store import Store
 from procedures.contracts.campaign_state import CampaignState
 from procedures.monitoring.progress import Progress

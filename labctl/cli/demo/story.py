@@ -9,13 +9,13 @@ from pathlib import Path
 from pydantic import JsonValue
 
 from instruments.clock import VirtualClock
+from labctl.answers.certification import CertifyRequest
+from labctl.answers.fitted_model import ErrorFiguresJson
 from labctl.cli.demo import example_data, find_missing_effect, serve_calibrations, single_axis, triaxial
 from labctl.cli.demo.runner import DemoRunner, maybe_silent
 from labctl.errors import BadInput
 from labctl.fitting.estimation.error_metrics import first_of_smallest
-from labctl.json_types.models import ErrorFiguresJson
 from labctl.services.calibrations.certification import put_in_force
-from labctl.services.schemas.certification import CertifyRequest
 from labctl.store import open_store
 
 DATABASE = "demo.sqlite"
@@ -51,7 +51,7 @@ def _certify_best(demo: DemoRunner, serial: str) -> None:
     act = put_in_force(demo.store, serial, best.version, request, VirtualClock().utc(), None)
     demo.say(f"{serial} version {act.version} ({best.model}): verdict {act.verdict or f'none, {act.verdict_reason}'}")
     for each in act.objections:
-        demo.say(f"  overridden: {each.text}")
+        demo.say(f"  overridden: {each['text']}")
 
 
 def _least_known(error: ErrorFiguresJson) -> float:

@@ -9,7 +9,7 @@ from rich.text import Text
 from labctl.cli.output import console
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.benches import BenchCheckResponse, DeviceCheck
+    from labctl.answers.benches import BenchCheckResponse, DeviceCheck
 
 MARKS = {"good": Text("answers", "green"), "doubtful": Text("doubt  ", "yellow"), "bad": Text("failed ", "red")}
 

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from labctl.answers.certification import CertificationResponse, ReleaseRequestResponse
 from labctl.cli.output import console, format_number, print_heading, print_warnings, table
 from labctl.cli.printing.joint import print_joint
 from labctl.fitting.numeric.rounding import rounded_to_uncertainty
-from labctl.services.schemas.certification import CertificationResponse, ReleaseRequestResponse
 
 if TYPE_CHECKING:
-    from labctl.json_types.models import Coefficients, Entry, HeldJson
-    from labctl.json_types.poses import PosesJson
-    from labctl.services.schemas.calibrations import FitResponse
+    from labctl.answers.calibrations import FitResponse
+    from labctl.answers.fitted_model import Coefficients, Entry, HeldJson
+    from labctl.answers.poses import PosesJson
 
 
 def print_fit(answer: FitResponse) -> None:
@@ -148,7 +148,7 @@ def _verdict(answer: CertificationResponse) -> str:
 
 def _print_objections(answer: CertificationResponse) -> None:
     for each in answer.objections:
-        console.print(f"  overridden: {each.text}", style="bold red", soft_wrap=True)
+        console.print(f"  overridden: {each['text']}", style="bold red", soft_wrap=True)
 
 
 def print_table(coefficients: Coefficients) -> None:

@@ -13,10 +13,10 @@ from labctl.cli.turn_text import turn_text
 from procedures.contracts.campaign_state import STOPPED_EARLY, UNDER_WAY
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.campaigns import CampaignResponse
-    from labctl.services.schemas.plans import AttendanceResponse, MisalignmentOutlook, PlanResponse
-    from labctl.services.schemas.reports.drafts import DraftResponse
-    from labctl.services.schemas.schedule import ScheduledResponse
+    from labctl.answers.campaigns import CampaignResponse
+    from labctl.answers.drafts import DraftResponse
+    from labctl.answers.plans import AttendanceResponse, MisalignmentOutlook, PlanResponse
+    from labctl.answers.schedule import ScheduledResponse
 
 
 def _print_guesses(guessed: Sequence[str]) -> None:
@@ -77,7 +77,7 @@ def print_end(answer: CampaignResponse, *, as_json: bool) -> None:
 
 def print_started(answer: CampaignResponse | ScheduledResponse, *, as_json: bool) -> None:
     """Print how a campaign ended, or the entry of the schedule that it became."""
-    from labctl.services.schemas.schedule import ScheduledResponse
+    from labctl.answers.schedule import ScheduledResponse
 
     if not isinstance(answer, ScheduledResponse):
         print_end(answer, as_json=as_json)

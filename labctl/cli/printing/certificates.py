@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from labctl.services.schemas.documents.certificates import CertificateResponse
+from labctl.answers.certificates import CertificateResponse
 
 
 def list_line(row: CertificateResponse) -> str:

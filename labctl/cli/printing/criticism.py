@@ -9,11 +9,11 @@ from labctl.cli.output import console, format_number, print_heading, print_warni
 from labctl.cli.printing.joint import print_joint
 
 if TYPE_CHECKING:
-    from labctl.json_types.criticism import ResidualMap, Suspect
-    from labctl.json_types.noise import StaticRecordJson
-    from labctl.services.schemas.calibrations import ImproveResponse
-    from labctl.services.schemas.criticism import CriticismResponse, VerificationResponse
-    from labctl.services.schemas.reports.ladder import LadderResponse
+    from labctl.answers.calibrations import ImproveResponse
+    from labctl.answers.criticism import CriticismResponse, ResidualMap, Suspect
+    from labctl.answers.ladder import LadderResponse
+    from labctl.answers.noise import StaticRecordJson
+    from labctl.answers.verification import VerificationResponse
 
 
 #: From dark to bright: residual over floor in the small map.

@@ -9,7 +9,7 @@ from rich.text import Text
 from labctl.cli.output import console, format_number, print_heading, table
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.reports.datasheet import Characteristic, DatasheetResponse
+    from labctl.answers.datasheet import Characteristic, DatasheetResponse
 
 
 def print_datasheet(answer: DatasheetResponse) -> None:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from labctl.cli.output import console, print_warnings
 
 if TYPE_CHECKING:
-    from labctl.recording.info import LeftOut
-    from labctl.services.schemas.inspection import InspectionResponse
+    from labctl.answers.inspection import InspectionResponse
+    from labctl.answers.recording_head import LeftOut
 
 
 def print_left_out(left_out: Sequence[LeftOut]) -> None:

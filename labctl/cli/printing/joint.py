@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from labctl.cli.output import console, format_number
 
 if TYPE_CHECKING:
-    from labctl.json_types.joint import JointJson
+    from labctl.answers.joint import JointJson
 
 
 def print_joint(joint: JointJson | None) -> None:

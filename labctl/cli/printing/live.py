@@ -10,8 +10,8 @@ from rich.segment import ControlType
 from labctl.cli.output import console, stderr
 
 if TYPE_CHECKING:
+    from labctl.answers.live import LiveResponse
     from labctl.fitting.live import LiveState
-    from labctl.services.schemas.live import LiveResponse
 
 
 #: So long nothing is said of what the readings lack, s.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.admin import MigrationResponse
+    from labctl.answers.admin import MigrationResponse
 
 
 def migration_text(answer: MigrationResponse) -> str:

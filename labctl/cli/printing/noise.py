@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from labctl.cli.output import console, format_number, table
 
 if TYPE_CHECKING:
-    from labctl.json_types.noise import AllanJson, NoiseFigure
-    from labctl.services.schemas.recordings import AllanResponse
+    from labctl.answers.noise import AllanJson, NoiseFigure
+    from labctl.answers.recordings import AllanResponse
 
 #: Averaging times closer than this share of each other stand in one row.
 SAME_TIME = 1e-3

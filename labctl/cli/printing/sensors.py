@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from labctl.answers.accelerometer import AccelerometerResponse
+from labctl.answers.magnetometer import MagnetometerResponse
+from labctl.answers.sensors import AccelerometerVersion, MagnetometerVersion, SensorVersionResponse
 from labctl.cli.output import console, format_number, table
-from labctl.services.schemas.reports.accelerometer import AccelerometerResponse
-from labctl.services.schemas.reports.magnetometer import MagnetometerResponse
-from labctl.services.schemas.sensors import AccelerometerVersion, MagnetometerVersion, SensorVersionResponse
 from labctl.services.sensor_coefficients import coefficients_of
 
 #: Of the expanded uncertainty.

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 from labctl.cli.output import console, format_number, table
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.standards import AffectedResponse, ChartLimits, DriftPrediction, StandardResponse
-    from labctl.services.schemas.validity import CheckGyroResponse, LaboratoryComparison
+    from labctl.answers.standards import AffectedResponse, ChartLimits, DriftPrediction, StandardResponse
+    from labctl.answers.validity import CheckGyroResponse, LaboratoryComparison
 
 
 def print_list(answers: Sequence[StandardResponse]) -> None:

@@ -9,10 +9,9 @@ from labctl.cli.output import console, format_number, stderr, table
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from labctl.services.schemas.uncertainty import (
+    from labctl.answers.budget import BudgetJson, BudgetLineJson
+    from labctl.answers.uncertainty import (
         AnyAxisUncertainty,
-        BudgetLineResponse,
-        BudgetResponse,
         UncertaintyResponse,
         VectorUncertainty,
     )
@@ -41,29 +40,30 @@ def print_uncertainty(answer: UncertaintyResponse) -> None:
             style="yellow",
         )
     if answer.overdue:
-        late = {line.name: line.due for one in answer.budget.values() for line in one.lines if line.overdue}
+        late = {line["name"]: line["due"] for one in answer.budget.values() for line in one["lines"] if line["overdue"]}
         for name, due in late.items():
             stderr.print(f"standard {name} was past its due date {due}; have it calibrated", style="bold red")
 
 
-def _print_lines(title: str, budget: BudgetResponse) -> None:
+def _print_lines(title: str, budget: BudgetJson) -> None:
     rows = table(title, "source", "type", "distribution", "u", "unit", "c", "|c| u, deg/s", "freedom", numbers=1)
-    for line in budget.lines:
-        freedom = "inf" if line.degrees_of_freedom is None else format_number(line.degrees_of_freedom, 3)
+    for line in budget["lines"]:
+        freedom = "inf" if line["degrees_of_freedom"] is None else format_number(line["degrees_of_freedom"], 3)
         rows.add_row(
-            f"{line.source} ({line.name})" if line.source in EVALUATED else line.name, line.type, line.distribution,
-            format_number(line.u, 3), line.unit, format_number(line.sensitivity, 3), _contribution(line), freedom,
+            f"{line['source']} ({line['name']})" if line["source"] in EVALUATED else line["name"], line["type"],
+            line["distribution"], format_number(line["u"], 3), line["unit"], format_number(line["sensitivity"], 3),
+            _contribution(line), freedom,
         )  # fmt: skip
     console.print(rows)
-    effective = budget.effective_degrees_of_freedom
+    effective = budget["effective_degrees_of_freedom"]
     console.print(
-        f"u_c = {format_number(budget.combined, 2)} deg/s, effective degrees of freedom "
-        f"{'inf' if effective is None else format_number(effective, 3)}, k = {format_number(budget.k, 3)}, "
-        f"U = {format_number(budget.expanded, 2)} deg/s (95.45 %)",
+        f"u_c = {format_number(budget['combined'], 2)} deg/s, effective degrees of freedom "
+        f"{'inf' if effective is None else format_number(effective, 3)}, k = {format_number(budget['k'], 3)}, "
+        f"U = {format_number(budget['expanded'], 2)} deg/s (95.45 %)",
     )
-    for line in budget.lines:
-        if line.contribution is None and line.stated:
-            console.print(f"{line.source} is unknown: {line.why}", style="yellow")
+    for line in budget["lines"]:
+        if line["contribution"] is None and line["stated"]:
+            console.print(f"{line['source']} is unknown: {line['why']}", style="yellow")
 
 
 def _print_covariance(vector: VectorUncertainty) -> None:
@@ -89,17 +89,19 @@ def _print_any_axis(any_axis: Mapping[str, AnyAxisUncertainty]) -> None:
         "output", "U, frame of the case", "U, up to a rotation of the frame", "per deg/s across", numbers=3,
     )  # fmt: skip
     for axis, one in any_axis.items():
-        across = "" if one.cross_rates is None else format_number(one.cross_rates.per_dps, 3)
+        across = "" if one.cross_rates is None else format_number(one.cross_rates["per_dps"], 3)
         rows.add_row(axis, format_number(one.bound_dps, 2), format_number(one.aligned_bound_dps, 2), across)
     console.print(rows)
-    reasons = [text for one in any_axis.values() for text in (one.why, one.cross_rates.why if one.cross_rates else "")]
+    reasons = [
+        text for one in any_axis.values() for text in (one.why, one.cross_rates["why"] if one.cross_rates else "")
+    ]
     for text in dict.fromkeys(reasons):
         if text:
             console.print(f"unknown about any axis: {text}", style="yellow")
 
 
-def _contribution(line: BudgetLineResponse) -> str:
-    return "not stated" if not line.stated else format_number(line.contribution, 2)
+def _contribution(line: BudgetLineJson) -> str:
+    return "not stated" if not line["stated"] else format_number(line["contribution"], 2)
 
 
 def _print_coefficients(answer: UncertaintyResponse) -> None:
@@ -109,11 +111,11 @@ def _print_coefficients(answer: UncertaintyResponse) -> None:
     )  # fmt: skip
     for axis, named in answer.coefficients.items():
         for name, one in named.items():
-            parts = [line.contribution for line in one.lines if line.source not in EVALUATED]
+            parts = [line["contribution"] for line in one["lines"] if line["source"] not in EVALUATED]
             known = [part for part in parts if part is not None]
             standards = sum(part**2 for part in known) ** 0.5 if known else None
             rows.add_row(
-                f"{axis} {name}", one.unit, format_number(one.value), format_number(one.combined, 2),
-                format_number(one.k, 3), format_number(one.expanded, 2), format_number(standards, 2),
+                f"{axis} {name}", one["unit"], format_number(one["value"]), format_number(one["combined"], 2),
+                format_number(one["k"], 3), format_number(one["expanded"], 2), format_number(standards, 2),
             )  # fmt: skip
     console.print(rows)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from labctl.answers.criticism import Advice
 from labctl.errors import LabctlError
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.data.joined import recordings_in
@@ -26,7 +27,6 @@ from labctl.fitting.models.force_sensitivity import EFFECTS as OF_FORCE
 from labctl.fitting.models.presets import Preset, changed
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.least_squares import Solution
-from labctl.json_types.criticism import Advice
 from labctl.progress import report_stage
 from labctl.recording.columns import RECORDING
 

@@ -10,6 +10,8 @@ from operator import attrgetter
 import numpy as np
 from scipy.special import chdtrc
 
+from labctl.answers.criticism import Advice, NotTestable, SlowProcess
+from labctl.answers.views import Views
 from labctl.fitting.criticism.advice import advice_for, is_carried
 from labctl.fitting.criticism.candidates import beside_held
 from labctl.fitting.criticism.diagnostics import views_of
@@ -38,8 +40,6 @@ from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.presets import changed, unchanged
 from labctl.fitting.numeric.blas_threads import single_threaded
 from labctl.fitting.numeric.drift_noise import Drift
-from labctl.json_types.criticism import Advice, NotTestable, SlowProcess
-from labctl.json_types.views import Views
 from labctl.progress import report_stage
 from labctl.recording import Recording
 from labctl.recording.verification import fitted_part

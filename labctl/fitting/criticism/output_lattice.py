@@ -12,9 +12,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.answers.criticism import OutputStep
 from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.numeric.arrays import Array
-from labctl.json_types.criticism import OutputStep
 from labctl.recording import Recording
 from labctl.recording.output_steps import output_steps
 

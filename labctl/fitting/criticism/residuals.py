@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
+from labctl.answers.criticism import FailingRange, WorstDataSet
 from labctl.fitting.criticism.channel_functions import smooth_channels
 from labctl.fitting.criticism.evidence.elimination import stack
 from labctl.fitting.criticism.evidence.noise_grid import factors
@@ -17,7 +18,6 @@ from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.data.noise_floor import NoiseFloor
 from labctl.fitting.data.temperature.levels import ONE_LEVEL_SPAN_C
 from labctl.fitting.numeric.arrays import Array, over
-from labctl.json_types.criticism import FailingRange, WorstDataSet
 
 #: Bins of a channel over which residuals are averaged.
 BINS = 8

@@ -12,13 +12,13 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.answers.criticism import Advice, SlowProcess
 from labctl.fitting.criticism.advice import LEAST_GAIN_AT_REST
 from labctl.fitting.criticism.channel_functions import TIMES
 from labctl.fitting.criticism.model_comparison import Comparison
 from labctl.fitting.criticism.residuals import Residuals
 from labctl.fitting.criticism.verdict import ENOUGH, FAR, Verdict
 from labctl.fitting.numeric.arrays import Array
-from labctl.json_types.criticism import Advice, SlowProcess
 
 #: Correlation of neighbouring data sets from which on a residual is slow: it goes on longer than the data sets last.
 LEAST_CORRELATION = 0.3

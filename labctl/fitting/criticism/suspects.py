@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtrc
 
+from labctl.answers.fitted_model import Coefficient
 from labctl.errors import LabctlError
 from labctl.fitting.criticism.model_comparison import Comparison
 from labctl.fitting.criticism.ranking import Candidate
@@ -26,7 +27,6 @@ from labctl.fitting.estimation.result import FitResult
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.presets import changed
 from labctl.fitting.numeric.json_numbers import none_for_nan
-from labctl.json_types.models import Coefficient
 from labctl.progress import report_stage
 
 #: At most this many suspects are reported.

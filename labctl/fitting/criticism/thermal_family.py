@@ -13,14 +13,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.answers.criticism import Advice
+from labctl.answers.fitted_model import Coefficient, ThermalFamilyJson, ThermalHintJson
 from labctl.fitting.criticism.verdict import Form, Verdict
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.effects import CATALOGUE, Span, Term
 from labctl.fitting.estimation.thermal_flows import NONE, Axis, LeftOut, left_out_by, pooled
 from labctl.fitting.estimation.thermal_response import ThermalResponse, stretches_of, thermal_response
 from labctl.fitting.models.error_model import ErrorModel
-from labctl.json_types.criticism import Advice
-from labctl.json_types.models import Coefficient, ThermalFamilyJson, ThermalHintJson
 
 LAG = "thermal_lag"
 #: The members beside the lag, and all of them.

@@ -12,14 +12,14 @@ from typing import Literal
 
 import numpy as np
 
+from labctl.answers.criticism import Remainder
+from labctl.answers.fitted_model import Coefficient
 from labctl.fitting.criticism.channel_functions import TIMES
 from labctl.fitting.criticism.evidence.gains import reproduced_and_size, solve_option
 from labctl.fitting.criticism.model_comparison import Comparison
 from labctl.fitting.criticism.ranking import Candidate, are_exact
 from labctl.fitting.effects import Term
 from labctl.fitting.effects.derived import with_derived
-from labctl.json_types.criticism import Remainder
-from labctl.json_types.models import Coefficient
 
 Form = Literal["adequate", "missing", "ambiguous", "unexplained", "insufficient_data"]
 #: What an unexplained residual may be caused by that is no effect of the catalogue.

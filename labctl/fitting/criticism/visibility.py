@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.answers.criticism import NotTestable
 from labctl.errors import NotEnoughData
 from labctl.fitting.criticism.candidate_shape import CandidateShape, slices_of
 from labctl.fitting.criticism.candidates import untestable_channels
@@ -22,7 +23,6 @@ from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.effects import CATALOGUE, Effect
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.presets import usual_model
-from labctl.json_types.criticism import NotTestable
 from labctl.recording import Recording
 
 #: An effect of which less than this share is visible beside the model cannot be shown by the schedule.

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.answers.noise import AllanJson, NoiseFigure, StaticRecordJson
 from labctl.fitting.numeric.allan import LEAST_READINGS, Allan, Figure, allan
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.json_numbers import plain, plain_list
-from labctl.json_types.noise import AllanJson, NoiseFigure, StaticRecordJson
 from labctl.recording import Recording
 from labctl.recording.points import temperature_of
 from labctl.recording.recording import Columns

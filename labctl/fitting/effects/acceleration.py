@@ -6,10 +6,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from labctl.answers.fitted_model import Origin
 from labctl.fitting.data.channels import BODY_AXES, Channels
 from labctl.fitting.effects.base import Column, Effect, Parameter, Reference, Rows, Span, Term, by_parameter
 from labctl.fitting.numeric.arrays import Array
-from labctl.json_types.models import Origin
 
 GRAVITY = 9.80665
 #: Specific force along an axis that changes by less, g, is the tilt of a support and the drift of an accelerometer with

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from labctl.answers.fitted_model import Origin
 from labctl.fitting.data.channels import BODY_AXES, Channels
 from labctl.fitting.effects.base import Column, Effect, Reference, Rows, Term
-from labctl.json_types.models import Origin
 
 
 class Misalignment(Effect):

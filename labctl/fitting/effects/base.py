@@ -13,10 +13,10 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from labctl.answers.fitted_model import Origin
 from labctl.fitting.data.channels import Carrier, Channels
 from labctl.fitting.data.temperature.history import TemperatureHistory
 from labctl.fitting.numeric.arrays import Array
-from labctl.json_types.models import Origin
 
 #: Which output axes an effect shows on: the one that turns, the others, or all alike.
 Rows = Literal["own", "cross", "all"]

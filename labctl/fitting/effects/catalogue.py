@@ -11,6 +11,7 @@ from functools import cache
 from typing import Any
 
 from instruments.plugins import PluginGroup
+from labctl.answers.effects import EffectJson
 from labctl.errors import BadInput
 from labctl.fitting.effects import (
     acceleration,
@@ -27,7 +28,6 @@ from labctl.fitting.effects import (
 from labctl.fitting.effects.base import Effect, Term
 from labctl.fitting.effects.formula import NAME, Formula
 from labctl.fitting.effects.trial import refuse_useless
-from labctl.json_types.effects import EffectJson
 
 _OWN = (
     bias,

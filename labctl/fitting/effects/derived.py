@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from labctl.json_types.models import Coefficient, CoefficientTable
+from labctl.answers.fitted_model import Coefficient, CoefficientTable
 
 #: Estimated square -> name and unit of its root.
 ROOTS: Mapping[str, tuple[str, str]] = {"k_squared": ("k", "rad/(rad/s)")}

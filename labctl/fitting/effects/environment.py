@@ -6,9 +6,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from labctl.answers.fitted_model import Origin
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.effects.base import Column, Effect, Reference, Rows, Term
-from labctl.json_types.models import Origin
 
 
 class SupplySensitivity(Effect):

@@ -17,11 +17,11 @@ from typing import Any, ClassVar
 import numpy as np
 
 from instruments.toml_documents import read_toml
+from labctl.answers.fitted_model import Origin
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.effects.base import Column, Effect, Reference, Rows, Span, Term
 from labctl.fitting.numeric.arrays import Array
-from labctl.json_types.models import Origin
 
 #: What an operator or function takes and returns.
 Operand = float | Array

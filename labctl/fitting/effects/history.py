@@ -6,10 +6,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from labctl.answers.fitted_model import Origin
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.data.rate_profile import Response
 from labctl.fitting.effects.base import Column, Effect, Parameter, Reference, Rows, Span, Term, by_parameter
-from labctl.json_types.models import Origin
 
 
 class BiasDrift(Effect):

@@ -6,9 +6,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from labctl.answers.fitted_model import Origin
 from labctl.fitting.data.channels import BODY_AXES, Channels
 from labctl.fitting.effects.base import Column, Effect, Parameter, Reference, Rows, Span, Term, by_parameter
-from labctl.json_types.models import Origin
 
 
 class CrossAxisNonlinearity(Effect):

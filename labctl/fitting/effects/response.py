@@ -7,11 +7,11 @@ from typing import ClassVar
 
 import numpy as np
 
+from labctl.answers.fitted_model import Origin
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.data.rate_profile import DELAY, TIME_CONSTANT, Response
 from labctl.fitting.effects.base import Column, Effect, Law, Parameter, Reference, Rows, Span, Term, by_parameter
 from labctl.fitting.numeric.arrays import Array
-from labctl.json_types.models import Origin
 
 
 class _Responding(Effect):

@@ -8,11 +8,11 @@ from typing import ClassVar
 
 import numpy as np
 
+from labctl.answers.fitted_model import Origin
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.effects.base import Column, Effect, Law, Parameter, Reference, Span, Term, by_parameter, powers
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.open_loop_sine import sine_ratio, sine_ratio_slope
-from labctl.json_types.models import Origin
 
 #: Parameter of a sine response whose size was fitted beside K: calibrations until 0.1 hold such.
 FREE_AMPLITUDE = "free_amplitude"

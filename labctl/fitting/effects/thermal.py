@@ -7,11 +7,11 @@ from typing import ClassVar
 
 import numpy as np
 
+from labctl.answers.fitted_model import Origin
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.data.temperature.history import TemperatureHistory
 from labctl.fitting.effects.base import Column, Effect, Parameter, Reference, Rows, Span, Term, by_parameter
 from labctl.fitting.effects.thermal_lag import LAGS
-from labctl.json_types.models import Origin
 
 
 class TemperatureRate(Effect):

@@ -14,10 +14,10 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from labctl.answers.fitted_model import Origin
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.effects.base import Column, Effect, Parameter, Reference, Rows, Span, Term, by_parameter
 from labctl.fitting.numeric.arrays import Array
-from labctl.json_types.models import Origin
 
 #: What makes the error: the distance between element and thermometer, or that of the squares of their temperatures.
 Part = Literal["all", "curved"]

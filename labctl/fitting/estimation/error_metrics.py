@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from labctl.answers.fitted_model import ErrorFiguresJson, LegErrorJson
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.numeric.arrays import Array
-from labctl.json_types.models import ErrorFiguresJson, LegErrorJson
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.answers.fitted_model import AxisNoiseJson, FitEnvironment, LegErrorJson
 from labctl.errors import LabctlError, NotEnoughData
 from labctl.fitting.data.channels import BODY_AXES, Channels
 from labctl.fitting.data.covered import Covered
@@ -38,7 +39,6 @@ from labctl.fitting.models.presets import POSES, Preset, preset_for
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.blas_threads import single_threaded
 from labctl.fitting.numeric.least_squares import Solution
-from labctl.json_types.models import AxisNoiseJson, FitEnvironment, LegErrorJson
 from labctl.recording import Recording
 
 # Held-out errors by leg: fitted while the unit warms up and tested while it cools, and the other way round.

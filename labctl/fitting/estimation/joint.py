@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
+from labctl.answers.joint import EffectAgreement, HeldOutRecording, JointJson, RepeatabilityJson, ShiftJson
 from labctl.errors import LabctlError, NotEnoughData
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.data.joined import recordings_in
@@ -22,7 +23,6 @@ from labctl.fitting.models.inversion import NotConverged
 from labctl.fitting.models.presets import Preset
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.least_squares import Solution
-from labctl.json_types.joint import EffectAgreement, HeldOutRecording, JointJson, RepeatabilityJson, ShiftJson
 
 #: The effects that a shift between recordings adds to, by kind of shift.
 SHIFTED = {kind.effect: kind for kind in KINDS.values()}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from labctl.answers.fitted_model import AxisNoiseJson, FitEnvironment
 from labctl.errors import BadInput
 from labctl.fitting.estimation.error_metrics import ErrorFigures
 from labctl.fitting.estimation.result import FitResult
@@ -9,7 +10,6 @@ from labctl.fitting.models.presets import POSES
 from labctl.fitting.numeric.blas_threads import single_threaded
 from labctl.fitting.numeric.least_squares import Solution
 from labctl.fitting.poses.fit import fit_poses
-from labctl.json_types.models import AxisNoiseJson, FitEnvironment
 from labctl.recording import Recording
 
 #: Where the noise floor of a calibration by hand is from.

@@ -5,6 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from labctl.answers.fitted_model import (
+    AxisNoiseJson,
+    Coefficient,
+    Coefficients,
+    CoefficientTable,
+    FitEnvironment,
+    FitResultJson,
+    LeftOutEffect,
+)
+from labctl.answers.joint import JointJson
+from labctl.answers.poses import PosesJson
 from labctl.fitting.effects.derived import with_derived, with_derived_tables
 from labctl.fitting.estimation.error_metrics import ErrorFigures
 from labctl.fitting.models.error_model import ErrorModel
@@ -12,17 +23,6 @@ from labctl.fitting.models.fitted_model import AxisFit, FittedModel
 from labctl.fitting.models.temperature import LagrangeTable
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.json_numbers import none_for_nan
-from labctl.json_types.joint import JointJson
-from labctl.json_types.models import (
-    AxisNoiseJson,
-    Coefficient,
-    Coefficients,
-    CoefficientTable,
-    FitEnvironment,
-    FitResultJson,
-    LeftOut,
-)
-from labctl.json_types.poses import PosesJson
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class FitResult:
     #: Output -> name -> angle of the mountings, rad, as far as they are separated from the misalignments.
     angles_rad: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
-    def exported(self) -> tuple[FittedModel, list[LeftOut]]:
+    def exported(self) -> tuple[FittedModel, list[LeftOutEffect]]:
         """Return the part of the model that belongs to the unit, and what was left out, with its size."""
         model, left_out = self.fitted.exported()
         return model, [{**one, "rms_dps": self.left_out_dps.get(one["effect"])} for one in left_out]

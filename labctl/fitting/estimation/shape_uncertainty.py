@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.answers.fitted_model import Coefficient
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.effects import Term, kind_of
 from labctl.fitting.estimation.axis_design import axis_design
@@ -18,7 +19,6 @@ from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.drift_noise import whitened
 from labctl.fitting.numeric.least_squares import Solution
-from labctl.json_types.models import Coefficient
 
 #: Step of a parameter, in its logarithm.
 STEP = 0.02

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from labctl.answers.fitted_model import ErrorModelJson, TermJson
 from labctl.fitting.data.channels import Argument, Channels
 from labctl.fitting.effects import Column, Reference, Term, kind_of
 from labctl.fitting.models.held import Held
 from labctl.fitting.models.temperature import Constant, TemperatureBasis, basis_from_dict
 from labctl.fitting.numeric.arrays import Array
-from labctl.json_types.models import ErrorModelJson, TermJson
 from labctl.recording.columns import RECORDING
 
 #: Effects of these origins belong to the unit and are exported with its calibration.

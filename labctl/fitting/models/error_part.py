@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.json_types.models import ErrorPartJson
+from labctl.answers.fitted_model import ErrorPartJson
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.answers.fitted_model import AxisFitJson, FittedModelJson, LeftOutEffect
 from labctl.fitting.data.channels import Channels
 from labctl.fitting.effects import Term, kind_of
 from labctl.fitting.effects.scale_factor import FREE_AMPLITUDE
@@ -16,7 +17,6 @@ from labctl.fitting.models.error_part import ErrorPart
 from labctl.fitting.models.inversion import invert
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.json_numbers import none_for_nan
-from labctl.json_types.models import AxisFitJson, FittedModelJson, LeftOut
 
 
 @dataclass(frozen=True)
@@ -95,10 +95,10 @@ class FittedModel:
             self.model.name,
         )
 
-    def exported(self) -> tuple[FittedModel, list[LeftOut]]:
+    def exported(self) -> tuple[FittedModel, list[LeftOutEffect]]:
         """Return the part that belongs to the unit, and what was left out with its origin."""
         kept = tuple(t for t in self.model.terms if is_exported(t))
-        left_out: list[LeftOut] = [
+        left_out: list[LeftOutEffect] = [
             {"effect": t.effect, "origin": kind_of(t).origin, "term": kind_of(t).term}
             for t in self.model.terms
             if not is_exported(t)

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.answers.fitted_model import HeldCoefficientJson, HeldJson
 from labctl.fitting.models.temperature import LagrangeTable, TemperatureBasis
-from labctl.json_types.models import HeldCoefficientJson, HeldJson
 
 #: Temperatures between which a held table is interpolated, where it has as many.
 POINTS = 3

@@ -13,6 +13,8 @@ from typing import Literal
 
 import numpy as np
 
+from labctl.answers.fitted_model import StateJson
+from labctl.answers.json_object import JsonObject
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import BODY_AXES, Channels
 from labctl.fitting.data.temperature.history import LoggedColumns, TemperatureHistory, rounded_plays
@@ -21,8 +23,6 @@ from labctl.fitting.effects.thermal_lag import Lag, LagElement, Part, ScaleFacto
 from labctl.fitting.models.fitted_model import FittedModel, without
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.following import Steps
-from labctl.json_types import JsonObject
-from labctl.json_types.models import StateJson
 
 #: What `Follower.to_json` describes.
 STATE_EQUATION = (

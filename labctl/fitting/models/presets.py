@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.answers.effects import PresetJson
 from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting.data.fit_data import FitData
 from labctl.fitting.data.temperature.levels import level_means
@@ -15,7 +16,6 @@ from labctl.fitting.effects import Reference, Term, parse_term
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.held import Held
 from labctl.fitting.models.temperature import LagrangeTable
-from labctl.json_types.effects import PresetJson
 
 Rows = NDArray[np.bool_]
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.answers.fitted_model import TemperatureBasisJson
 from labctl.fitting.numeric.arrays import Array
-from labctl.json_types.models import TemperatureBasisJson
 
 
 @dataclass(frozen=True)

@@ -4,16 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from labctl.fitting.poses.alignment import Alignment
-from labctl.fitting.poses.at_rest.accelerometer import Accelerometer, different_poses
-from labctl.fitting.poses.at_rest.bias import Bias
-from labctl.fitting.poses.at_rest.rests import FACTOR, WINDOW_S, Rests
-from labctl.fitting.poses.determination import condition_of, turned_deg
-from labctl.fitting.poses.gyroscope import Gyroscope
-from labctl.fitting.poses.moves import Moves
-from labctl.fitting.poses.readings import AXES, PoseReadings
-from labctl.fitting.poses.triad import UPPER
-from labctl.json_types.poses import (
+from labctl.answers.poses import (
     AccelerometerCoefficient,
     AccelerometerJson,
     AlignmentJson,
@@ -23,6 +14,15 @@ from labctl.json_types.poses import (
     PosesJson,
     RestsJson,
 )
+from labctl.fitting.poses.alignment import Alignment
+from labctl.fitting.poses.at_rest.accelerometer import Accelerometer, different_poses
+from labctl.fitting.poses.at_rest.bias import Bias
+from labctl.fitting.poses.at_rest.rests import FACTOR, WINDOW_S, Rests
+from labctl.fitting.poses.determination import condition_of, turned_deg
+from labctl.fitting.poses.gyroscope import Gyroscope
+from labctl.fitting.poses.moves import Moves
+from labctl.fitting.poses.readings import AXES, PoseReadings
+from labctl.fitting.poses.triad import UPPER
 
 FRAME = (
     "body axes by the accelerometer: z along its z axis, its y axis in the plane of y and z; how they lie in the case "

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from labctl.answers.poses import PosesJson
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.numeric.least_squares import Solution
-from labctl.json_types.poses import PosesJson
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from typing import Literal
 
 import numpy as np
 
+from labctl.answers.budget import BudgetJson, BudgetLineJson
 from labctl.fitting.uncertainty.combination import combined_u, coverage_factor, effective_freedom, half_width
-from labctl.json_types.budget import BudgetJson, BudgetLineJson
 
 
 @dataclass(frozen=True)

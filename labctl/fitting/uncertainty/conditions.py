@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, replace
 from datetime import date
 from typing import Literal
 
+from labctl.answers.budget import BenchConditionsJson
+from labctl.answers.fitted_model import FitEnvironment
 from labctl.fitting.data.mounting_angles import AngleGains, angle_gains, placed_rad, separates_any
-from labctl.json_types.budget import BenchConditionsJson
-from labctl.json_types.models import FitEnvironment
 from labctl.recording import RecordingInfo, Standard
 
 Thermometer = Literal["unit", "chamber", "reference"]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from labctl.answers.budget import AxisBoundJson, ExpandedJson, UncertaintyJson
 from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.numeric.blas_threads import single_threaded
@@ -16,7 +17,6 @@ from labctl.fitting.uncertainty.grid import grid_rates, grid_temperatures
 from labctl.fitting.uncertainty.rate import RateUncertainty, rate_uncertainty
 from labctl.fitting.uncertainty.use import AxisEvidence
 from labctl.fitting.uncertainty.vector_bound import cross_rates, vector_bounds
-from labctl.json_types.budget import AxisBoundJson, ExpandedJson, UncertaintyJson
 
 
 @dataclass(frozen=True)

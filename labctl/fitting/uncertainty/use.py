@@ -9,6 +9,7 @@ from itertools import permutations
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.answers.calibration_file import AxisEvidenceJson
 from labctl.errors import LabctlError
 from labctl.fitting.data.channels import BODY_AXES
 from labctl.fitting.data.fit_data import FitData, fit_data_of
@@ -24,7 +25,6 @@ from labctl.fitting.numeric.json_numbers import plain_list
 from labctl.fitting.numeric.least_squares import Solution
 from labctl.fitting.uncertainty.local_model_error import LocalModelError
 from labctl.fitting.uncertainty.repeatability import Repeatability, repeatability_of
-from labctl.json_types.calibrations import AxisEvidenceJson
 from labctl.recording import Recording
 
 # Variance that a model leaves at each data set, by leaving out its temperature and its rate in turn.

@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from itertools import product
 
+from labctl.answers.budget import CrossRatesJson, VectorBoundJson
 from labctl.fitting.data.channels import BODY_AXES
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.uncertainty.budget import Budget
@@ -13,7 +14,6 @@ from labctl.fitting.uncertainty.combination import half_width
 from labctl.fitting.uncertainty.conditions import BenchConditions
 from labctl.fitting.uncertainty.rate_vector import RateVectorUncertainty, rate_vector_uncertainty
 from labctl.fitting.uncertainty.use import AxisEvidence
-from labctl.json_types.budget import CrossRatesJson, VectorBoundJson
 
 #: Signs of rate vectors: along the axes, the diagonals of the faces, and those of the cube.
 _SIGNS = [signs for signs in product((-1, 0, 1), repeat=3) if any(signs)]

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.answers.recording_head import OutputUnit
 from labctl.recording.column_map.guesses import temperature_unit
 from labctl.recording.column_map.model import MappedColumn
 from labctl.recording.column_map.problems import Problems, rows_text
 from labctl.recording.column_map.units import QUANTITIES, find_unit, is_lsb, names_of, unit_of_target
-from labctl.recording.info import OutputUnit
 from labctl.recording.raw_table import RawColumn
 
 Array = NDArray[np.float64]

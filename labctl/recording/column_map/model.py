@@ -16,9 +16,9 @@ from pydantic import (
     model_validator,
 )
 
+from labctl.answers.recording_head import Axis, Motion
 from labctl.recording.column_map.units import LSB, QUANTITIES, find_unit, is_lsb, names_of, unit_of_target
 from labctl.recording.columns import BY_NAME
-from labctl.recording.info import Axis, Motion
 from labctl.recording.positions import Position
 
 FORMAT: Literal["labctl-map/1"] = "labctl-map/1"

@@ -7,9 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.answers.recording_head import Motion
 from labctl.recording.column_map.movement import Movement, poses
 from labctl.recording.columns import BY_NAME, needed
-from labctl.recording.info import Motion, RecordingInfo
+from labctl.recording.info import RecordingInfo
 from labctl.recording.motions.constant_rate import rate_change
 from labctl.recording.recording import Columns
 from labctl.recording.sanity.finding import Finding

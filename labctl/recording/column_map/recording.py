@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from labctl.answers.recording_head import Motion, OutputUnit
 from labctl.recording.column_map.conversion import converted, output_of
 from labctl.recording.column_map.data_sets import Division, divide
 from labctl.recording.column_map.dates import ORDERS
@@ -24,7 +25,7 @@ from labctl.recording.column_map.sources import refuse_wrong_cells, sources, unu
 from labctl.recording.column_map.time_axis import TimeAxis, time_axis
 from labctl.recording.column_map.units import find_unit
 from labctl.recording.columns import BY_NAME, holds_flags
-from labctl.recording.info import NO_DATE, Motion, OutputUnit, RecordingInfo
+from labctl.recording.info import NO_DATE, RecordingInfo
 from labctl.recording.raw_table import RawColumn, RawTable
 from labctl.recording.recording import Recording
 from labctl.recording.sanity.readings import examine

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import get_args
 
+from labctl.answers.recording_head import Motion
 from labctl.errors import BadInput
-from labctl.recording.info import Motion
 
 _GYRO = ("gyro_x (deg/s)", "gyro_y (deg/s)", "gyro_z (deg/s)")
 _ACCEL = ("accel_x (g)", "accel_y (g)", "accel_z (g)")

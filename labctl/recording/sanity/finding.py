@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from labctl.json_types.findings import FindingJson, Part, Severity
+from labctl.answers.inspection import FindingJson, Part, Severity
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labctl.recording.info import OutputUnit
+from labctl.answers.recording_head import OutputUnit
 from labctl.recording.positions import Position
 from labctl.recording.sanity.finding import Finding
 from labctl.recording.sanity.response import Response

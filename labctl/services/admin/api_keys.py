@@ -7,8 +7,8 @@ import hmac
 import secrets
 from datetime import datetime
 
+from labctl.answers.admin import Caller, KeyRequest, KeyResponse, NewKeyResponse, Role
 from labctl.errors import BadInput, NotAllowed, NotIdentified
-from labctl.services.schemas.admin import Caller, KeyRequest, KeyResponse, NewKeyResponse, Role
 from labctl.store import KeyRow, Store
 
 PREFIX = "labctl_"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from datetime import UTC, datetime
 
+from labctl.answers.admin import AuditResponse, AuditVerificationResponse
 from labctl.errors import BadInput
-from labctl.services.schemas.admin import AuditResponse, AuditVerificationResponse
 from labctl.store import Head, Store
 
 

@@ -7,10 +7,10 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 
+from labctl.answers.admin import Caller, Role
 from labctl.errors import StoreError
 from labctl.log import get_logger
 from labctl.services.admin.api_keys import SCHEME, digest_of, unknown_key
-from labctl.services.schemas.admin import Caller, Role
 from labctl.store import Store
 
 log = get_logger()

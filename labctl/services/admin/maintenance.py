@@ -5,16 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from labctl.answers.admin import BackupNote, BackupResponse, CheckResponse, DamageResponse, MigrationResponse
 from labctl.config import default_database
 from labctl.errors import BadInput, LabctlError
 from labctl.services.recordings.live_folders import kept_beside
-from labctl.services.schemas.admin import (
-    BackupNote,
-    BackupResponse,
-    CheckResponse,
-    FindingResponse,
-    MigrationResponse,
-)
 from labctl.store import (
     ChainHead,
     Progress,
@@ -58,7 +52,7 @@ def check_database(
         anchor=None if found.head is None else str(found.head),
         remarks=list(found.remarks),
         kept_readings=[each.text for each in kept_beside(location)],
-        findings=[FindingResponse(part=each.part, text=each.text) for each in found.findings],
+        findings=[DamageResponse(part=each.part, text=each.text) for each in found.findings],
     )
 
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from labctl.answers.admin import SealKeyResponse, SignedResponse
 from labctl.certificates.signing import signing_settings
 from labctl.config import SEAL_KEY_VARIABLE, default_database, seal_key
 from labctl.errors import BadInput
 from labctl.private_keys import SCHEME, refuse_open_key
-from labctl.services.schemas.admin import SealKeyResponse, SignedResponse
 from labctl.store import SEAL_KEY, Signer, create_key, sign_chain, signer_of
 
 

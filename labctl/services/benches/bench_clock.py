@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from instruments.bench_config import is_simulated_address
-from labctl.json_types import JsonObject
+from labctl.answers.json_object import JsonObject
 
 
 def has_simulated_time(bench: JsonObject) -> bool:

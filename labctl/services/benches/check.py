@@ -13,11 +13,7 @@ from instruments.clock import Clock, VirtualClock, WallClock
 from instruments.shared_clock import clock_outside, served_clock
 from instruments.simulation import Simulation, serve_simulation
 from instruments.transport.factory import Wire
-from labctl.errors import BadInput
-from labctl.services.benches.pace import asked_speed, reached_speed
-from labctl.services.benches.wire_log import recording
-from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.benches import (
+from labctl.answers.benches import (
     BenchCheckResponse,
     BenchDescription,
     BenchUnit,
@@ -25,7 +21,11 @@ from labctl.services.schemas.benches import (
     FindingResponse,
     ShippedBench,
 )
-from labctl.services.schemas.wire_logs import RecordedSession
+from labctl.answers.wire_logs import RecordedSession
+from labctl.errors import BadInput
+from labctl.services.benches.pace import asked_speed, reached_speed
+from labctl.services.benches.wire_log import recording
+from labctl.services.planning.loading import load_bench
 
 
 def check_bench(source: str, wire_log: Path | None = None) -> BenchCheckResponse:

@@ -17,10 +17,10 @@ from instruments.protocols.request_reply.reference import ReferenceDescription
 from instruments.protocols.request_reply.settings import shipped_descriptions
 from instruments.protocols.request_reply.table import TableDescription
 from instruments.toml_documents import listed, read_toml, shown
+from labctl.answers.admin import DescribedCheckResponse, DescriptionTestResponse
+from labctl.answers.wire_logs import RecordedSession
 from labctl.errors import BadInput
 from labctl.services.benches.wire_log import recording
-from labctl.services.schemas.admin import DescribedCheckResponse, DescriptionTestResponse
-from labctl.services.schemas.wire_logs import RecordedSession
 
 MODELS: dict[str, type[Described]] = {
     "table": TableDescription, "chamber": ChamberDescription, "reference": ReferenceDescription

@@ -14,8 +14,8 @@ from instruments.bench_config import BenchFile, shipped_benches
 from instruments.clock import Clock, SystemClock, WallClock
 from instruments.discovery import Found, PortInfo, ask_itself, find_on_host, find_on_port, port_info, serial_ports
 from instruments.drivers.resolution import resolve
+from labctl.answers.benches import FoundResponse, NewBenchRequest, NewBenchResponse
 from labctl.errors import BadInput
-from labctl.services.schemas.benches import FoundResponse, NewBenchRequest, NewBenchResponse
 
 MODBUS_PORT = 502
 #: Asks a person for a value: section, key, what it is, the proposal; returns what goes into the file, None for none.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 
 from instruments.discovery import serial_ports
-from labctl.services.schemas.benches import PortResponse
+from labctl.answers.benches import PortResponse
 
 
 def list_ports() -> list[PortResponse]:

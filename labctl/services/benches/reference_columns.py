@@ -5,8 +5,8 @@ from __future__ import annotations
 from instruments.bench import Bench
 from instruments.bench_config import BenchFile
 from instruments.interfaces.gyro import Channel
+from labctl.answers.recordings import RawChannelJson
 from labctl.errors import BadInput
-from labctl.json_types.recordings import RawChannelJson
 
 #: Column of a recording that a fit takes as the temperature.
 TEMPERATURE = "temperature_c"

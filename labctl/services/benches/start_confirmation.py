@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Protocol
 
 from instruments.bench_config import BenchFile
+from labctl.answers.campaigns import BENCH_CHECKS, BenchCheck
 from labctl.errors import StartNotConfirmed
-from labctl.services.schemas.campaigns import BENCH_CHECKS, BenchCheck
 
 #: What is asked, and what the answer yes says.
 QUESTIONS: Mapping[BenchCheck, str] = {

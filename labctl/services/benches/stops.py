@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from datetime import datetime, timedelta
 
 from instruments.clock import WallClock
+from labctl.answers.benches import BenchStop
 from labctl.errors import BenchBusy
 from labctl.log import get_logger
-from labctl.services.schemas.benches import BenchStop
 from labctl.stop.latch import LatchState, StopRequest
 from labctl.stop.places import place_of
 from labctl.store import Store

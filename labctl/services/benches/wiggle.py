@@ -15,10 +15,10 @@ from instruments.bench import Bench, open_bench
 from instruments.bench_config import BenchFile
 from instruments.clock import Clock
 from instruments.interfaces.gyro import Gyro, Readings
+from labctl.answers.benches import WiggleResponse, WiggleUnit
 from labctl.errors import BadInput
 from labctl.services.benches.check import clock_of
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.benches import WiggleResponse, WiggleUnit
 from procedures.monitoring.turn_course import Nominal, nominal_outputs
 
 #: All units are at rest for so long before the first one is turned, and again before the next, s.

@@ -13,9 +13,9 @@ from instruments.bench_config import BenchFile
 from instruments.clock import Clock
 from instruments.transport.wire_log.log_file import WireLogFile
 from instruments.transport.wire_log.recorder import WireRecorder
+from labctl.answers.wire_logs import RecordedSession, SessionResult
 from labctl.errors import BadInput
 from labctl.log import get_logger
-from labctl.services.schemas.wire_logs import RecordedSession, SessionResult
 
 log = get_logger()
 

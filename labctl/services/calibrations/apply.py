@@ -11,6 +11,7 @@ import pyarrow as pa
 import pyarrow.csv as pacsv
 import pyarrow.parquet as pq
 
+from labctl.answers.calibrations import CompensationResponse
 from labctl.calibration.certification import CalibrationWarning
 from labctl.compensator import Compensator
 from labctl.errors import BadInput
@@ -18,7 +19,6 @@ from labctl.fitting.data.channels import BODY_AXES
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording.data_files import read_table
 from labctl.recording.recording import Column
-from labctl.services.schemas.reports.compensation import CompensationResponse
 
 
 def compensate_file(calibration: Path, source: Path, target: Path, outside: str) -> CompensationResponse:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from labctl.answers.certification import AssessmentResponse, CertifiedErrors, Objection
+from labctl.answers.criticism import CriticismResponse
 from labctl.errors import BadInput, NotEnoughData, NotFound
 from labctl.fitting.models.inversion import NotConverged
 from labctl.services.calibrations.comparison import worse_than_raw, worse_than_version
 from labctl.services.calibrations.due import interval_days
 from labctl.services.criticism.criticise import criticise_unit
 from labctl.services.recordings.inspection import inspect_stored
-from labctl.services.schemas.certification import AssessmentResponse, CertifiedErrors, Objection
-from labctl.services.schemas.criticism import CriticismResponse
 from labctl.services.standards.usage import Notices
 from labctl.store import CalibrationRecord, Store
 

@@ -3,27 +3,24 @@
 from __future__ import annotations
 
 from datetime import datetime, timedelta
-from typing import Literal, cast
+from typing import Literal
 
 from labctl.acting_user import acting_key
-from labctl.errors import BadInput, CertificationRefused
-from labctl.json_types.calibrations import JudgementDetail
-from labctl.services.calibrations.assessment import LEAST_REASON_CHARACTERS, LEAST_REASON_WORDS, assess
-from labctl.services.calibrations.due import interval_days
-from labctl.services.calibrations.fetch_log import fetched_by
-from labctl.services.calibrations.release import ask_for_release, key_of_person, needs_second_person, waiting_request
-from labctl.services.schemas.certification import (
+from labctl.answers.certification import (
     AssessmentResponse,
     CertificationResponse,
     CertifyRequest,
+    JudgementDetail,
     ReleaseRequest,
     ReleaseRequestResponse,
     RevokeRequest,
 )
+from labctl.errors import BadInput, CertificationRefused
+from labctl.services.calibrations.assessment import LEAST_REASON_CHARACTERS, LEAST_REASON_WORDS, assess
+from labctl.services.calibrations.due import interval_days
+from labctl.services.calibrations.fetch_log import fetched_by
+from labctl.services.calibrations.release import ask_for_release, key_of_person, needs_second_person, waiting_request
 from labctl.store import CertificationRow, Judgement, Release, Store
-
-#: What is kept of an assessment beside its verdict.
-KEPT = ("verdict_reason", "verdict_text", "error", "objections")
 
 
 def list_certifications(store: Store, serial: str) -> list[CertificationResponse]:
@@ -99,7 +96,10 @@ def put_in_force(
     _refuse_objections(known, request)
     judgement = Judgement(
         known.verdict, known.verdict_recording, at if known.verdict else None, bool(known.objections),
-        cast(JudgementDetail, {**known.model_dump(mode="json", include=set(KEPT)), "due_from": due_from}),
+        JudgementDetail(
+            verdict_reason=known.verdict_reason, verdict_text=known.verdict_text, error=known.error.model_dump(),
+            objections=known.objections, due_from=due_from,
+        ),
     )  # fmt: skip
     due = None if days is None else at + timedelta(days=days)
     row = store.calibrations.certify(
@@ -136,11 +136,11 @@ def revoke(store: Store, serial: str, version: int, request: RevokeRequest, at: 
 
 def refusal(known: AssessmentResponse) -> str:
     """Return in one message why a version is not certified, and what to do; of wrong data only the first is said."""
-    data = [each for each in known.objections if each.what == "data"]
+    data = [each for each in known.objections if each["what"] == "data"]
     said = [each for each in known.objections if each not in data[1:]]
     more = f" (and {len(data) - 1} more in its data)" if len(data) > 1 else ""
-    objections = "; ".join(each.text for each in said)
-    todo = "; ".join(dict.fromkeys(each.do for each in said))
+    objections = "; ".join(each["text"] for each in said)
+    todo = "; ".join(dict.fromkeys(each["do"] for each in said))
     return (
         f"certification of version {known.version} of {known.serial} is refused: {objections}{more}. To do: {todo}. "
         "To certify it nevertheless:"

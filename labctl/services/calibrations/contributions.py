@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import cast
 
 import numpy as np
 
+from labctl.answers.budget import ContributionLinesJson, ContributionsOverJson
+from labctl.answers.uncertainty import UncertaintyResponse
 from labctl.errors import BadInput
 from labctl.fitting.uncertainty import Budget, RateUncertainty
-from labctl.json_types.budget import ContributionsOverJson
-from labctl.services.schemas.uncertainty import ContributionLines, ContributionsOver, UncertaintyResponse
 
 #: Points of a line.
 POINTS = 21
@@ -21,7 +20,7 @@ Found = Callable[[float, float], Mapping[str, RateUncertainty]]
 
 def contributions_over(
     rates_dps: list[float], temperatures_c: list[float], found: Found
-) -> dict[str, ContributionsOver]:
+) -> dict[str, ContributionsOverJson]:
     """Return axis -> lines over the rate at the middle temperature, and over the temperature at the fastest rate."""
     middle_c = temperatures_c[len(temperatures_c) // 2]
     fastest_dps = max(rates_dps, key=abs)
@@ -29,7 +28,7 @@ def contributions_over(
     over_rate = [found(rate, middle_c) for rate in rates]
     over_temperature = [found(fastest_dps, each) for each in warm]
     return {
-        axis: ContributionsOver(
+        axis: ContributionsOverJson(
             temperature_c=middle_c,
             rate_dps=fastest_dps,
             over_rate=_lines(rates, [each[axis].budget for each in over_rate]),
@@ -44,11 +43,11 @@ def _between(ends: list[float]) -> list[float]:
     return np.linspace(low, high, POINTS).tolist() if high > low else [low]
 
 
-def _lines(at: list[float], budgets: list[Budget]) -> ContributionLines:
+def _lines(at: list[float], budgets: list[Budget]) -> ContributionLinesJson:
     """Return a line for each source; those of one source and several standards are named apart."""
     names = dict.fromkeys(_label(budget, index) for budget in budgets for index in range(len(budget.lines)))
     by_name = [{_label(one, k): line.contribution for k, line in enumerate(one.lines)} for one in budgets]
-    return ContributionLines(
+    return ContributionLinesJson(
         at=at,
         contributions={name: [each.get(name) for each in by_name] for name in names},
         combined=[budget.combined for budget in budgets],
@@ -73,8 +72,5 @@ def write_figure(answer: UncertaintyResponse, target: Path) -> None:
         raise BadInput(
             f"{target}: the contributions over rate and temperature were not computed; request them with grid = true"
         )
-    over = {
-        axis: cast(ContributionsOverJson, each.model_dump(mode="json")) for axis, each in grid.contributions.items()
-    }
     title = f"{answer.serial}, version {answer.version}: contributions to the uncertainty of a corrected rate"
-    target.write_text(contributions_html(title, over, answer.not_stated), encoding="utf-8")
+    target.write_text(contributions_html(title, grid.contributions, answer.not_stated), encoding="utf-8")

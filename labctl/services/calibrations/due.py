@@ -6,8 +6,8 @@ import re
 from datetime import timedelta
 
 from labctl import config
+from labctl.answers.certification import DueSource
 from labctl.errors import BadInput
-from labctl.services.schemas.certification import DueSource
 from labctl.store import Store
 
 #: The longest interval between two calibrations of a unit, days; a recipe has the same limit.

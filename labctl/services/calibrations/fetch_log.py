@@ -9,9 +9,9 @@ from __future__ import annotations
 import threading
 from datetime import datetime, timedelta
 
+from labctl.answers.certification import FetchResponse
 from labctl.errors import LabctlError
 from labctl.log import get_logger
-from labctl.services.schemas.certification import FetchResponse
 from labctl.store import FetchRow, Store
 
 #: Who fetched without a key.

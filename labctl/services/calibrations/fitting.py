@@ -5,12 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 from datetime import date, datetime
 
+from labctl.answers.calibrations import (
+    CalibrationRow,
+    FitRequest,
+    FitResponse,
+    Follower,
+    ImprovedVersionResponse,
+    VersionResponse,
+)
+from labctl.answers.kept_answers import KeptFit
 from labctl.calibration import Calibration, build_calibration, read_calibration
 from labctl.fitting import fit
 from labctl.fitting.effects.response import IDS
 from labctl.fitting.models.memory import split_memory
 from labctl.fitting.uncertainty import evidence_of
-from labctl.json_types.kept_answers import KeptFit
 from labctl.recording.info import REFERENCES, RecordingInfo
 from labctl.services.calibrations.certification import certification_response, version_in_force
 from labctl.services.calibrations.comparison import worse_than_raw
@@ -19,14 +27,6 @@ from labctl.services.criticism.measurements import measurements_of
 from labctl.services.fixed_coefficients import fixed_of
 from labctl.services.recordings.inspection import refuse_wrong
 from labctl.services.recordings.warnings import as_json, warning_of
-from labctl.services.schemas.calibrations import (
-    CalibrationRow,
-    FitRequest,
-    FitResponse,
-    Follower,
-    ImprovedVersionResponse,
-    VersionResponse,
-)
 from labctl.services.standards.usage import Notices
 from labctl.store import NewCalibration, RecordingRow, Store
 

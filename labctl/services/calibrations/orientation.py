@@ -10,6 +10,8 @@ from typing import get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.answers.orientation import STOP_S, OrientationOptions, OrientationResponse, StaticBiasResponse
+from labctl.answers.recording_head import Axis
 from labctl.calibration import Calibration, CalibrationWarning, read_calibration
 from labctl.compensator import Compensator
 from labctl.error_per_turn import static_bias
@@ -17,16 +19,9 @@ from labctl.errors import BadInput, BadRecording, NotCertified, NotEnoughData
 from labctl.fitting.numeric.arrays import Array
 from labctl.orientation import Orientation
 from labctl.recording import OutputUnit, RecordingInfo
-from labctl.recording.info import Axis
 from labctl.recording.recording import Columns
 from labctl.services.calibrations.served import calibration_file
 from labctl.services.recordings.loading import newest_row
-from labctl.services.schemas.reports.orientation import (
-    STOP_S,
-    OrientationOptions,
-    OrientationResponse,
-    StaticBiasResponse,
-)
 from labctl.store import Store
 
 #: Points of a course that is sent.

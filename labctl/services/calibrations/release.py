@@ -10,8 +10,8 @@ from datetime import datetime
 
 from labctl import config
 from labctl.acting_user import acting_key
+from labctl.answers.certification import CertifyRequest, ReleaseRequestResponse
 from labctl.errors import BadInput, Conflict, NotFound
-from labctl.services.schemas.certification import CertifyRequest, ReleaseRequestResponse
 from labctl.store import NewReleaseRequest, ReleaseRequestRow, Store
 
 

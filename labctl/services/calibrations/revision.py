@@ -8,6 +8,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 
+from labctl.answers.calibrations import ImproveRequest, ImproveResponse, PreviewResponse
+from labctl.answers.fitted_model import UsualRange
+from labctl.answers.inspection import DataWarning
+from labctl.answers.kept_answers import ChangeFigures, KeptChange
+from labctl.answers.residuals import ResidualColumns
 from labctl.calibration import build_calibration
 from labctl.errors import BadInput
 from labctl.fitting import FitResult
@@ -19,8 +24,6 @@ from labctl.fitting.estimation.shapes import with_shapes
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.presets import changed
 from labctl.fitting.uncertainty import use_evidence
-from labctl.json_types.kept_answers import ChangeFigures, KeptChange
-from labctl.json_types.models import UsualRange
 from labctl.recording import Recording
 from labctl.services.cache import RecentResults, cached
 from labctl.services.calibrations.comparison import worse_than_before
@@ -32,13 +35,6 @@ from labctl.services.criticism.residuals import residual_columns
 from labctl.services.criticism.versions import version_of
 from labctl.services.recordings.inspection import refuse_wrong
 from labctl.services.recordings.warnings import as_json, warning_of
-from labctl.services.schemas.calibrations import (
-    ImproveRequest,
-    ImproveResponse,
-    PreviewResponse,
-)
-from labctl.services.schemas.criticism import ResidualColumns
-from labctl.services.schemas.warnings import DataWarning
 from labctl.store import CalibrationRecord, NewCalibration, Store
 
 

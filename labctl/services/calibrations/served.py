@@ -8,15 +8,15 @@ from datetime import UTC, datetime
 from functools import lru_cache
 from typing import Final
 
+from labctl.answers.certification import CalibrationStateResponse, WithdrawnResponse
+from labctl.answers.noise import AllanJson
 from labctl.calibration import read_calibration, with_certification
 from labctl.calibration.certification import Certification, State
 from labctl.errors import BadInput, NotFound
 from labctl.exports import Loss, format_named, written_calibration
 from labctl.exports.noise.figures import DPS_RTHZ_PER_DEG_RTH, DPS_S_RTHZ_PER_DEG_H_RTH, RATE, WALK, WHITE
-from labctl.json_types.noise import AllanJson
 from labctl.services.calibrations.certification import version_in_force
 from labctl.services.recordings.allan import MOST_RECORDINGS, noise_of_recordings
-from labctl.services.schemas.certification import CalibrationStateResponse, WithdrawnResponse
 from labctl.store import ServedCalibration, Store
 from labctl.withdrawal import HEADER, Withdrawn, quoted
 

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from labctl.answers.calibrations import Validity
+from labctl.answers.uncertainty import Surface, SurfaceResponse
 from labctl.calibration import Calibration, read_calibration
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import BODY_AXES, Channels
@@ -15,8 +17,6 @@ from labctl.fitting.models.true_rate_error import errors_at_true_rates
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording.recording import Column
 from labctl.recording.verification import fitted_part
-from labctl.services.schemas.calibrations import Validity
-from labctl.services.schemas.uncertainty import Surface, SurfaceResponse
 from labctl.store import CalibrationRecord, Store
 
 #: Rates that a surface of a model without a rate spans where the unit's are not known, deg/s.

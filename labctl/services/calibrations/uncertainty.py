@@ -9,6 +9,13 @@ from typing import Literal
 
 import numpy as np
 
+from labctl.answers.uncertainty import (
+    AnyAxisUncertainty,
+    AxisUncertainty,
+    UncertaintyGrid,
+    UncertaintyResponse,
+    VectorUncertainty,
+)
 from labctl.calibration import Calibration, read_calibration
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import BODY_AXES
@@ -33,14 +40,6 @@ from labctl.fitting.uncertainty.largest_error import widening
 from labctl.fitting.uncertainty.vector_bound import PLACES
 from labctl.services.calibrations.contributions import contributions_over
 from labctl.services.criticism.versions import version_of
-from labctl.services.schemas.uncertainty import (
-    AnyAxisUncertainty,
-    AxisUncertainty,
-    BudgetResponse,
-    UncertaintyGrid,
-    UncertaintyResponse,
-    VectorUncertainty,
-)
 from labctl.store import Store
 
 
@@ -93,7 +92,7 @@ def uncertainty_answer(
     coefficients = coefficient_budgets(
         known.fitted, temperature_c, evidence=known.evidence, name=known.name, bench=known.bench
     )
-    budgets = {axis: BudgetResponse.model_validate(one.budget.to_json()) for axis, one in found.items()}
+    budgets = {axis: one.budget.to_json() for axis, one in found.items()}
     response = calibration.document.get("response", {})
     return UncertaintyResponse(
         serial=calibration.serial,
@@ -107,15 +106,15 @@ def uncertainty_answer(
         budget=budgets,
         coefficients={
             axis: {
-                **{name: BudgetResponse.model_validate(one.to_json()) for name, one in named.items()},
-                **{name: BudgetResponse.model_validate(one) for name, one in response.get(axis, {}).items()},
+                **{name: one.to_json() for name, one in named.items()},
+                **response.get(axis, {}),
             }
             for axis, named in coefficients.items()
         },
         vector=None if vector is None else _vector_response(vector),
         any_axis=over_any_axis(calibration),
-        not_stated=list(dict.fromkeys(name for one in budgets.values() for name in one.not_stated)),
-        overdue=any(one.overdue for one in budgets.values()),
+        not_stated=list(dict.fromkeys(name for one in budgets.values() for name in one["not_stated"])),
+        overdue=any(one["overdue"] for one in budgets.values()),
         grid=uncertainty_grid(calibration) if grid else None,
     )
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from labctl.services.schemas.reports.campaign_parts import AdviceResponse
+from labctl.answers.campaign_parts import AdviceResponse
 from procedures.contracts.campaign_state import CampaignState
 from procedures.contracts.journal import NOT_SAFE
 

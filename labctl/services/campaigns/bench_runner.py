@@ -9,6 +9,8 @@ from pathlib import Path
 from instruments.bench_config import BenchFile
 from instruments.clock import Clock
 from labctl.acting_user import actor
+from labctl.answers.benches import BenchCheckResponse, BenchDescription
+from labctl.answers.campaigns import CampaignRequest, CampaignResponse, ConfirmRequest, ReasonRequest, ResumeRequest
 from labctl.errors import BenchBusy, Conflict, StoreError
 from labctl.log import get_logger
 from labctl.services.benches.check import checked, description
@@ -27,14 +29,6 @@ from labctl.services.campaigns.resume import with_original_simulation
 from labctl.services.campaigns.status import answer_of, campaign_status, outlives_its_process
 from labctl.services.campaigns.stop_execution import StopExecution
 from labctl.services.planning.loading import with_drivers
-from labctl.services.schemas.benches import BenchCheckResponse, BenchDescription
-from labctl.services.schemas.campaigns import (
-    CampaignRequest,
-    CampaignResponse,
-    ConfirmRequest,
-    ReasonRequest,
-    ResumeRequest,
-)
 from labctl.services.simulation.hidden_effects import with_hidden_effects
 from labctl.services.standards.agreement import with_register
 from labctl.stop.latch import SERVICE_STOPS, StopRequest

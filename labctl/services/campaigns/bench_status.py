@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import asdict
 from datetime import datetime
 
+from labctl.answers.benches import BenchStatus, ClearRequest
 from labctl.errors import Conflict
 from labctl.services.benches.stops import BenchStops
 from labctl.services.campaigns.status import abandoned_campaigns, describe_interrupted, outlives_its_process
-from labctl.services.schemas.benches import BenchStatus, ClearRequest
 from labctl.store import BenchRow, Store
 
 

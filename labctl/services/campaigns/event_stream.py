@@ -6,8 +6,8 @@ import asyncio
 from collections.abc import AsyncIterator, Callable, Hashable
 from typing import Any, TypeVar, cast
 
+from labctl.answers.campaigns import CampaignResponse, EventResponse
 from labctl.services.campaigns.status import event_answer
-from labctl.services.schemas.campaigns import CampaignResponse, EventResponse
 from labctl.store import Store
 from procedures.contracts.campaign_state import ENDED, CampaignState
 

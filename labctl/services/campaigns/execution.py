@@ -11,6 +11,8 @@ from instruments.bench_config import BenchFile
 from instruments.clock import WallClock
 from instruments.transport.wire_log.recorder import WireRecorder
 from labctl.acting_user import actor
+from labctl.answers.campaigns import BENCH_CHECKS, CampaignResponse, StartRequest
+from labctl.answers.wire_logs import RecordedSession
 from labctl.config import default_database
 from labctl.errors import Conflict, DiskFull, Stopped, StoreError
 from labctl.log import get_logger
@@ -36,8 +38,6 @@ from labctl.services.campaigns.readings_digest import readings_digest
 from labctl.services.campaigns.recorded_operator import RecordedOperator
 from labctl.services.campaigns.status import answer_of, describe_interrupted, from_rows
 from labctl.services.planning.loading import bench_for, load_bench, load_recipe, own_text
-from labctl.services.schemas.campaigns import BENCH_CHECKS, CampaignResponse, StartRequest
-from labctl.services.schemas.wire_logs import RecordedSession
 from labctl.services.simulation.hidden_effects import with_hidden_effects
 from labctl.services.standards.agreement import register_events
 from labctl.store import Store

@@ -7,16 +7,12 @@ from collections.abc import Sequence
 import tomli_w
 from pydantic import ValidationError
 
-from labctl.json_types import JsonObject
+from labctl.answers.json_object import JsonObject
+from labctl.answers.plans import CampaignPlanResponse, RunColumns, StepState
 from labctl.services.planning.loading import (
     recipe_document,
 )
 from labctl.services.planning.timeline import timeline_columns
-from labctl.services.schemas.plans import (
-    CampaignPlanResponse,
-    RunColumns,
-    StepState,
-)
 from labctl.store import StepRow, Store
 from procedures.planning.turn_steps import DATA_SETS_OF_TURN
 from procedures.recipe.recipe import Recipe

@@ -6,7 +6,7 @@ import hashlib
 
 import numpy as np
 
-from labctl.services.schemas.wire_logs import ReadingsDigest
+from labctl.answers.wire_logs import ReadingsDigest
 from labctl.store import Store
 
 

@@ -9,6 +9,8 @@ from pathlib import Path
 
 from instruments.bench_config import BenchFile
 from instruments.clock import Clock, WallClock
+from labctl.answers.campaigns import CampaignRequest, CampaignResponse, ResumeRequest
+from labctl.answers.wire_logs import RecordedSession
 from labctl.errors import BadInput
 from labctl.log import get_logger
 from labctl.services.benches.wire_log import SessionLog, recording
@@ -19,8 +21,6 @@ from labctl.services.campaigns.readings_digest import readings_digest
 from labctl.services.campaigns.recorded_operator import RecordedOperator
 from labctl.services.campaigns.resume import prepare_resume
 from labctl.services.planning.loading import own_text
-from labctl.services.schemas.campaigns import CampaignRequest, CampaignResponse, ResumeRequest
-from labctl.services.schemas.wire_logs import RecordedSession
 from labctl.store import Store
 from procedures.contracts.control import Control
 from procedures.monitoring.progress import Progress

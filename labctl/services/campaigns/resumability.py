@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from instruments.bench_config import BenchFile
-from labctl.services.schemas.campaigns import CampaignResponse
+from labctl.answers.campaigns import CampaignResponse
 from labctl.store import ResumePoint, Store
 from procedures.contracts.campaign_state import CampaignState
 

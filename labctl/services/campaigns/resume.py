@@ -12,6 +12,8 @@ from instruments.bench import Bench, open_bench
 from instruments.bench_config import BenchFile, SimulationSettings
 from instruments.clock import Clock, SystemClock
 from instruments.transport.factory import Wire
+from labctl.answers.campaigns import CampaignResponse, ResumeRequest
+from labctl.answers.wire_logs import RecordedSession
 from labctl.config import default_database
 from labctl.errors import Conflict
 from labctl.log import get_logger
@@ -31,8 +33,6 @@ from labctl.services.campaigns.preparation import (
 )
 from labctl.services.campaigns.readings_digest import readings_digest
 from labctl.services.planning.loading import load_bench, with_drivers
-from labctl.services.schemas.campaigns import CampaignResponse, ResumeRequest
-from labctl.services.schemas.wire_logs import RecordedSession
 from labctl.store import CampaignRow, ResumePoint, Resumption, Store, open_store
 from procedures.contracts.campaign_state import CampaignState
 from procedures.execution.resume import Restart

@@ -10,16 +10,11 @@ from typing import Literal
 from pydantic import TypeAdapter
 
 from instruments.bench_config import BenchFile
+from labctl.answers.campaign_parts import DriverResponse, OutputResponse, PromptResponse, TurnResponse
+from labctl.answers.campaigns import CampaignResponse, EventResponse
 from labctl.services.benches.bench_clock import has_simulated_time
 from labctl.services.benches.identity import reported_in
 from labctl.services.campaigns.advice import advice_of
-from labctl.services.schemas.campaigns import CampaignResponse, EventResponse
-from labctl.services.schemas.reports.campaign_parts import (
-    DriverResponse,
-    OutputResponse,
-    PromptResponse,
-    TurnResponse,
-)
 from labctl.store import CampaignRow, CampaignSummary, EventRow, Store
 from labctl.store.paging import Page, PageRequest
 from procedures.contracts.campaign_state import ENDED, CampaignState

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from datetime import datetime
 
+from labctl.answers.campaigns import CampaignResponse
 from labctl.errors import Conflict
 from labctl.log import get_logger
 from labctl.services.benches.lease import described, driver_of
 from labctl.services.benches.stops import BenchStops
 from labctl.services.campaigns.status import campaign_status, outlives_its_process
-from labctl.services.schemas.campaigns import CampaignResponse
 from labctl.store import Store
 from procedures.contracts.campaign_state import ENDED, UNDER_WAY, CampaignState
 

@@ -8,6 +8,7 @@ from importlib.metadata import version as package_version
 
 from instruments.standards import Standard
 from labctl.acting_user import acting_key
+from labctl.answers.certificates import CertificateRequest
 from labctl.calibration import read_calibration
 from labctl.certificates.document import (
     Authorisation,
@@ -32,7 +33,6 @@ from labctl.services.certificates.found import Found
 from labctl.services.certificates.missing import MissingFacts
 from labctl.services.certificates.stability import stability_until, until
 from labctl.services.criticism.measurements import Measurements
-from labctl.services.schemas.documents.certificates import CertificateRequest
 from labctl.store import CertificateRow, CertificationRow, Store
 
 ITEM_ONLY = "The results relate only to the item that is identified here, in the condition in which it was received."

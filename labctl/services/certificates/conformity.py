@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 
+from labctl.answers.certificates import OrderedConformity
 from labctl.certificates.document import AnyAxisResult, Conformity, ConformityResult, ResultPoint, StabilityResult
 from labctl.certificates.readable import percent
 from labctl.errors import BadInput
 from labctl.services.certificates.evidence import Errors, VerifiedError
 from labctl.services.certificates.stability import until_date
-from labctl.services.schemas.documents.certificates import OrderedConformity
 
 #: Largest probability of a false acceptance at the limit (ILAC-G8, table 1), normal distribution.
 RISKS = {

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from labctl.answers.certificates import Use
 from labctl.calibration import Calibration
-from labctl.certificates.document import Evidence, Use
+from labctl.certificates.document import Evidence
 from labctl.errors import BadInput
 from labctl.fitting.data.channels import BODY_AXES
 from labctl.fitting.data.fit_data import FitData, fit_data_of

@@ -9,11 +9,11 @@ from datetime import date
 from instruments.bench_config import BenchFile
 from instruments.laboratory import Laboratory
 from instruments.standards import SIMULATED, Standard
+from labctl.answers.certificates import CertificateOrder
 from labctl.calibration import Calibration, read_calibration
 from labctl.recording import RecordingInfo
 from labctl.services.certificates.missing import of_contact
 from labctl.services.certificates.sensors import Sensors, missing_of
-from labctl.services.schemas.documents.certificates import CertificateOrder
 from labctl.services.standards.usage import performed
 from labctl.store import CalibrationRecord, CampaignRow, CertificationRow, RecordingRow, Store
 

@@ -6,6 +6,7 @@ from datetime import date, datetime
 
 from instruments.standards import Standard
 from labctl.acting_user import acting_key
+from labctl.answers.certificates import CertificateOrder, CertificateRequest, CertificateResponse, WithdrawRequest
 from labctl.certificates.document import hash_of_certificate
 from labctl.config import SIGN_KEY_VARIABLE
 from labctl.errors import Conflict
@@ -16,12 +17,6 @@ from labctl.services.certificates.found import Found
 from labctl.services.certificates.missing import MissingFacts
 from labctl.services.certificates.signature import forms_of, signing_key, to_be_signed
 from labctl.services.certificates.states import certificate_by_number
-from labctl.services.schemas.documents.certificates import (
-    CertificateOrder,
-    CertificateRequest,
-    CertificateResponse,
-    WithdrawRequest,
-)
 from labctl.services.standards.usage import Notices
 from labctl.store import CertificateRow, Store, Withdrawal
 

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.answers.certificates import RoomConditions
+from labctl.answers.fitted_model import Coefficients
 from labctl.calibration import Calibration
 from labctl.certificates.document import (
     AnyAxisResult,
@@ -23,13 +25,11 @@ from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.uncertainty.budget import Budget
 from labctl.fitting.uncertainty.combination import LEVEL
-from labctl.json_types.models import Coefficients
 from labctl.recording import Recording
 from labctl.services.calibrations.surface import errors_on_grid
 from labctl.services.calibrations.uncertainty import coefficients_at, over_any_axis, places_of, uncertainty_of
 from labctl.services.criticism.measurements import Measurements
 from labctl.services.criticism.verification.of_version import applied_errors, mounting_angles_of
-from labctl.services.schemas.documents.certificates import RoomConditions
 from labctl.store import CalibrationRecord, RoomSpan, Store
 
 Array = NDArray[np.float64]
@@ -133,8 +133,8 @@ def _any_axis(calibration: Calibration) -> tuple[AnyAxisResult, ...]:
         AnyAxisResult(
             output=output, reach_dps=found.reach_dps, expanded_dps=found.bound_dps,
             aligned_expanded_dps=found.aligned_bound_dps,
-            across=() if found.cross_rates is None else tuple(found.cross_rates.about),
-            per_dps_across=None if found.cross_rates is None else found.cross_rates.per_dps, why=found.why,
+            across=() if found.cross_rates is None else tuple(found.cross_rates["about"]),
+            per_dps_across=None if found.cross_rates is None else found.cross_rates["per_dps"], why=found.why,
         )
         for output, found in over_any_axis(calibration).items()
     )  # fmt: skip

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from instruments.laboratory import Contact
+from labctl.answers.json_object import JsonObject
 from labctl.errors import BadInput
-from labctl.json_types import JsonObject
 
 #: Facts of an address that a letter, and the schema of the DCC, need.
 ADDRESS = ("name", "street", "post_code", "city", "country")

@@ -12,6 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from labctl.answers.accelerometer import AccelerometerResponse, AccelerometerTemperature
+from labctl.answers.certificates import CertificateOrder, OrderedAccelerometer, OrderedMagnetometer, OrderedSensor
+from labctl.answers.poses import AccelerometerCoefficient
+from labctl.answers.sensors import AccelerometerVersion, MagnetometerVersion, SensorName
 from labctl.certificates.document import SensorCoefficient, SensorReference, SensorResult
 from labctl.errors import BadInput
 from labctl.fitting.magnetometer.calibrate import AXES
@@ -20,15 +24,6 @@ from labctl.fitting.poses.at_rest.accelerometer import PARAMETERS as ACCELEROMET
 from labctl.fitting.poses.at_rest.gravity import STANDARD_GRAVITY
 from labctl.fitting.poses.triad import UPPER
 from labctl.fitting.uncertainty.budget import BudgetLine, budget_of
-from labctl.json_types.poses import AccelerometerCoefficient
-from labctl.services.schemas.documents.certificates import (
-    CertificateOrder,
-    OrderedAccelerometer,
-    OrderedMagnetometer,
-    OrderedSensor,
-)
-from labctl.services.schemas.reports.accelerometer import AccelerometerResponse, AccelerometerTemperature
-from labctl.services.schemas.sensors import AccelerometerVersion, MagnetometerVersion, SensorName
 from labctl.services.sensor_versions import one_accelerometer, one_magnetometer
 from labctl.store import Store
 

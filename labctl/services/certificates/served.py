@@ -6,10 +6,10 @@ import json
 from dataclasses import dataclass
 from typing import Literal, get_args
 
+from labctl.answers.certificates import CertificateResponse, PublicCertificate
 from labctl.errors import BadInput, NotFound
 from labctl.services.certificates.address import HASH_DIGITS
 from labctl.services.certificates.states import certificate_by_number, list_certificates
-from labctl.services.schemas.documents.certificates import CertificateResponse, PublicCertificate
 from labctl.services.standards.usage import Notices
 from labctl.store import Store
 from labctl.withdrawal import HEADER, Withdrawn

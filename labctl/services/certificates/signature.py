@@ -7,13 +7,13 @@ from contextlib import closing, contextmanager
 from datetime import datetime
 from typing import TYPE_CHECKING
 
+from labctl.answers.signatures import SigningKeyResponse
 from labctl.certificates.dcc import dcc_of
 from labctl.certificates.document import Certificate
 from labctl.certificates.pdf import pdf_of
 from labctl.certificates.signing import SigningSettings, libraries, signing_settings
 from labctl.config import SIGN_KEY_VARIABLE
 from labctl.errors import BadInput
-from labctl.services.schemas.documents.signatures import SigningKeyResponse
 from labctl.store import CertificateForms
 
 if TYPE_CHECKING:

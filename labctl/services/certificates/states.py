@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
-from labctl.services.schemas.documents.certificates import CertificateResponse, CertificateState, SignatoryResponse
+from labctl.answers.certificates import CertificateResponse, CertificateState, SignatoryResponse
 from labctl.services.standards.usage import Notices
 from labctl.store import CertificateRow, CertificationRow, Store
 

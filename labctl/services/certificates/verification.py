@@ -10,14 +10,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from labctl.answers.certificates import CertificateState, SignatoryResponse
+from labctl.answers.signatures import SignatureResponse, VerifiedFileResponse
 from labctl.certificates.document import TITLE, Signatory
 from labctl.certificates.signing import libraries
 from labctl.config import SIGNER_VARIABLE, variable
 from labctl.errors import BadInput
 from labctl.services.certificates.served import CertificateFormat
 from labctl.services.certificates.states import certificate_by_number
-from labctl.services.schemas.documents.certificates import CertificateState, SignatoryResponse
-from labctl.services.schemas.documents.signatures import SignatureResponse, VerifiedFileResponse
 from labctl.store import Store
 
 if TYPE_CHECKING:

@@ -7,9 +7,9 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Generic, Literal, Protocol, TypeVar
 
+from labctl.answers.base import ResponseModel
 from labctl.services.commands.context import CommandContext
 from labctl.services.commands.encoding import json_body
-from labctl.services.schemas.base import ResponseModel
 
 RequestT = TypeVar("RequestT")
 ResponseT = TypeVar("ResponseT", bound=ResponseModel)

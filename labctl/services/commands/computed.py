@@ -6,10 +6,10 @@ from datetime import datetime
 from typing import TypeVar
 
 from instruments.clock import VirtualClock
+from labctl.answers.base import ResponseModel
 from labctl.services.commands.command import Handler
 from labctl.services.commands.context import CommandContext
 from labctl.services.commands.service_control import ServiceControl
-from labctl.services.schemas.base import ResponseModel
 from labctl.store import Store
 
 RequestT = TypeVar("RequestT")

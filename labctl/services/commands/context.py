@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Generic, Protocol, TypeVar
 
 from instruments.bench_config import BenchFile
 from instruments.clock import Clock
+from labctl.answers.base import ResponseModel
+from labctl.answers.benches import BenchCheckResponse
+from labctl.answers.campaigns import CampaignResponse
+from labctl.answers.live import LiveEndRequest, LiveRequest, LiveStateResponse
+from labctl.answers.schedule import ScheduledResponse
 from labctl.services.commands.requests import CampaignResume, CampaignStart
-from labctl.services.schemas.base import ResponseModel
-from labctl.services.schemas.benches import BenchCheckResponse
-from labctl.services.schemas.campaigns import CampaignResponse
-from labctl.services.schemas.live import LiveEndRequest, LiveRequest, LiveStateResponse
-from labctl.services.schemas.schedule import ScheduledResponse
 from labctl.store import Store
 
 if TYPE_CHECKING:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from contextlib import ExitStack
 
+from labctl.answers.base import Request
 from labctl.recording.column_map import map_text
 from labctl.recording.files import recording_parts
 from labctl.services.commands.requests import LogFile, RecordingFolder
-from labctl.services.schemas.base import Request
 
 
 def json_body(_: ExitStack, request: object) -> Mapping[str, object]:

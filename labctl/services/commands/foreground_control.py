@@ -8,6 +8,10 @@ from dataclasses import dataclass
 
 from instruments.bench_config import BenchFile
 from instruments.clock import SystemClock
+from labctl.answers.benches import BenchCheckResponse
+from labctl.answers.campaigns import CampaignResponse, StartRequest
+from labctl.answers.drafts import DraftsRequest
+from labctl.answers.schedule import ScheduledResponse
 from labctl.errors import BadInput
 from labctl.services.benches.check import check_bench
 from labctl.services.campaigns.execution import AskClear, Attend, Observe, run_here
@@ -17,10 +21,6 @@ from labctl.services.commands.requests import CampaignResume, CampaignStart
 from labctl.services.drafts.answers import with_drafts
 from labctl.services.planning.loading import bench_for, load_bench, load_recipe
 from labctl.services.schedule import queue
-from labctl.services.schemas.benches import BenchCheckResponse
-from labctl.services.schemas.campaigns import CampaignResponse, StartRequest
-from labctl.services.schemas.reports.drafts import DraftsRequest
-from labctl.services.schemas.schedule import ScheduledResponse
 from labctl.store import open_store
 from procedures.contracts.campaign_state import CampaignState
 

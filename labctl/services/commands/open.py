@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from instruments.clock import SystemClock
+from labctl.answers.campaigns import CampaignResponse
 from labctl.config import default_database
 from labctl.services.campaigns.resumability import with_resume
 from labctl.services.campaigns.status import campaign_status
 from labctl.services.commands.command import Command, CommandExecutor, LocalExecutor, RequestT, ResponseT
 from labctl.services.commands.context import CommandContext
 from labctl.services.drafts.answers import with_drafts
-from labctl.services.schemas.campaigns import CampaignResponse
 from labctl.store import Store, holder_of, is_url, open_store
 
 if TYPE_CHECKING:

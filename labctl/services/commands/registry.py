@@ -4,6 +4,21 @@ from __future__ import annotations
 
 from typing import Any
 
+from labctl.answers.admin import BackupNote, KeyRequest, KeyResponse, NewKeyResponse
+from labctl.answers.benches import BenchStatus, ClearRequest
+from labctl.answers.calibrations import FitRequest, FitResponse, ImproveRequest, ImproveResponse
+from labctl.answers.campaigns import ReasonRequest
+from labctl.answers.certificates import CertificateRequest, CertificateResponse, WithdrawRequest
+from labctl.answers.certification import (
+    CertificationResponse,
+    CertifyRequest,
+    ReleaseRequest,
+    ReleaseRequestResponse,
+    RevokeRequest,
+)
+from labctl.answers.drafts import DraftsRequest, DraftsResponse
+from labctl.answers.recordings import ExampleRequest, ImportResponse, SimulatedRecordingResponse, SimulatedRequest
+from labctl.answers.schedule import ScheduledResponse
 from labctl.services.admin import api_keys
 from labctl.services.calibrations import certification, fitting, revision
 from labctl.services.campaigns.bench_status import clear_bench
@@ -40,26 +55,6 @@ from labctl.services.commands.standards import (
 from labctl.services.drafts.make import make_drafts
 from labctl.services.recordings import examples, importers, transfer
 from labctl.services.schedule import queue
-from labctl.services.schemas.admin import BackupNote, KeyRequest, KeyResponse, NewKeyResponse
-from labctl.services.schemas.benches import BenchStatus, ClearRequest
-from labctl.services.schemas.calibrations import FitRequest, FitResponse, ImproveRequest, ImproveResponse
-from labctl.services.schemas.campaigns import ReasonRequest
-from labctl.services.schemas.certification import (
-    CertificationResponse,
-    CertifyRequest,
-    ReleaseRequest,
-    ReleaseRequestResponse,
-    RevokeRequest,
-)
-from labctl.services.schemas.documents.certificates import CertificateRequest, CertificateResponse, WithdrawRequest
-from labctl.services.schemas.recordings import (
-    ExampleRequest,
-    ImportResponse,
-    SimulatedRecordingResponse,
-    SimulatedRequest,
-)
-from labctl.services.schemas.reports.drafts import DraftsRequest, DraftsResponse
-from labctl.services.schemas.schedule import ScheduledResponse
 
 
 def _import_recording(context: CommandContext, asked: RecordingFolder) -> ImportResponse:

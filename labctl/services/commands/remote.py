@@ -6,11 +6,11 @@ from contextlib import ExitStack
 from typing import TypeVar
 from urllib.parse import quote
 
+from labctl.answers.base import ResponseModel
 from labctl.errors import Conflict
 from labctl.service_connection import ServiceConnection, json_of
 from labctl.services.commands.command import Command, RequestT, ResponseT
 from labctl.services.commands.requests import Addressed
-from labctl.services.schemas.base import ResponseModel
 
 FetchedT = TypeVar("FetchedT", bound=ResponseModel)
 

@@ -7,9 +7,9 @@ from datetime import datetime
 from pathlib import Path
 from typing import ClassVar, Generic, TypeVar
 
+from labctl.answers.base import Request
+from labctl.answers.campaigns import CampaignRequest, ResumeRequest
 from labctl.recording.column_map import ColumnMap
-from labctl.services.schemas.base import Request
-from labctl.services.schemas.campaigns import CampaignRequest, ResumeRequest
 
 BodyT_co = TypeVar("BodyT_co", bound=Request, covariant=True)
 

@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
+from labctl.answers.sensors import AccelerometerRequest, AccelerometerVersion, MagnetometerRequest, MagnetometerVersion
 from labctl.services.commands.command import Command
 from labctl.services.commands.context import CommandContext
 from labctl.services.commands.requests import ToUnit
-from labctl.services.schemas.sensors import (
-    AccelerometerRequest,
-    AccelerometerVersion,
-    MagnetometerRequest,
-    MagnetometerVersion,
-)
 from labctl.services.sensor_versions import keep_accelerometer, keep_magnetometer
 
 

@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-from labctl.services import check_gyros, room_environment
-from labctl.services.commands.command import Command
-from labctl.services.commands.context import CommandContext
-from labctl.services.commands.requests import ToFinding, ToStandard, ToUnit
-from labctl.services.schemas.standards import (
+from labctl.answers.standards import (
     StandardBadRequest,
     StandardCertificateRequest,
     StandardCheckRequest,
@@ -14,12 +10,11 @@ from labctl.services.schemas.standards import (
     StandardResponse,
     WithdrawFindingRequest,
 )
-from labctl.services.schemas.validity import (
-    CheckGyroRequest,
-    CheckGyroResponse,
-    RoomEnvironmentRequest,
-    RoomEnvironmentResponse,
-)
+from labctl.answers.validity import CheckGyroRequest, CheckGyroResponse, RoomEnvironmentRequest, RoomEnvironmentResponse
+from labctl.services import check_gyros, room_environment
+from labctl.services.commands.command import Command
+from labctl.services.commands.context import CommandContext
+from labctl.services.commands.requests import ToFinding, ToStandard, ToUnit
 from labctl.services.standards import register
 
 

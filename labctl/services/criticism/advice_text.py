@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from labctl.answers.criticism import Advice
 from labctl.fitting.criticism import Criticism, Suspect
 from labctl.fitting.effects import CATALOGUE
-from labctl.json_types.criticism import Advice
 
 #: From this share of the variance of several axes on, their slow courses are one.
 COMMON = 0.8

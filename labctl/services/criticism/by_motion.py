@@ -9,6 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.answers.budget import BudgetJson
+from labctl.answers.comparison import (
+    AxisResponse,
+    MotionResponse,
+    PoseColumns,
+    ProfileColumns,
+    RestColumns,
+    TurnColumns,
+)
+from labctl.answers.fitted_model import AxisCoefficients
 from labctl.calibration import Calibration, read_calibration
 from labctl.errors import BadInput
 from labctl.fitting.data.fit_data import FitData, fit_data_of
@@ -17,21 +27,11 @@ from labctl.fitting.data.temperature.legs import legs_of
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.poses.direction_errors import Correct, move_errors
 from labctl.fitting.uncertainty import COVERAGE
-from labctl.json_types.budget import BudgetJson
-from labctl.json_types.models import AxisCoefficients
 from labctl.services.cache import UNNAMED, compute
 from labctl.services.criticism.measurements import Measurements
 from labctl.services.criticism.verification.of_poses import correction_of
 from labctl.services.criticism.verification.of_version import applied_errors
 from labctl.services.recordings.loading import motion_of, newest_row, source_of
-from labctl.services.schemas.comparison import (
-    AxisResponse,
-    MotionResponse,
-    PoseColumns,
-    ProfileColumns,
-    RestColumns,
-    TurnColumns,
-)
 from labctl.store import CalibrationRecord, RecordingRow, Store
 
 #: Rows of one axis that a picture of a profile takes.

@@ -7,11 +7,12 @@ Nothing is fitted here: points, lines, what remains and the error per turn all c
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.answers.comparison import ComparisonColumns, ComparisonResponse, ModelLines
 from labctl.calibration import Calibration, read_calibration
 from labctl.error_per_turn import AT_REST_DPS, LEAST_RATE_DPS, bias_at_rest, turn_errors
 from labctl.errors import BadInput, LabctlError
@@ -22,13 +23,11 @@ from labctl.fitting.data.levels import level_centres, rate_levels, temperature_r
 from labctl.fitting.models.fitted_model import FittedModel
 from labctl.fitting.models.true_rate_error import errors_at_true_rates
 from labctl.fitting.numeric.arrays import Array
-from labctl.json_types.answers import ComparisonJson
 from labctl.recording.positions import axis_in
 from labctl.services.criticism.measurements import Measurements
 from labctl.services.criticism.residuals import own_numbers
 from labctl.services.criticism.verification.of_version import applied_errors
 from labctl.services.recordings.loading import chosen_rows
-from labctl.services.schemas.comparison import ComparisonColumns, ComparisonResponse, ModelLines
 from labctl.store import Store
 
 #: Points of a line, besides those at the measured rates or temperatures themselves.
@@ -140,11 +139,10 @@ def compare_version(
     )  # fmt: skip
 
 
-def comparison_json(store: Store, serial: str, version: int, recording: int) -> ComparisonJson | None:
-    """Return the comparison as JSON; None where the version cannot be applied to the recording."""
+def drawn_comparison(store: Store, serial: str, version: int, recording: int) -> ComparisonResponse | None:
+    """Return what is drawn beside a criticism; None where the version cannot be applied to the recording."""
     try:
-        found = compare_version(store, serial, version, recording, other_unit=True)
-        return cast(ComparisonJson, found.model_dump(mode="json"))
+        return compare_version(store, serial, version, recording, other_unit=True)
     except LabctlError:
         return None
 

@@ -6,13 +6,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
+from labctl.answers.base import ResponseModel
+from labctl.answers.criticism import CriticismResponse
+from labctl.answers.residuals import ResidualsResponse
 from labctl.errors import BadInput
 from labctl.services.cache import cached_group
 from labctl.services.criticism.decimated_readings import reading_beside
 from labctl.services.criticism.versions import content_digest, version_of
 from labctl.services.recordings.loading import chosen_rows, passed_over, readings_question
-from labctl.services.schemas.base import ResponseModel
-from labctl.services.schemas.criticism import CriticismResponse, ResidualsResponse
 from labctl.store import CalibrationRecord, RecordingRow, Store
 
 if TYPE_CHECKING:

@@ -7,12 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from labctl.answers.criticism import CriticismResponse, Experiment
+from labctl.answers.residuals import ResidualsResponse
+from labctl.answers.verification import VerificationResponse
 from labctl.errors import BadInput, LabctlError
 from labctl.fitting.criticism import Criticism, criticise, fit_means
 from labctl.fitting.effects import Formula
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.fitting.models.inversion import NotConverged
-from labctl.json_types.criticism import Experiment
 from labctl.progress import report_stage
 from labctl.services.criticism.decimated_readings import Decimated
 from labctl.services.criticism.measurements import Measurements, refuse_unmeasured
@@ -21,7 +23,6 @@ from labctl.services.criticism.residuals import residual_columns
 from labctl.services.criticism.verification.of_version import verify
 from labctl.services.effects import catalogue_with
 from labctl.services.recordings.inspection import refuse_wrong
-from labctl.services.schemas.criticism import CriticismResponse, ResidualsResponse, VerificationResponse
 from labctl.store import CalibrationRecord, RecordingRow, Store
 
 

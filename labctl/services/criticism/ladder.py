@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from labctl.answers.ladder import LadderResponse, LadderRow
 from labctl.errors import BadInput, LabctlError
 from labctl.services.cache import UNNAMED, compute
 from labctl.services.criticism.versions import version_of
-from labctl.services.schemas.reports.ladder import LadderResponse, LadderRow
 from labctl.store import CalibrationRecord, RecordingRow, Store
 
 #: Applying more versions than this to a recording takes long.

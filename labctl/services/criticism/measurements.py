@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from instruments.configuration import changed
+from labctl.answers.inspection import DataWarning, RecordingInspection
 from labctl.errors import BadInput
 from labctl.fitting.data.covered import Covered
 from labctl.fitting.data.fit_data import refuse_poses
@@ -35,7 +36,6 @@ from labctl.services.recordings.loading import (
     readings_question,
     source_of,
 )
-from labctl.services.schemas.warnings import DataWarning, RecordingInspection
 from labctl.store import RecordingRow, Store
 
 

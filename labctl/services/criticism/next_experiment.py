@@ -8,6 +8,7 @@ import numpy as np
 import tomli_w
 
 from instruments.bench_config import BenchFile
+from labctl.answers.criticism import Experiment
 from labctl.errors import LabctlError
 from labctl.fitting.criticism import (
     SEPARATED_CHI2,
@@ -18,7 +19,6 @@ from labctl.fitting.criticism import (
     separation_power,
 )
 from labctl.fitting.models.error_model import ErrorModel
-from labctl.json_types.criticism import Experiment
 from labctl.services.planning.loading import bench_for, limits_of, load_bench, recipe_document
 from labctl.services.simulation.visibility import planned_schedule
 from labctl.store import Store

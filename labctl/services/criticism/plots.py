@@ -4,32 +4,19 @@ from __future__ import annotations
 
 import hashlib
 import json
-from typing import cast
 
-from labctl.json_types.answers import CriticismJson, LadderJson
+from labctl.answers.views import PictureResponse, PicturesResponse
 from labctl.services.cache import cached
-from labctl.services.criticism.comparison import comparison_json
+from labctl.services.criticism.comparison import drawn_comparison
 from labctl.services.criticism.criticise import criticise_unit
 from labctl.services.criticism.ladder import ladder
-from labctl.services.schemas.criticism import CriticismResponse, PictureResponse, PicturesResponse
-from labctl.services.schemas.reports.ladder import LadderResponse
 from labctl.store import Store
-
-
-def criticism_json(answer: CriticismResponse) -> CriticismJson:
-    """Return a criticism as plots read it."""
-    return cast(CriticismJson, answer.model_dump(mode="json"))
-
-
-def ladder_json(answer: LadderResponse) -> LadderJson:
-    """Return a ladder as plots read it."""
-    return cast(LadderJson, answer.model_dump(mode="json"))
 
 
 def pictures_unit(store: Store, serial: str, version: int | None, recording: int | None) -> list[PictureResponse]:
     """Return the pictures of a version's criticism and of its unit's ladder. Raises NotFound, BadInput."""
     said, steps = criticise_unit(store, serial, version, recording), ladder(store, serial)
-    compared = comparison_json(store, serial, said.version, said.recording)
+    compared = drawn_comparison(store, serial, said.version, said.recording)
 
     def work() -> PicturesResponse:
         from labctl.plots import pictures_of  # noqa: PLC0415  a service starts without a drawing library
@@ -39,9 +26,9 @@ def pictures_unit(store: Store, serial: str, version: int | None, recording: int
                 id=picture.id, title=picture.title, how_to_read=picture.caption, effects=list(picture.effects),
                 figure=json.loads(picture.figure.to_json()),
             )
-            for picture in pictures_of(criticism_json(said), ladder_json(steps), compared)
+            for picture in pictures_of(said, steps, compared)
         ]  # fmt: skip
         return PicturesResponse(pictures=found)
 
-    numbers = "\n".join([*(answer.model_dump_json() for answer in (said, steps)), json.dumps(compared)])
+    numbers = "\n".join(answer.model_dump_json() for answer in (said, steps, compared) if answer is not None)
     return cached(PicturesResponse, {"numbers": hashlib.sha256(numbers.encode()).hexdigest()}, work).pictures

@@ -6,6 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from labctl.answers.criticism import CriticisedNoise, CriticismResponse, Experiment, LackOfFit
+from labctl.answers.criticism import Suspect as SuspectJson
+from labctl.answers.inspection import DataWarning
 from labctl.fitting.criticism import (
     Criticism,
     Suspect,
@@ -16,8 +19,6 @@ from labctl.fitting.criticism import (
     worst_data_sets,
 )
 from labctl.fitting.effects import CATALOGUE, kind_of
-from labctl.json_types.criticism import CriticisedNoise, Experiment, LackOfFit
-from labctl.json_types.criticism import Suspect as SuspectJson
 from labctl.services.criticism.advice_text import (
     advice_sentences,
     coarse_steps,
@@ -26,8 +27,6 @@ from labctl.services.criticism.advice_text import (
     not_logged,
     what_to_log,
 )
-from labctl.services.schemas.criticism import CriticismResponse
-from labctl.services.schemas.warnings import DataWarning
 
 #: How a warning begins that stands before a verdict.
 DATA_FIRST = {"certain": "The data are wrong", "likely": "Check the data"}

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from labctl.answers.residuals import ResidualColumns
 from labctl.fitting import FitResult
 from labctl.fitting.criticism import ReducedRecording, Residuals
 from labctl.fitting.data.channels import Channels
@@ -14,7 +15,6 @@ from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.numeric.arrays import Array, over
 from labctl.recording import Recording
 from labctl.recording.columns import OWN_DATASET, RECORDING
-from labctl.services.schemas.criticism import ResidualColumns
 
 
 def residual_columns(

@@ -8,6 +8,7 @@ from datetime import UTC, datetime, timedelta
 
 import numpy as np
 
+from labctl.answers.units import AppliedVersion, AxisPoint, Drift, DriftLine, Leaving, TrendPoint, TrendResponse
 from labctl.calibration import read_calibration
 from labctl.errors import BadInput, LabctlError
 from labctl.fitting.data.fit_data import fit_data_of
@@ -24,15 +25,6 @@ from labctl.services.criticism.verification.of_version import (
     mounting_angles_of,
 )
 from labctl.services.criticism.versions import version_of
-from labctl.services.schemas.units import (
-    AppliedVersion,
-    AxisPoint,
-    Drift,
-    DriftLine,
-    Leaving,
-    TrendPoint,
-    TrendResponse,
-)
 from labctl.store import CalibrationRecord, RecordingRow, Store
 
 #: Recordings that begin less than this after the end of an earlier one are of one occasion.

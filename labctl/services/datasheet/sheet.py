@@ -9,17 +9,17 @@ from typing import Literal
 
 import numpy as np
 
+from labctl.answers.datasheet import Characteristic, DatasheetResponse, MeasuredUnder
+from labctl.answers.noise import NoiseFigure
 from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.data.rate_profile import TIME_CONSTANT
-from labctl.json_types.noise import NoiseFigure
 from labctl.progress import report_stage
 from labctl.recording import RecordingInfo
 from labctl.services.cache import UNNAMED, compute
 from labctl.services.datasheet.measured import Figure, figures_of
 from labctl.services.recordings.allan import MOST_RECORDINGS, noise_of_recordings
 from labctl.services.recordings.loading import points_of
-from labctl.services.schemas.reports.datasheet import Characteristic, DatasheetResponse, MeasuredUnder
 from labctl.store import RecordingRow, Store, Unit
 
 RATES = "a recipe of several rates of both signs, such as ojeda2000 or table1-x-table2"

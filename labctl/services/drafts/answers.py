@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from labctl.services.schemas.campaigns import CampaignResponse
-from labctl.services.schemas.reports.drafts import DraftReport, DraftResponse
+from labctl.answers.campaigns import CampaignResponse
+from labctl.answers.drafts import DraftReport, DraftResponse
 from labctl.store import DraftRow, Store
 from procedures.contracts.campaign_state import CampaignState
 

@@ -6,17 +6,17 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from labctl.answers.drafts import AppliedDraft, CoefficientChange, DriftFromVersion, RemainingLine
+from labctl.answers.fitted_model import AxisCoefficients
 from labctl.calibration import read_calibration
 from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.fitting.models.inversion import NotConverged
 from labctl.fitting.numeric.arrays import Array
-from labctl.json_types.models import AxisCoefficients
 from labctl.services.criticism.measurements import Measurements
 from labctl.services.criticism.trend import line_left
 from labctl.services.criticism.verification.of_version import applied_errors, mounting_angles_of, verify
 from labctl.services.recordings.loading import motion_of
-from labctl.services.schemas.reports.drafts import AppliedDraft, CoefficientChange, DriftFromVersion, RemainingLine
 from labctl.store import CalibrationRecord, Store
 
 #: What cannot be done with a recording or a version, as opposed to what went wrong on the way.

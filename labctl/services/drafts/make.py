@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import cast
 
+from labctl.answers.calibrations import FitRequest
+from labctl.answers.drafts import DraftsRequest, DraftsResponse
 from labctl.errors import Conflict, DataRefused, LabctlError
-from labctl.json_types import JsonObject
 from labctl.log import get_logger
 from labctl.progress import report_stage
 from labctl.services.calibrations.fitting import fit_unit
@@ -14,8 +14,6 @@ from labctl.services.drafts.answers import drafts_of
 from labctl.services.drafts.as_found import REFUSALS
 from labctl.services.drafts.report import report_on
 from labctl.services.drafts.text import failure_text
-from labctl.services.schemas.calibrations import FitRequest
-from labctl.services.schemas.reports.drafts import DraftsRequest, DraftsResponse
 from labctl.store import DraftEvent, DraftRow, Store
 from procedures.contracts.campaign_state import CampaignState
 from procedures.recipe.fit_rules import FitRules
@@ -61,7 +59,7 @@ def _make(store: Store, draft: DraftRow, rules: FitRules, at: datetime) -> None:
             return
     report = report_on(store, store.calibrations.get(draft.serial, version), draft.recording, rules)
     is_well = report.within_limits is not False and not report.objections
-    document = cast(JsonObject, report.model_dump(mode="json"))
+    document = report.model_dump(mode="json")
     event = DraftEvent(report.text, "info" if is_well else "warning")
     if store.drafts.conclude(draft.recording, document, event, at):
         log.info(

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import Literal
 
+from labctl.answers.certification import AssessmentResponse, CertifiedErrors
+from labctl.answers.drafts import AppliedDraft, ComparedModel, DraftReport, DriftFromVersion, LimitResult
 from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting import fit
 from labctl.fitting.estimation.error_metrics import first_of_smallest
@@ -15,14 +17,6 @@ from labctl.services.calibrations.certification import version_in_force
 from labctl.services.criticism.measurements import Measurements
 from labctl.services.drafts.as_found import REFUSALS, applied, drift_from
 from labctl.services.drafts.text import report_text
-from labctl.services.schemas.certification import AssessmentResponse, CertifiedErrors
-from labctl.services.schemas.reports.drafts import (
-    AppliedDraft,
-    ComparedModel,
-    DraftReport,
-    DriftFromVersion,
-    LimitResult,
-)
 from labctl.store import CalibrationRecord, Store
 from procedures.recipe.fit_rules import FitLimits, FitRules
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from labctl.services.schemas.reports.drafts import DraftReport, LimitResult
+from labctl.answers.drafts import DraftReport, LimitResult
 
 LIMITS = {
     "heldout_rms_dps": "held-out error",

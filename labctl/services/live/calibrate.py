@@ -13,6 +13,8 @@ from typing import BinaryIO, Self
 import numpy as np
 
 from instruments.errors import InstrumentError
+from labctl.answers.calibrations import FitRequest, FitResponse
+from labctl.answers.live import LiveResponse
 from labctl.errors import BadInput, LabctlError
 from labctl.fitting.live import LiveCalibration, LiveState, Target
 from labctl.fitting.models.presets import POSES
@@ -25,8 +27,6 @@ from labctl.services.live.assessor import Assessor
 from labctl.services.live.figures import figures_of
 from labctl.services.live.source import Block, LiveSource, Reason, StreamEnded
 from labctl.services.recordings.live_folders import SAMPLES, lock, unlock
-from labctl.services.schemas.calibrations import FitRequest, FitResponse
-from labctl.services.schemas.live import LiveResponse
 
 # The recording of a live calibration on disk, from its first reading on.
 #

@@ -5,15 +5,10 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import TypedDict
 
+from labctl.answers.live import LiveCoefficientResponse, LiveMoment, LivePoseResponse, LiveTargetResponse
 from labctl.fitting.live import LiveState, Target
 from labctl.fitting.live.directions import DIRECTIONS, Direction
 from labctl.fitting.live.state import LiveCoefficient
-from labctl.services.schemas.live import (
-    LiveCoefficientResponse,
-    LiveMoment,
-    LivePoseResponse,
-    LiveTargetResponse,
-)
 
 
 class _Figures(TypedDict):

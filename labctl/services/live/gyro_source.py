@@ -17,6 +17,7 @@ from instruments.configuration import configuration_of
 from instruments.interfaces.gyro import Readings
 from instruments.simulation import lay_simulated
 from instruments.transport.factory import Wire
+from labctl.answers.wire_logs import RecordedSession
 from labctl.errors import BadInput
 from labctl.fitting.live import PoseRequest
 from labctl.recording import RecordingInfo
@@ -26,7 +27,6 @@ from labctl.services.benches.wire_log import recording
 from labctl.services.live.source import Block
 from labctl.services.planning.loading import with_drivers
 from labctl.services.recordings.importers import parsed_options
-from labctl.services.schemas.wire_logs import RecordedSession
 
 #: Limits of a unit that is named by driver and port alone: no table turns it.
 USUAL_RATE_DPS = 2000.0

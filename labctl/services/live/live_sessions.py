@@ -15,6 +15,7 @@ from functools import partial
 from instruments.clock import Clock, SystemClock
 from instruments.errors import InstrumentError
 from labctl.acting_user import actor
+from labctl.answers.live import LiveEndRequest, LiveHistoryResponse, LiveRequest, LiveResponse, LiveStateResponse
 from labctl.errors import BadInput, Conflict, LabctlError
 from labctl.fitting.live import PoseRequest, Target
 from labctl.log import get_logger
@@ -34,13 +35,6 @@ from labctl.services.live.session_record import SessionRecord
 from labctl.services.live.source import Block, LiveSource, StreamEnded
 from labctl.services.planning.loading import with_drivers
 from labctl.services.recordings.live_folders import folders_of, kept_readings, usual_folder
-from labctl.services.schemas.live import (
-    LiveEndRequest,
-    LiveHistoryResponse,
-    LiveRequest,
-    LiveResponse,
-    LiveStateResponse,
-)
 from labctl.store import Store
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator, Callable
 
+from labctl.answers.live import LiveStateResponse
 from labctl.services.campaigns.event_stream import HEARTBEAT_S, LIVE_S, Bell, Listen, StatusCache
-from labctl.services.schemas.live import LiveStateResponse
 
 #: A session in one of these goes on.
 GOES_ON = ("running", "storing")

@@ -8,10 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
 
-from labctl.fitting.estimation.result import FitResult
-from labctl.fitting.live import LiveCoefficient, LiveState, Target
-from labctl.services.live.figures import moment_of, target_of
-from labctl.services.schemas.live import (
+from labctl.answers.live import (
     LiveHistoryResponse,
     LiveMoment,
     LiveResponse,
@@ -19,6 +16,9 @@ from labctl.services.schemas.live import (
     LiveStateResponse,
     LiveUncertaintyColumn,
 )
+from labctl.fitting.estimation.result import FitResult
+from labctl.fitting.live import LiveCoefficient, LiveState, Target
+from labctl.services.live.figures import moment_of, target_of
 
 
 @dataclass(frozen=True)

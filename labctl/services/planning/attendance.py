@@ -8,7 +8,7 @@ from datetime import UTC, datetime, timedelta
 from zoneinfo import ZoneInfo
 
 from instruments.bench_config import BenchFile
-from labctl.services.schemas.plans import AttendanceResponse
+from labctl.answers.plans import AttendanceResponse
 from procedures.contracts.steps import Mount, PowerOff, PowerOn, Turn
 from procedures.planning.plan import Plan
 

@@ -10,13 +10,13 @@ from zoneinfo import ZoneInfo
 
 from instruments.bench_config import USUAL_AIR_TAU_S, BenchFile
 from instruments.positions import Position
+from labctl.answers.plans import FurtherMountings, MisalignmentOutlook, PlanResponse, Visibility
 from labctl.fitting.data.channels import BODY_AXES
 from labctl.fitting.data.mounting_angles import ANGLE_QUANTITIES, angle_gains, shares_of
 from labctl.fitting.uncertainty.conditions import BenchConditions
 from labctl.fitting.uncertainty.standard_lines import Sensitivities, standards_u
 from labctl.services.planning.attendance import attendance, visits_s
 from labctl.services.planning.loading import limits_of, plan_for
-from labctl.services.schemas.plans import FurtherMountings, MisalignmentOutlook, PlanResponse, Visibility
 from procedures.contracts.errors import PlanRefused
 from procedures.contracts.steps import Acquire, Mount, MoveChamber
 from procedures.planning.limits import BenchLimits

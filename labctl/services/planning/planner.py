@@ -7,16 +7,11 @@ from typing import Any
 
 from instruments.bench_config import BenchFile
 from instruments.positions import Position
+from labctl.answers.plans import PlannedResponse, PlanRequest, RecipeResponse, TimelineColumns
 from labctl.errors import BadInput
 from labctl.services.planning.loading import bench_for, limits_of, load_bench, load_recipe
 from labctl.services.planning.plan_answer import LocalStart, Look, plan_answer
 from labctl.services.planning.timeline import step_json, timeline_columns
-from labctl.services.schemas.plans import (
-    PlannedResponse,
-    PlanRequest,
-    RecipeResponse,
-    TimelineColumns,
-)
 from procedures.contracts.errors import PlanRefused
 from procedures.planning.plan import make_plan
 from procedures.recipe.recipe import shipped_recipes

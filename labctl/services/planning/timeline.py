@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import cast
 
-from labctl.json_types.steps import StepJson
-from labctl.services.schemas.plans import (
-    TimelineColumns,
-)
+from labctl.answers.plans import TimelineColumns
+from labctl.answers.steps import StepJson
 from procedures.contracts.steps import Step
 
 

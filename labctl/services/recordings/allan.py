@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from labctl.answers.recordings import AllanResponse
 from labctl.errors import BadInput, NotEnoughData
 from labctl.fitting.data.static_record import StaticRecord, static_record
 from labctl.fitting.numeric.allan import LEAST_READINGS, allan
@@ -13,7 +14,6 @@ from labctl.progress import report_stage
 from labctl.recording import Columns, Recording, RecordingInfo
 from labctl.recording.points import temperature_of
 from labctl.services.cache import cached
-from labctl.services.schemas.recordings import AllanResponse
 from labctl.store import RecordingRow, Store
 
 #: Of a unit with many recordings the newest are used.

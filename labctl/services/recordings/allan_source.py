@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.answers.recordings import AllanResponse
 from labctl.errors import BadInput, BadRecording, NotEnoughData
 from labctl.fitting.data.static_record import ONE_TEMPERATURE_K, StaticRecord, static_record, stretch_of
 from labctl.fitting.numeric.allan import LEAST_READINGS, Allan, allan
@@ -20,7 +21,6 @@ from labctl.recording.verification import fitted_part
 from labctl.services.recordings.allan import allan_unit
 from labctl.services.recordings.importers import as_interchange
 from labctl.services.recordings.loading import newest_row
-from labctl.services.schemas.recordings import AllanResponse
 from labctl.store import Store
 
 #: Files that are read as they are, a header and columns, where no recording.toml says more.

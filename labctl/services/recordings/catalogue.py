@@ -7,10 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.recording import Recording, RecordingInfo
-from labctl.recording.columns import RATE_TIME_U
-from labctl.services.benches.bench_clock import has_simulated_time
-from labctl.services.schemas.recordings import (
+from labctl.answers.recordings import (
     ChannelColumns,
     DataSetsResponse,
     RecordingAlone,
@@ -18,6 +15,9 @@ from labctl.services.schemas.recordings import (
     RecordingWithPoints,
     SamplesResponse,
 )
+from labctl.recording import Recording, RecordingInfo
+from labctl.recording.columns import RATE_TIME_U
+from labctl.services.benches.bench_clock import has_simulated_time
 from labctl.store import MeanRow, RecordingRow, Store
 from labctl.store.paging import Page, PageRequest
 

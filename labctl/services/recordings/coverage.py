@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from labctl.answers.inspection import RecordingInspection
 from labctl.fitting.data.covered import Covered, covered_by
 from labctl.fitting.data.earth import up_rate_dps
 from labctl.recording import Recording
 from labctl.recording.verification import is_marked
-from labctl.services.schemas.warnings import RecordingInspection
 
 
 def covered_of(found: RecordingInspection, points: Recording) -> Covered | None:

@@ -6,6 +6,8 @@ import json
 from collections.abc import Sequence
 from pathlib import Path
 
+from labctl.answers.inspection import DataWarning, InspectionResponse, ReadingsExamined
+from labctl.answers.views import PictureResponse
 from labctl.errors import BadInput
 from labctl.recording import RecordingInfo, read_recording
 from labctl.recording.column_map import ColumnMap
@@ -16,9 +18,6 @@ from labctl.services.recordings.inspection import inspect_stored
 from labctl.services.recordings.readings_examined import examined_stored
 from labctl.services.recordings.time_order import OutOfOrder
 from labctl.services.recordings.warnings import warning_of
-from labctl.services.schemas.criticism import PictureResponse
-from labctl.services.schemas.inspection import InspectionResponse, ReadingsExamined
-from labctl.services.schemas.warnings import DataWarning
 from labctl.store import Store
 
 

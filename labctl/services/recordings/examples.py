@@ -6,10 +6,10 @@ from datetime import datetime
 from importlib import resources
 from pathlib import Path
 
+from labctl.answers.recordings import SimulatedRecordingResponse, SimulatedRequest
 from labctl.errors import BadInput
 from labctl.services.recordings.inspection import inspect_stored
 from labctl.services.recordings.transfer import model_for
-from labctl.services.schemas.recordings import SimulatedRecordingResponse, SimulatedRequest
 from labctl.services.simulation.recordings import SimulateRequest, make_recording
 from labctl.store import Store
 

@@ -5,14 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.answers.inspection import DataWarning, ReadingsExamined, RecordingInspection
 from labctl.errors import DataRefused
 from labctl.recording import Recording
 from labctl.recording.sanity import Summary, findings_of, joined, steps_of, summarise
 from labctl.services.cache import cached
 from labctl.services.recordings.readings_examined import examined_stored
 from labctl.services.recordings.warnings import as_json, finding_of, warning_of
-from labctl.services.schemas.inspection import ReadingsExamined
-from labctl.services.schemas.warnings import DataWarning, RecordingInspection
 from labctl.store import RecordingRow, Store
 
 

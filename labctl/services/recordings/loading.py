@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from labctl.answers.inspection import DataWarning, RecordingInspection
 from labctl.errors import BadInput, NotEnoughData, NotFound
 from labctl.recording import Recording, to_points
 from labctl.recording.output_steps import per_reading
@@ -17,7 +18,6 @@ from labctl.recording.verification import is_marked
 from labctl.services.cache import UNNAMED, compute
 from labctl.services.recordings.inspection import inspect_stored
 from labctl.services.recordings.warnings import warning_of
-from labctl.services.schemas.warnings import DataWarning, RecordingInspection
 from labctl.store import RecordingRow, Store
 
 #: Recordings that are fitted together, at most.

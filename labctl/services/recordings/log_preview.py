@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.answers.inspection import DataWarning
+from labctl.answers.recordings import LogColumn, LogPreview, LogTarget, LogTrace
 from labctl.recording.column_map import ColumnMap, map_document, map_text
 from labctl.recording.column_map.sources import source, unused
 from labctl.recording.column_map.time_order import in_order_of_time
@@ -19,8 +21,6 @@ from labctl.services.recordings.importers import log_with_map
 from labctl.services.recordings.logs import MappedFile
 from labctl.services.recordings.time_order import OutOfOrder, leaves_out_rows, refuse_unknown
 from labctl.services.recordings.warnings import warning_of
-from labctl.services.schemas.recordings import LogColumn, LogPreview, LogTarget, LogTrace
-from labctl.services.schemas.warnings import DataWarning
 from labctl.store import Store
 
 #: Bins of a trace, and columns that have one.

@@ -6,12 +6,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from labctl.answers.inspection import ReadingsExamined
 from labctl.recording import Recording, RecordingInfo
 from labctl.recording.recording import Columns
 from labctl.recording.sanity.readings import examination, joined_examinations
 from labctl.services.cache import cached
 from labctl.services.recordings.warnings import warning_of
-from labctl.services.schemas.inspection import ReadingsExamined
 from labctl.store import RecordingRow, Store
 
 #: Readings that are examined together, at most, where a recording is not in memory already.

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
+from labctl.answers.recording_head import LeftOut
 from labctl.errors import BadInput
 from labctl.recording import Recording
 from labctl.recording.column_map import ColumnMap
 from labctl.recording.column_map.time_order import in_order_of_time
-from labctl.recording.info import LeftOut
 from labctl.recording.raw_table import RawTable
 from labctl.recording.sanity import Finding
 from labctl.recording.sanity.readings.leaving_out import ALL, MAY_BE_LEFT_OUT

@@ -7,11 +7,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.answers.recordings import TraceResponse
 from labctl.errors import BadInput
 from labctl.recording import RecordingInfo
 from labctl.recording.columns import BY_NAME
 from labctl.services.recordings.envelopes import Array, Envelope, bins_of, courses_of, envelope_of
-from labctl.services.schemas.recordings import TraceResponse
 from labctl.store import DataSetRow, Store
 
 #: More readings than this are not read for one picture; their envelope is drawn.

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import IO, BinaryIO, Literal
 from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile
 
+from labctl.answers.recordings import ImportResponse
 from labctl.errors import BadRecording
 from labctl.fitting.estimation.suggestion import suggested_model
 from labctl.recording import Recording, read_recording, write_recording
@@ -20,7 +21,6 @@ from labctl.recording.verification import is_marked
 from labctl.services.recordings.inspection import inspect_stored
 from labctl.services.recordings.loading import points_of
 from labctl.services.recordings.staging import staging_folder
-from labctl.services.schemas.recordings import ImportResponse
 from labctl.store import RecordingRow, Store
 
 CHUNK_BYTES = 1 << 20

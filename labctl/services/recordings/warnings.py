@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from labctl.json_types.findings import FindingJson
+from labctl.answers.inspection import DataWarning, FindingJson
 from labctl.recording.sanity import Finding
-from labctl.services.schemas.warnings import DataWarning
 
 
 def warning_of(finding: Finding) -> DataWarning:

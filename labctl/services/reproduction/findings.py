@@ -9,8 +9,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from labctl.json_types.reproduction import PaperFigure, PaperPanel, PaperTrace
-from labctl.json_types.views import Numbers
+from labctl.answers.reproduction import PaperFigure, PaperPanel, PaperTrace
+from labctl.answers.views import Numbers
 
 #: Where a number is from. measured: a real unit. simulated: what labctl makes of a simulated unit. built in: the
 #: simulated unit was given it, so that its return shows the arithmetic only. computed: from printed numbers alone.

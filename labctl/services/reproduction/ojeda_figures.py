@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from labctl.answers.reproduction import PaperFigure, PaperPanel, PaperTrace
 from labctl.fitting import Channels
 from labctl.fitting.data.levels import level_centres, rate_levels
 from labctl.fitting.numeric.arrays import Array
-from labctl.json_types.reproduction import PaperFigure, PaperPanel, PaperTrace
 from labctl.papers import ojeda2000 as paper
 from labctl.services.reproduction.findings import Missing, panel, trace
 from labctl.services.reproduction.ojeda_surface import Surface

@@ -7,8 +7,8 @@ import tempfile
 from collections.abc import Callable
 from pathlib import Path
 
+from labctl.answers.reproduction import PaperNumber, PaperPage
 from labctl.errors import BadInput
-from labctl.json_types.reproduction import PaperNumber, PaperPage
 from labctl.papers import PAPERS, Paper, Printed
 from labctl.plots import paper_html
 from labctl.progress import report_stage

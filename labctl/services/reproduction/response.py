@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from labctl.services.schemas.base import ResponseModel
+from labctl.answers.base import ResponseModel
 
 
 class NumberResponse(ResponseModel):

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
+from labctl.answers.orientation import OrientationOptions, OrientationResponse
+from labctl.answers.reproduction import PaperFigure
 from labctl.errors import BadInput, LabctlError
 from labctl.fitting import FitResult, fit, fit_data_of
 from labctl.fitting.models.temperature import LagrangeTable
 from labctl.fitting.numeric.arrays import Array
-from labctl.json_types.reproduction import PaperFigure
 from labctl.papers import weiss1995 as paper
 from labctl.progress import report_stage
 from labctl.recording import OutputUnit, Recording
 from labctl.services.calibrations.orientation import orientation_of_readings
 from labctl.services.reproduction.findings import Findings, Missing, Value, panel, trace
 from labctl.services.reproduction.sources import Measured, measured_from, shipped, simulated_readings
-from labctl.services.schemas.reports.orientation import OrientationOptions, OrientationResponse
 
 BENCH = "gyrostar-sim"
 TABLE = (

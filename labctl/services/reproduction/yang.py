@@ -6,6 +6,7 @@ import tempfile
 from pathlib import Path
 
 from instruments.clock import VirtualClock
+from labctl.answers.calibrations import FitRequest, ImproveRequest
 from labctl.errors import BadInput, LabctlError
 from labctl.fitting import FitData, FitResult, fit, fit_data_of, fit_turning, residuals
 from labctl.progress import report_stage
@@ -18,7 +19,6 @@ from labctl.services.reproduction import yang_numbers as numbers
 from labctl.services.reproduction.findings import Findings, Missing, Value
 from labctl.services.reproduction.sources import Measured, measured_from, simulated_readings
 from labctl.services.reproduction.yang_errors import Judged, at_shown, left_out_errors, raw_errors
-from labctl.services.schemas.calibrations import FitRequest, ImproveRequest
 from labctl.store import Store, open_store
 
 

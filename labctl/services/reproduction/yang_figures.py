@@ -7,10 +7,10 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.answers.reproduction import PaperFigure, PaperPanel, PaperTrace
 from labctl.fitting import FitData, FittedModel
 from labctl.fitting.models.temperature import LagrangeTable
 from labctl.fitting.numeric.arrays import Array
-from labctl.json_types.reproduction import PaperFigure, PaperPanel, PaperTrace
 from labctl.papers import yang2018 as paper
 from labctl.services.reproduction.findings import panel, trace
 from labctl.services.reproduction.yang_errors import Judged

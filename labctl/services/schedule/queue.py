@@ -5,14 +5,14 @@ from __future__ import annotations
 from datetime import datetime
 
 from instruments.bench_config import BenchFile
+from labctl.answers.campaigns import CampaignRequest
+from labctl.answers.schedule import ScheduledResponse, StartEventResponse
 from labctl.errors import BadInput
 from labctl.services.benches.start_confirmation import confirmation_text
 from labctl.services.planning.attendance import attendance, visits_s
 from labctl.services.planning.loading import limits_of, load_recipe
 from labctl.services.schedule import times
 from labctl.services.schedule.scheduler import REAL_BENCH_LATE_LIMIT_S
-from labctl.services.schemas.campaigns import CampaignRequest
-from labctl.services.schemas.schedule import ScheduledResponse, StartEventResponse
 from labctl.services.simulation.hidden_effects import with_hidden_effects
 from labctl.store import NewStart, StartRow, Store
 from procedures.planning.plan import make_plan

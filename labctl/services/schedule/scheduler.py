@@ -20,10 +20,10 @@ from typing import Protocol
 
 from instruments.clock import Clock
 from instruments.errors import InstrumentError
+from labctl.answers.campaigns import BENCH_CHECKS, CampaignRequest, CampaignResponse
 from labctl.errors import BenchBusy, LabctlError
 from labctl.log import get_logger
 from labctl.services.schedule import times
-from labctl.services.schemas.campaigns import BENCH_CHECKS, CampaignRequest, CampaignResponse
 from labctl.store import StartEventRow, StartRow, Store
 from procedures.contracts.errors import ProcedureError
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from instruments.bench_config import BenchFile, GyroSettings
+from labctl.answers.campaigns import CampaignRequest
 from labctl.errors import BadInput
 from labctl.fitting.criticism import size_for_z, size_in_noise_units, size_reference
 from labctl.services.planning.loading import limits_of, load_recipe
-from labctl.services.schemas.campaigns import CampaignRequest
 from labctl.services.simulation.hidden_effects import hidden_sizes, is_in_noise_units, refuse_unless_simulated
 from labctl.services.simulation.plan_simulation import hidden_recording
 from procedures.planning.plan import Plan, make_plan

@@ -11,10 +11,10 @@ import numpy as np
 from pydantic import Field
 
 from instruments.bench_config import BenchFile, GyroSettings, SimulationSettings
+from labctl.answers.base import LongText, Request, ResponseModel
 from labctl.errors import BadInput
 from labctl.recording import Recording, write_recording
 from labctl.services.planning.loading import bench_for, limits_of, load_bench, load_recipe
-from labctl.services.schemas.base import LongText, Request, ResponseModel
 from labctl.services.simulation.effect_sizes import USUAL_RATE_HZ, sizes_on_plan
 from labctl.services.simulation.plan_simulation import simulate
 from procedures.planning.plan import Plan, make_plan

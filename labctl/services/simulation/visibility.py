@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import asdict
 
 from instruments.bench_config import BenchFile
+from labctl.answers.plans import PlannedResponse, PlanRequest, Visibility
 from labctl.fitting.criticism import Schedule, effect_visibilities, schedule_of
 from labctl.fitting.models.error_model import ErrorModel
 from labctl.services.cache import UNNAMED, compute
 from labctl.services.planning.plan_answer import LocalStart
 from labctl.services.planning.planner import plan_steps
-from labctl.services.schemas.plans import PlannedResponse, PlanRequest, Visibility
 from labctl.services.simulation.walks import walked
 from labctl.store import Store
 from procedures.planning.plan import Plan

@@ -13,10 +13,10 @@ from datetime import date
 
 from instruments.bench_config import BenchFile
 from instruments.standards import Standard
+from labctl.answers.benches import BenchCheckResponse, DeviceCheck, FindingResponse
 from labctl.errors import Conflict
 from labctl.metrology.certificate_drift import Prediction
 from labctl.services.benches.standards import standards_of
-from labctl.services.schemas.benches import BenchCheckResponse, DeviceCheck, FindingResponse
 from labctl.services.standards.checks import to_be_checked
 from labctl.services.standards.predictions import predictions_of
 from labctl.services.standards.register import due_of

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import asdict
 
+from labctl.answers.standards import ChartLimits, StandardCheckResponse
 from labctl.metrology.control_chart import ChartPoint, Judged, Limits, judged
-from labctl.services.schemas.standards import ChartLimits, StandardCheckResponse
 from labctl.services.standards.predictions import prediction_at
 from labctl.store import RegisteredStandard, StandardCheck
 

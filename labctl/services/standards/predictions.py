@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from datetime import date
 
+from labctl.answers.standards import DriftPrediction
 from labctl.metrology.certificate_drift import CertifiedValue, Prediction, predicted
-from labctl.services.schemas.standards import DriftPrediction
 from labctl.store import RegisteredStandard
 
 

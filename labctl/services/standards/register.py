@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from datetime import date, datetime
-from typing import cast, get_args
+from typing import get_args
 
-from instruments.standards import UNITS, Quantity
-from labctl.errors import BadInput, Conflict, NotFound
-from labctl.services.schemas.standards import (
+from instruments.standards import UNITS
+from labctl.answers.standards import (
     CertifiedPointRequest,
     CertifiedPointResponse,
     StandardBadRequest,
@@ -21,6 +20,7 @@ from labctl.services.schemas.standards import (
     StandardState,
     WithdrawFindingRequest,
 )
+from labctl.errors import BadInput, Conflict, NotFound
 from labctl.services.standards.checks import charted, check_answer, out_text, to_be_checked
 from labctl.services.standards.predictions import prediction_answer, predictions_of
 from labctl.services.standards.usage import finding_text, same_issuer
@@ -34,10 +34,13 @@ from labctl.store import (
     Store,
 )
 
+#: The states that have a text, the worst first.
+WORST_FIRST: tuple[StandardState, ...] = ("bad", "check it", "overdue", "no certificate")
+
 
 def add_standard(store: Store, asked: StandardRequest, at: datetime) -> StandardResponse:
     """Enter a standard. Raises BadInput for a unit that its quantity has not, Conflict for a label that is taken."""
-    units = UNITS.get(cast(Quantity, asked.quantity))
+    units = next((units for quantity, units in UNITS.items() if quantity == asked.quantity), None)
     unit = asked.unit or (units[0] if units else None)
     if unit is None:
         raise BadInput(f"standard {asked.label}: no usual unit of {asked.quantity!r} is known; give its unit")
@@ -138,11 +141,11 @@ def answer_of(standard: RegisteredStandard, on: date) -> StandardResponse:
     """Return a standard as an answer."""
     row = standard.row
     found = dict(_states(standard, on))
-    state = next((each for each in ("bad", "check it", "overdue", "no certificate") if each in found), "valid")
+    state = next((each for each in WORST_FIRST if each in found), "valid")
     withdrawn = {each.finding: each for each in standard.findings if each.act == "withdraw"}
     return StandardResponse(
         label=row.label, serial=row.serial, quantity=row.quantity, unit=row.unit, description=row.description,
-        state=cast(StandardState, state), text=[text for texts in found.values() for text in texts],
+        state=state, text=[text for texts in found.values() for text in texts],
         due=due_of(standard),
         certificates=[_certificate(each) for each in standard.in_force],
         predictions=[prediction_answer(nominal, each) for nominal, each in predictions_of(standard, on)],

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 from datetime import date, timedelta
 
 from instruments.standards import Standard
+from labctl.answers.standards import AffectedCalibration, AffectedResponse
 from labctl.errors import BadInput
 from labctl.recording import RecordingInfo
 from labctl.recording.info import measured_at
-from labctl.services.schemas.standards import AffectedCalibration, AffectedResponse
 from labctl.store import (
     CalibrationRecord,
     RecordingRow,

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import cast
 
 import numpy as np
 import sqlalchemy as sa
 from numpy.typing import NDArray
 
 from labctl.store.dataset_statistics import statistics
-from labctl.store.repositories.sample_blocks import DataSetHead, join_blocks, scaled
+from labctl.store.repositories.sample_blocks import head_of, join_blocks, scaled
 from labctl.store.schema import tables
 
 #: Sums differ in their last places by the order in which they are made; figures that were changed differ by more.
@@ -62,7 +61,7 @@ class KeptMeans:
         m, d, r = tables.data_set_means.c, tables.data_sets, tables.recordings.c
         self._channels = connection.scalar(sa.select(r.channels).where(r.id == recording)) or []
         heads = connection.execute(sa.select(d).where(d.c.recording_id == recording)).mappings()
-        self._heads = {int(head["number"]): dict(head) for head in heads}
+        self._heads = {int(head["number"]): head_of(head) for head in heads}
         self._kept: dict[int, list[tuple[str, float, float | None, int]]] = {}
         query = sa.select(m.number, m.channel, m.mean, m.std, m.n).where(m.recording_id == recording)
         for number, channel, mean, std, n in connection.execute(query):
@@ -81,7 +80,7 @@ class KeptMeans:
         )
         if absent := sorted(sent - raw.keys()):
             return [f"the readings have no column {', '.join(absent)}"]
-        columns = scaled(dict(raw), self._channels, cast(DataSetHead, self._heads[number])) if self._channels else raw
+        columns = scaled(dict(raw), self._channels, self._heads[number]) if self._channels else raw
         valid = np.asarray(columns["valid"]) != 0 if "valid" in columns else slice(None)
         found = []
         for channel, mean, std, n in kept:

@@ -14,8 +14,8 @@ from typing import Literal
 
 import sqlalchemy as sa
 
+from labctl.answers.json_object import JsonObject
 from labctl.canonical_json import canonical
-from labctl.json_types import JsonObject
 from labctl.store.schema import tables
 
 SCHEMA = "labctl-manifest/1"

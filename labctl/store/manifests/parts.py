@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 
 import sqlalchemy as sa
 
-from labctl.json_types import JsonObject
+from labctl.answers.json_object import JsonObject
 from labctl.store import sample_codec
 from labctl.store.manifests.contents import KINDS, Kind
 from labctl.store.manifests.digests import GROUPS, RowsDigest, block_digests, digest_of_rows

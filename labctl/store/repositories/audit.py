@@ -11,11 +11,12 @@ from typing import Any
 import sqlalchemy as sa
 
 from labctl.acting_user import actor
-from labctl.json_types import JsonObject
+from labctl.answers.json_object import JsonObject
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.manifests import chain
 from labctl.store.records import AuditRow
+from labctl.store.repositories.records_by_name import records_of
 from labctl.store.schema import tables
 from labctl.store.schema.types import EPOCH
 
@@ -152,11 +153,11 @@ class Audit:
     def rows(self, *, since: datetime | None = None, after: int = 0, limit: int = 1000) -> list[AuditRow]:
         """Return rows in order: those from `since` on, with a number above `after`, at most `limit`."""
         a = tables.audit.c
-        query = sa.select(a.id, a.at, a.actor, a.action, a.subject, a.detail, a.hash).where(a.id > after)
+        query = sa.select(a.id, a.at, a.actor.label("who"), a.action, a.subject, a.detail, a.hash).where(a.id > after)
         if since is not None:
             query = query.where(a.at >= since)
         with self._database.reading() as connection:
-            return [AuditRow(*row) for row in connection.execute(query.order_by(a.id).limit(limit))]
+            return records_of(AuditRow, connection.execute(query.order_by(a.id).limit(limit)))
 
     def head(self) -> Head | None:
         """Return how long the trail is and the hash of its last row; None when the head was removed."""

@@ -12,6 +12,7 @@ from labctl.errors import Conflict, NotFound
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.repositories import audit
+from labctl.store.repositories.records_by_name import record_of, records_of
 from labctl.store.schema import tables
 
 
@@ -49,7 +50,7 @@ class Benches:
     def all(self) -> list[BenchRow]:
         """Return every bench, by name."""
         with self._database.reading() as connection:
-            return [BenchRow(*row) for row in connection.execute(_ROWS)]
+            return records_of(BenchRow, connection.execute(_ROWS))
 
     def get(self, name: str) -> BenchRow | None:
         """Return a bench; None for one that was never used with this database."""
@@ -75,8 +76,9 @@ class Benches:
         """
         b = tables.benches
         with self._database.writing() as connection:
-            found = connection.execute(_ROWS.where(b.c.name == name)).one_or_none()
-            if found is None or not BenchRow(*found).is_unconfirmed:  # a person was quicker
+            row = connection.execute(_ROWS.where(b.c.name == name)).mappings().one_or_none()
+            found = None if row is None else record_of(BenchRow, row)
+            if found is None or not found.is_unconfirmed:  # a person was quicker
                 return
             was, attempts = found.unconfirmed, found.attempts + 1
             values = {"attempts": attempts, "attempted_at": at}

@@ -10,9 +10,9 @@ from typing import Any, Literal
 import sqlalchemy as sa
 from sqlalchemy import exc
 
+from labctl.answers.certification import JudgementDetail
+from labctl.answers.kept_answers import KeptAnswer
 from labctl.errors import Conflict, NotCertified, NotFound, VersionTaken
-from labctl.json_types.calibrations import JudgementDetail
-from labctl.json_types.kept_answers import KeptAnswer
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.manifests.contents import CALIBRATION, CERTIFICATION

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 from datetime import datetime
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import sqlalchemy as sa
@@ -26,9 +26,9 @@ from labctl.store.repositories import benches
 from labctl.store.repositories.audit import append
 from labctl.store.repositories.sample_blocks import (
     STORED_TIMES,
-    DataSetHead,
     angle_values,
     blocks_of,
+    head_of,
     scaled,
     write_block,
     write_final_block,
@@ -286,7 +286,7 @@ class StoreJournal:
             valid = raw["valid"] != 0
             n = int(valid.sum())
             head = connection.execute(sa.select(d).where(*this)).mappings().one()
-            columns = scaled(raw, self._channels[gyro], cast(DataSetHead, dict(head)))
+            columns = scaled(raw, self._channels[gyro], head_of(head))
             if head["turn_deg"] is not None:  # how long it took is known only now
                 turned = {name: float(columns[key][-1].item()) for name, key in KNOWN_LATE.items()}
             means = means_rows(recording, dataset, columns, valid)

@@ -9,7 +9,7 @@ from typing import Any
 
 import sqlalchemy as sa
 
-from labctl.json_types.steps import StepJson
+from labctl.answers.steps import StepJson
 from labctl.store.connection.database import Database
 from labctl.store.schema import tables
 
@@ -109,8 +109,8 @@ def _current_steps(connection: sa.Connection, numbers: Sequence[int]) -> _Found:
         .select_from(tables.steps)
         .join(newest, (newest.c.campaign_id == s.campaign_id) & (newest.c.number == s.number))
     )
-    for number, *step in connection.execute(query):
-        yield number, {"current": CurrentStep(*step)}
+    for row in connection.execute(query):
+        yield row.campaign_id, {"current": CurrentStep(number=row.number, kind=row.kind, body=row.body)}
 
 
 def _last_events(connection: sa.Connection, numbers: Sequence[int]) -> _Found:
@@ -164,8 +164,11 @@ def _environments(connection: sa.Connection, numbers: Sequence[int]) -> _Found:
         .where(r.campaign_id.in_(numbers))
         .order_by(e.id)  # of several units the last one wins
     )
-    for number, *columns in connection.execute(query):
-        yield number, {"environment": LastEnvironment(*columns)}
+    for row in connection.execute(query):
+        logged = LastEnvironment(
+            t_s=row.t_s, temperature_c=row.temperature_c, chamber_c=row.chamber_c, setpoint_c=row.chamber_setpoint_c
+        )
+        yield row.campaign_id, {"environment": logged}
 
 
 def _dropped(connection: sa.Connection, numbers: Sequence[int]) -> _Found:

@@ -9,9 +9,9 @@ from typing import Literal
 
 import sqlalchemy as sa
 
+from labctl.answers.json_object import JsonDocument, JsonObject
+from labctl.answers.steps import StepJson
 from labctl.errors import NotFound
-from labctl.json_types import JsonDocument, JsonObject
-from labctl.json_types.steps import StepJson
 from labctl.recording import RecordingInfo
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
@@ -22,6 +22,7 @@ from labctl.store.repositories.campaign_journal import StoreJournal
 from labctl.store.repositories.campaign_summaries import CampaignSummaries, CampaignSummary
 from labctl.store.repositories.drafts.marks import make_due
 from labctl.store.repositories.recording_writer import new_recording
+from labctl.store.repositories.records_by_name import records_of
 from labctl.store.schema import tables
 from labctl.store.sealing.seals import changing, of_campaign, prepared_recordings
 from procedures.contracts.campaign_state import UNFINISHED, CampaignState
@@ -234,21 +235,31 @@ class Campaigns:
             .order_by(s.number)
         )
         with self._database.reading() as connection:
-            return [StepRow(*row) for row in connection.execute(query)]
+            return records_of(StepRow, connection.execute(query))
 
     def events(self, campaign: int, after: int = 0, limit: int = 1000) -> list[EventRow]:
         """Return events in order, those with a number above `after`."""
         e = tables.events.c
         query = (
             sa.select(
-                e.id, e.campaign_id, e.at, e.t_s, e.kind, e.level, e.message, e.device, e.value, e.limit_value, e.unit
+                e.id,
+                e.campaign_id.label("campaign"),
+                e.at,
+                e.t_s,
+                e.kind,
+                e.level,
+                e.message,
+                e.device,
+                e.value,
+                e.limit_value.label("limit"),
+                e.unit,
             )
             .where(e.campaign_id == campaign, e.id > after)
             .order_by(e.id)
             .limit(limit)
         )
         with self._database.reading() as connection:
-            return [EventRow(*row) for row in connection.execute(query)]
+            return records_of(EventRow, connection.execute(query))
 
     def unfinished(self) -> list[CampaignRow]:
         """Return campaigns that a process left without an end."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime
 from typing import Any
@@ -11,8 +10,8 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy import exc
 
+from labctl.answers.json_object import JsonDocument
 from labctl.errors import Conflict, NotFound
-from labctl.json_types import JsonDocument
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.manifests.contents import CERTIFICATE
@@ -51,12 +50,16 @@ class CertificateForms:
     pdf: bytes
 
 
-_W = tables.certificate_withdrawals.c
+_C, _W = tables.certificates.c, tables.certificate_withdrawals.c
 _WITHDRAWAL = (_W.by, _W.by_key, _W.reason, _W.at, _W.certification_id)
 
 
-def _withdrawal(columns: Sequence[Any]) -> Withdrawal | None:
-    return None if columns[0] is None else Withdrawal(*columns)
+def _withdrawal(row: sa.RowMapping) -> Withdrawal | None:
+    if row[_W.by] is None:
+        return None
+    return Withdrawal(
+        by=row[_W.by], by_key=row[_W.by_key], reason=row[_W.reason], at=row[_W.at], act=row[_W.certification_id]
+    )
 
 
 class Certificates:
@@ -159,7 +162,7 @@ class Certificates:
         columns = (c.number, c.serial, c.version, c.replaces, c.reason, c.by, c.at, c.hash, c.order, c.by_key)
         query = sa.select(*columns, c.document, *_WITHDRAWAL).select_from(joined).where(which).order_by(c.id.desc())
         with self._database.reading() as connection:
-            return [_row(row) for row in connection.execute(query).all()]
+            return [_row(row) for row in connection.execute(query).mappings()]
 
     def newest(self, serial: str, version: int) -> CertificateRow | None:
         """Return the certificate of a version that none replaces; None: none was issued."""
@@ -173,7 +176,10 @@ class Certificates:
         return CertificateForms(bytes(row.document), bytes(row.xml), bytes(row.pdf))
 
 
-def _row(found: Sequence[Any]) -> CertificateRow:
-    own, document = found[: -len(_WITHDRAWAL) - 1], found[-len(_WITHDRAWAL) - 1]
-    signed_by = json.loads(bytes(document)).get("signed_by")
-    return replace(CertificateRow(*own), withdrawal=_withdrawal(found[-len(_WITHDRAWAL) :]), signed_by=signed_by)
+def _row(row: sa.RowMapping) -> CertificateRow:
+    signed_by = json.loads(bytes(row[_C.document])).get("signed_by")
+    return CertificateRow(
+        number=row[_C.number], serial=row[_C.serial], version=row[_C.version], replaces=row[_C.replaces],
+        reason=row[_C.reason], by=row[_C.by], at=row[_C.at], hash=row[_C.hash], order=row[_C.order],
+        by_key=row[_C.by_key], withdrawal=_withdrawal(row), signed_by=signed_by,
+    )  # fmt: skip

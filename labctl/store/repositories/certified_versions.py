@@ -9,7 +9,7 @@ from typing import Any
 
 import sqlalchemy as sa
 
-from labctl.json_types import JsonObject
+from labctl.answers.json_object import JsonObject
 from labctl.recording.info import measured_at
 from labctl.store.connection.database import Database
 from labctl.store.schema import tables

@@ -10,6 +10,7 @@ import sqlalchemy as sa
 
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
+from labctl.store.repositories.records_by_name import records_of
 from labctl.store.schema import tables
 
 
@@ -44,7 +45,7 @@ class Fetches:
             f.serial == serial, f.version == version
         )
         with self._database.reading() as connection:
-            return [FetchRow(*row) for row in connection.execute(query.order_by(f.last_at.desc(), f.who))]
+            return records_of(FetchRow, connection.execute(query.order_by(f.last_at.desc(), f.who)))
 
 
 def _record(connection: sa.Connection, row: FetchRow) -> None:

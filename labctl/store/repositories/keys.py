@@ -12,6 +12,7 @@ from labctl.store.connection.transactions import transaction
 from labctl.store.manifests.contents import KEY
 from labctl.store.records import KeyRow
 from labctl.store.repositories.audit import append
+from labctl.store.repositories.records_by_name import record_of, records_of
 from labctl.store.schema import tables
 from labctl.store.sealing.seals import changing, seal
 
@@ -61,10 +62,10 @@ class Keys:
     def all(self) -> list[KeyRow]:
         """Return every key, by name."""
         with self._database.reading() as connection:
-            return [KeyRow(*row) for row in connection.execute(_ALL.order_by(_k.name))]
+            return records_of(KeyRow, connection.execute(_ALL.order_by(_k.name)))
 
     def by_digest(self, digest: str) -> KeyRow | None:
         """Return the key of a digest, in force or not; None when there is none."""
         with self._database.reading() as connection:
-            row = connection.execute(_BY_DIGEST, {"digest": digest}).first()
-        return None if row is None else KeyRow(*row)
+            row = connection.execute(_BY_DIGEST, {"digest": digest}).mappings().first()
+        return None if row is None else record_of(KeyRow, row)

@@ -11,6 +11,7 @@ from sqlalchemy import exc
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.connection.writer_lock import ServiceAddress
+from labctl.store.repositories.records_by_name import record_of
 from labctl.store.schema import tables
 
 
@@ -47,8 +48,8 @@ class Leases:
         x = tables.leases.c
         query = sa.select(*(x[field.name] for field in fields(LeaseRow))).where(x.bench_name == bench_name)
         with self._database.reading() as connection:
-            row = connection.execute(query).first()
-        return None if row is None else LeaseRow(*row)
+            row = connection.execute(query).mappings().first()
+        return None if row is None else record_of(LeaseRow, row)
 
     @transaction
     def claim(self, lease: LeaseRow, replacing: LeaseRow | None) -> bool:

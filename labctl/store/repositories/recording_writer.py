@@ -15,15 +15,16 @@ from typing import Any
 import sqlalchemy as sa
 from sqlalchemy import exc
 
+from labctl.answers.json_object import JsonObject
+from labctl.answers.recordings import RawChannelJson
 from labctl.errors import Conflict
-from labctl.json_types import JsonObject
-from labctl.json_types.recordings import RawChannelJson
 from labctl.recording import RecordingInfo
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.import_parts import MOST_BYTES, MOST_ROWS, TABLES, ImportPart
 from labctl.store.manifests.contents import RECORDING
 from labctl.store.repositories.audit import append
+from labctl.store.repositories.records_by_name import records_of
 from labctl.store.repositories.units import add_missing_unit, remember_unit
 from labctl.store.schema import tables
 from labctl.store.sealing.seals import prepared_recordings, seal
@@ -122,10 +123,10 @@ class Imports:
         """
         r = tables.recordings.c
         with self._database.reading() as connection:
-            query = sa.select(r.id, r.importing).where(r.importing.is_not(None))
+            query = sa.select(r.id.label("recording"), r.importing.label("token")).where(r.importing.is_not(None))
             if connection.dialect.name != "sqlite":
                 query = query.where(r.import_sign_at < sa.func.now() - ABANDONED_AFTER)
-            found = [ImportTicket(*row) for row in connection.execute(query)]
+            found = records_of(ImportTicket, connection.execute(query))
         for ticket in found:
             with suppress(Conflict):
                 self.discard(self.claim(ticket))

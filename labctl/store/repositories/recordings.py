@@ -9,14 +9,13 @@ from contextlib import suppress
 from datetime import datetime
 from itertools import groupby
 from operator import itemgetter
-from typing import Any, cast
 
 import numpy as np
 import sqlalchemy as sa
 from numpy.typing import NDArray
 
+from labctl.answers.json_object import JsonObject
 from labctl.errors import LabctlError, NotFound
-from labctl.json_types import JsonObject
 from labctl.recording import Recording, RecordingInfo, refuse_too_many_data_sets
 from labctl.recording.columns import RATE_TIME_U, READING_TIMES, VERIFICATION
 from labctl.store.connection.database import Database
@@ -24,11 +23,12 @@ from labctl.store.import_parts import WHOLE_TABLE, import_parts
 from labctl.store.paging import Page, PageRequest, rows_to_read
 from labctl.store.records import DataSetRow, MeanRow, RecordingRow
 from labctl.store.repositories.recording_writer import Imports
+from labctl.store.repositories.records_by_name import records_of
 from labctl.store.repositories.sample_blocks import (
-    DataSetHead,
     blocks_of,
     blocks_of_sets,
     channels_of,
+    head_of,
     in_units,
     join_blocks,
     readings_in_units,
@@ -153,20 +153,20 @@ class Recordings:
             sa.select(
                 r.id,
                 r.serial,
-                r.campaign_id,
+                r.campaign_id.label("campaign"),
                 r.gyro,
                 r.kind,
                 r.info,
                 r.created_at,
-                counts.c.datasets,
-                counts.c.readings,
+                _whole_number(counts.c.datasets).label("datasets"),
+                _whole_number(counts.c.readings).label("readings"),
             )
             .outerjoin(counts, counts.c.recording_id == r.id)
             .where(condition, r.importing.is_(None))
             .order_by(r.id.desc())
         )
         with self._database.reading() as connection:
-            return [RecordingRow(*row[:7], int(row[7] or 0), int(row[8] or 0)) for row in connection.execute(query)]
+            return records_of(RecordingRow, connection.execute(query))
 
     def fingerprint(self, recording: int, *, complete: bool = False, head: RecordingRow | None = None) -> str:
         """Return a digest of all that a recording holds now: equal only where every answer about it is.
@@ -238,7 +238,7 @@ class Recordings:
                 .where(d.recording_id == recording, d.state == "complete", _whole(recording))
                 .order_by(d.number)
             )
-            rows = [dict(head) for head in heads.mappings()]
+            rows = list(heads.mappings())
             channels = channels_of(connection, recording)
         is_marked = any(head["verification"] for head in rows)
         is_timed = any("time_u_s" in (head["encoder"] or {}) for head in rows)
@@ -247,7 +247,7 @@ class Recordings:
                 blocks = blocks_of_sets(connection, recording, [int(head["number"]) for head in together])
             for head in together:
                 number = int(head["number"])
-                columns = in_units(blocks.pop(number, []), cast(DataSetHead, head), channels, times=times)
+                columns = in_units(blocks.pop(number, []), head_of(head), channels, times=times)
                 if is_marked and VERIFICATION not in columns:
                     columns[VERIFICATION] = np.zeros(len(columns["dataset"]), dtype=np.int64)
                 if is_timed and "course" not in (head["encoder"] or {}):  # of a constant rate no time matters
@@ -264,14 +264,14 @@ class Recordings:
         )  # fmt: skip
         with self._database.reading() as connection:
             rows = connection.execute(query.where(d.recording_id == recording, _whole(recording)).order_by(d.number))
-            return [DataSetRow(**dict(row)) for row in rows.mappings()]
+            return records_of(DataSetRow, rows)
 
     def means(self, recording: int) -> list[MeanRow]:
         """Return mean and standard deviation of every data set and channel, as far as they are kept as rows."""
         m = tables.data_set_means.c
         query = sa.select(m.number, m.channel, m.mean, m.std).where(m.recording_id == recording, _whole(recording))
         with self._database.reading() as connection:
-            return [MeanRow(*row) for row in connection.execute(query.order_by(m.channel, m.number))]
+            return records_of(MeanRow, connection.execute(query.order_by(m.channel, m.number)))
 
     def dataset(self, recording: int, number: int) -> dict[str, NDArray[np.generic]]:
         """Return the readings of one data set, column by column, in the interchange format's units."""
@@ -282,14 +282,19 @@ class Recordings:
             head = connection.execute(chosen).mappings().first()
             if head is None:
                 raise NotFound(f"recording {recording} has no data set {number}; check its number")
-            return readings_in_units(connection, cast(DataSetHead, dict(head)), channels_of(connection, recording))
+            return readings_in_units(connection, head_of(head), channels_of(connection, recording))
 
 
-def _by_readings(heads: Sequence[dict[str, Any]]) -> Iterator[list[dict[str, Any]]]:
+def _by_readings(heads: Sequence[sa.RowMapping]) -> Iterator[list[sa.RowMapping]]:
     """Yield data sets in groups of about `READ_AT_ONCE` readings, in their order."""
     begins = np.cumsum([head["n"] or 0 for head in heads], dtype=np.int64) // READ_AT_ONCE
     for _, group in groupby(zip(begins.tolist(), heads, strict=True), key=itemgetter(0)):
         yield [head for _, head in group]
+
+
+def _whole_number(count: sa.ColumnElement[int]) -> sa.ColumnElement[int]:
+    """Return a count as a whole number, 0 where there is nothing to count; PostgreSQL sums to a decimal number."""
+    return sa.cast(sa.func.coalesce(count, 0), sa.BigInteger)
 
 
 def _whole(recording: int) -> sa.ColumnElement[bool]:

@@ -11,6 +11,7 @@ from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.manifests.contents import RELEASE_REQUEST
 from labctl.store.repositories.audit import append
+from labctl.store.repositories.records_by_name import records_of
 from labctl.store.schema import tables
 from labctl.store.sealing.seals import seal
 
@@ -70,7 +71,7 @@ class ReleaseRequests:
             ~sa.exists().where(newer.c.serial == r.serial, newer.c.version == r.version, newer.c.id > r.id),
         )  # fmt: skip
         with self._database.reading() as connection:
-            return [ReleaseRequestRow(*row) for row in connection.execute(query.order_by(r.id.desc()))]
+            return records_of(ReleaseRequestRow, connection.execute(query.order_by(r.id.desc())))
 
 
 def newest_act(connection: sa.Connection, serial: str, version: int) -> int:

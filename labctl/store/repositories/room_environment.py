@@ -12,6 +12,7 @@ from labctl.acting_user import acting_key
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.repositories.audit import append
+from labctl.store.repositories.records_by_name import records_of
 from labctl.store.schema import tables
 
 
@@ -65,17 +66,18 @@ class RoomEnvironment:
         query = sa.select(r.measured_at, r.bench_name, r.quantity, r.unit, r.value, r.source)
         query = query.where(self._within(first, last, bench)).order_by(r.measured_at.desc(), r.id.desc()).limit(limit)
         with self._database.reading() as connection:
-            return [RoomReading(*row) for row in connection.execute(query)]
+            return records_of(RoomReading, connection.execute(query))
 
     def spans(self, first: datetime, last: datetime, bench: str) -> list[RoomSpan]:
         """Return least and largest of each quantity between two instants that hold for a bench, by quantity."""
         r = tables.room_environment.c
         query = sa.select(
-            r.quantity, r.unit, sa.func.min(r.value), sa.func.max(r.value), sa.func.count(), sa.func.min(r.measured_at),
-            sa.func.max(r.measured_at),
+            r.quantity, r.unit, sa.func.min(r.value).label("low"), sa.func.max(r.value).label("high"),
+            sa.func.count().label("readings"), sa.func.min(r.measured_at).label("first"),
+            sa.func.max(r.measured_at).label("last"),
         ).where(self._within(first, last, bench)).group_by(r.quantity, r.unit).order_by(r.quantity)  # fmt: skip
         with self._database.reading() as connection:
-            return [RoomSpan(*row) for row in connection.execute(query)]
+            return records_of(RoomSpan, connection.execute(query))
 
     @staticmethod
     def _within(first: datetime, last: datetime, bench: str) -> sa.ColumnElement[bool]:

@@ -10,8 +10,8 @@ import sqlalchemy as sa
 from numpy.typing import NDArray
 from typing_extensions import TypedDict
 
-from labctl.json_types import JsonObject
-from labctl.json_types.recordings import RawChannelJson
+from labctl.answers.json_object import JsonObject
+from labctl.answers.recordings import RawChannelJson
 from labctl.recording.columns import ARRIVAL_S, DEVICE_S, READING_TIMES, TIME_COMMON_U_S, TIME_U_S, VERIFICATION
 from labctl.store import sample_codec
 from labctl.store.import_parts import block_row
@@ -83,6 +83,16 @@ class DataSetHead(TypedDict):
     turn_u_deg: float | None
     encoder: EncoderAngles | None
     verification: bool
+
+
+def head_of(row: sa.RowMapping) -> DataSetHead:
+    """Return a row of the data sets, as far as its readings need it. Raises KeyError for a column that is absent."""
+    return DataSetHead(
+        recording_id=row["recording_id"], number=row["number"], position=row["position"], run=row["run"],
+        mounting=row["mounting"], table_rate_dps=row["table_rate_dps"], table_angle_deg=row["table_angle_deg"],
+        gate_from_s=row["gate_from_s"], power_on_s=row["power_on_s"], turn_deg=row["turn_deg"],
+        turn_u_deg=row["turn_u_deg"], encoder=row["encoder"], verification=row["verification"],
+    )  # fmt: skip
 
 
 def blocks_of(connection: sa.Connection, recording: int, number: int) -> list[dict[str, NDArray[np.generic]]]:

@@ -13,6 +13,7 @@ from labctl.errors import Conflict, NotFound
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.repositories import audit
+from labctl.store.repositories.records_by_name import records_of
 from labctl.store.schema import tables
 
 #: `claimed`: being started by the process that wrote it. The others are final.
@@ -174,12 +175,21 @@ class Starts:
     def _events(self, condition: sa.ColumnElement[bool]) -> list[StartEventRow]:
         e = tables.start_events.c
         query = (
-            sa.select(e.id, e.start_id, e.at, e.due_at, e.outcome, e.message, e.campaign_id, e.after_campaign)
+            sa.select(
+                e.id,
+                e.start_id.label("start"),
+                e.at,
+                e.due_at,
+                e.outcome,
+                e.message,
+                e.campaign_id.label("campaign"),
+                e.after_campaign,
+            )
             .where(condition)
             .order_by(e.id)
         )
         with self._database.reading() as connection:
-            return [StartEventRow(*row) for row in connection.execute(query)]
+            return records_of(StartEventRow, connection.execute(query))
 
     @transaction
     def cancel(self, start: int, at: datetime) -> None:

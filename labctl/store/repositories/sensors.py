@@ -12,9 +12,9 @@ import sqlalchemy as sa
 from sqlalchemy import exc
 
 from labctl.acting_user import acting_key
+from labctl.answers.json_object import JsonDocument
 from labctl.canonical_json import canonical
 from labctl.errors import NotFound, StoreError, VersionTaken
-from labctl.json_types import JsonDocument
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.manifests.contents import SENSOR_VERSION

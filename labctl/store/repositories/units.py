@@ -14,6 +14,7 @@ from labctl.errors import NotFound
 from labctl.store.connection.database import Database
 from labctl.store.paging import Page, PageRequest, parts_of, rows_to_read
 from labctl.store.records import CertificationRow, ServedCalibration, Unit, UnitHoldings, Withdrawal
+from labctl.store.repositories.records_by_name import record_of, records_of
 from labctl.store.schema import tables
 
 
@@ -65,10 +66,11 @@ class Units:
     def get(self, serial: str) -> Unit:
         """Return a unit; raises NotFound, which says how a unit is added."""
         with self._database.reading() as connection:
-            row = connection.execute(sa.select(tables.units).where(tables.units.c.serial == serial, SEEN)).first()
+            wanted = sa.select(tables.units).where(tables.units.c.serial == serial, SEEN)
+            row = connection.execute(wanted).mappings().first()
         if row is None:
             raise NotFound(f"unit {serial!r} is not in this database; `labctl import DIR` or a campaign adds it")
-        return Unit(*row)
+        return record_of(Unit, row)
 
     def has(self, serial: str) -> bool:
         """Return whether a unit is there."""
@@ -99,7 +101,7 @@ class Units:
         """Return every unit, by serial number."""
         with self._database.reading() as connection:
             rows = connection.execute(sa.select(tables.units).where(SEEN).order_by(tables.units.c.serial))
-            return [Unit(*row) for row in rows]
+            return records_of(Unit, rows)
 
     def page(self, request: PageRequest[str]) -> Page[Unit, str]:
         """Return units by serial number; searched are serial number, model and technology."""
@@ -110,7 +112,7 @@ class Units:
             query = query.where(c.serial > request.after)
         with self._database.reading() as connection:
             total = connection.scalar(sa.select(sa.func.count()).select_from(tables.units).where(matching)) or 0
-            units = [Unit(*row) for row in connection.execute(query)]
+            units = records_of(Unit, connection.execute(query))
         return Page.of(units, lambda unit: unit.serial, request, total)
 
     def holdings(self, serials: Sequence[str]) -> dict[str, UnitHoldings]:

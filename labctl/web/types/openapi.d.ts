@@ -2705,7 +2705,7 @@ export interface components {
              */
             why: string;
             /** @description null: every body axis has an output. */
-            cross_rates: components["schemas"]["CrossRates"] | null;
+            cross_rates: components["schemas"]["CrossRatesJson"] | null;
         };
         /**
          * AppliedDraft
@@ -3542,23 +3542,79 @@ export interface components {
             modified_ms?: number | null;
         };
         /**
-         * BudgetLineResponse
+         * BudgetJson
+         * @description A result with its lines (GUM).
+         */
+        BudgetJson: {
+            /**
+             * Result
+             * @description Quantity of the budget: corrected_rate, bias, scale_factor, misalignment with an axis, delay or time_constant.
+             */
+            result: string;
+            /**
+             * Unit
+             * @description Unit of the result and of every contribution; 1: a ratio to the rate.
+             */
+            unit: string;
+            /**
+             * Value
+             * @description Value of a coefficient, in `unit`; null: the budget is that of a corrected rate.
+             */
+            value: number | null;
+            /**
+             * Lines
+             * @description The sources of uncertainty.
+             */
+            lines: components["schemas"]["BudgetLineJson"][];
+            /**
+             * Combined
+             * @description Combined standard uncertainty, in `unit`; null: a line of type A is unknown.
+             */
+            combined: number | null;
+            /**
+             * Effective Degrees Of Freedom
+             * @description By Welch-Satterthwaite; null: infinite, or unknown.
+             */
+            effective_degrees_of_freedom: number | null;
+            /**
+             * K
+             * @description Coverage factor for a probability of 95.45 %; null: unknown.
+             */
+            k: number | null;
+            /**
+             * Expanded
+             * @description Expanded uncertainty, k times `combined`, widened for known errors that are not corrected, in `unit`; null: unknown.
+             */
+            expanded: number | null;
+            /**
+             * Not Stated
+             * @description Sources that nothing states and that are not in the result.
+             */
+            not_stated: string[];
+            /**
+             * Overdue
+             * @description Whether a standard was past its due date when it was used.
+             */
+            overdue: boolean;
+        };
+        /**
+         * BudgetLineJson
          * @description One source of uncertainty; null is unknown, never 0.
          */
-        BudgetLineResponse: {
+        BudgetLineJson: {
             /**
              * Source
-             * @description Source of the uncertainty: `coefficients` of the fit, `model` (its form), `repeatability`, or the quantity that a reference standard realises, such as `clock`; `table_time` and `table_time_common`: time of a reference rate that changes.
+             * @description coefficients, model, repeatability, or the quantity of a reference standard.
              */
             source: string;
             /**
              * Name
-             * @description Name of the reference standard, with the number of its certificate.
+             * @description Name of the standard with its certificate, or of the data evaluated.
              */
             name: string;
             /**
              * Type
-             * @description Evaluated by statistics (A) or otherwise (B).
+             * @description Evaluated by statistics (A) or otherwise (B), GUM 2.3.2 and 2.3.3.
              * @enum {string}
              */
             type: "A" | "B";
@@ -3574,22 +3630,22 @@ export interface components {
             u: number | null;
             /**
              * Unit
-             * @description Unit of the input.
+             * @description Unit of `u`.
              */
             unit: string;
             /**
              * Sensitivity
-             * @description Derivative of the result along the input, per `unit`.
+             * @description Derivative of the result along the input, per `unit`; null: unknown.
              */
             sensitivity: number | null;
             /**
              * Contribution
-             * @description Magnitude of sensitivity times u, in the unit of the result.
+             * @description Magnitude of sensitivity times u, in the unit of the result; null: unknown.
              */
             contribution: number | null;
             /**
              * Degrees Of Freedom
-             * @description null: infinite.
+             * @description Degrees of freedom of `u`; null: infinite.
              */
             degrees_of_freedom: number | null;
             /**
@@ -3622,62 +3678,6 @@ export interface components {
              * @description Why a number is null or 0, or how it was evaluated.
              */
             why: string;
-        };
-        /**
-         * BudgetResponse
-         * @description A result with its lines (GUM).
-         */
-        BudgetResponse: {
-            /**
-             * Result
-             * @description Quantity of the budget: corrected_rate, bias, scale_factor, misalignment with an axis, delay or time_constant.
-             */
-            result: string;
-            /**
-             * Unit
-             * @description Unit of the result and of every contribution; 1: a ratio to the rate.
-             */
-            unit: string;
-            /**
-             * Value
-             * @description Of a coefficient.
-             */
-            value: number | null;
-            /**
-             * Lines
-             * @description Each source of uncertainty.
-             */
-            lines: components["schemas"]["BudgetLineResponse"][];
-            /**
-             * Combined
-             * @description Combined standard uncertainty; null: a line of type A is unknown.
-             */
-            combined: number | null;
-            /**
-             * Effective Degrees Of Freedom
-             * @description Welch-Satterthwaite; null: infinite.
-             */
-            effective_degrees_of_freedom: number | null;
-            /**
-             * K
-             * @description Coverage factor for a probability of 95.45 %.
-             */
-            k: number | null;
-            /**
-             * Expanded
-             * @description Expanded uncertainty: k times `combined`, widened so that it covers with the same probability where known errors are not corrected.
-             */
-            expanded: number | null;
-            /**
-             * Not Stated
-             * @description Standards that are not stated and therefore not in the result.
-             */
-            not_stated: string[];
-            /**
-             * Overdue
-             * @description Whether a standard was past its due date when it was used.
-             */
-            overdue: boolean;
         };
         /**
          * CalibrationRow
@@ -5378,7 +5378,7 @@ export interface components {
              * Left Out
              * @description Effects of the fit that are not exported with the calibration.
              */
-            left_out: components["schemas"]["labctl__json_types__models__LeftOut"][];
+            left_out: components["schemas"]["LeftOutEffect"][];
             /**
              * Least Turn Rate Dps
              * @description The error per turn is computed where the magnitude of the rate is at least this, deg/s.
@@ -5437,25 +5437,25 @@ export interface components {
             reason?: string;
         };
         /**
-         * ContributionLines
-         * @description Contributions along one variable, deg/s.
+         * ContributionLinesJson
+         * @description Contributions along one variable.
          */
-        ContributionLines: {
+        ContributionLinesJson: {
             /**
              * At
-             * @description Rates, deg/s, or temperatures, deg C, at which the budget was computed.
+             * @description Points of the variable: rate, deg/s, or temperature, deg C.
              */
             at: number[];
             /**
              * Contributions
-             * @description For each source: its contribution, deg/s; null: not stated.
+             * @description Source -> contribution at each point, deg/s; null: not stated or unknown.
              */
             contributions: {
                 [key: string]: (number | null)[];
             };
             /**
              * Combined
-             * @description Combined standard uncertainty at each point, deg/s; null: a line of type A is unknown.
+             * @description Combined standard uncertainty at each point, deg/s; null: unknown.
              */
             combined: (number | null)[];
             /**
@@ -5465,24 +5465,24 @@ export interface components {
             expanded: (number | null)[];
         };
         /**
-         * ContributionsOver
-         * @description Contributions to the uncertainty of one axis, over rate and over temperature.
+         * ContributionsOverJson
+         * @description Contributions to the uncertainty of one axis.
          */
-        ContributionsOver: {
+        ContributionsOverJson: {
             /**
              * Temperature C
-             * @description Temperature at which `over_rate` was computed, deg C.
+             * @description Temperature of `over_rate`, deg C.
              */
             temperature_c: number;
             /**
              * Rate Dps
-             * @description Rate at which `over_temperature` was computed, deg/s.
+             * @description Rate of `over_temperature`, deg/s.
              */
             rate_dps: number;
-            /** @description Contributions over the rate, at `temperature_c`. */
-            over_rate: components["schemas"]["ContributionLines"];
-            /** @description Contributions over the temperature, at `rate_dps`. */
-            over_temperature: components["schemas"]["ContributionLines"];
+            /** @description Contributions over the rate. */
+            over_rate: components["schemas"]["ContributionLinesJson"];
+            /** @description Contributions over the temperature. */
+            over_temperature: components["schemas"]["ContributionLinesJson"];
         };
         /**
          * CourseJson
@@ -5737,10 +5737,10 @@ export interface components {
             views: components["schemas"]["Views"];
         };
         /**
-         * CrossRates
-         * @description What rates about axes without an output add to a corrected rate: nothing can correct it.
+         * CrossRatesJson
+         * @description What rates about axes without an output add to a corrected rate.
          */
-        CrossRates: {
+        CrossRatesJson: {
             /**
              * About
              * @description Body axes without an output.
@@ -5748,7 +5748,7 @@ export interface components {
             about: string[];
             /**
              * Per Dps
-             * @description Error of the corrected rate per deg/s about these axes, in the worst direction, with the coverage of U; null: unknown.
+             * @description Error per deg/s about these axes, in the worst direction, with the coverage of U, 1; null: see `why`.
              */
             per_dps: number | null;
             /**
@@ -7489,7 +7489,7 @@ export interface components {
              * Left Out
              * @description Readings that were left out by choice, with how many and why.
              */
-            left_out: components["schemas"]["labctl__recording__info__LeftOut"][];
+            left_out: components["schemas"]["LeftOut"][];
             /**
              * New Unit
              * @description Whether this is the first recording of its unit.
@@ -7627,7 +7627,7 @@ export interface components {
              * Left Out
              * @description Effects in the fitted model that the exported calibration leaves out.
              */
-            left_out: components["schemas"]["labctl__json_types__models__LeftOut"][];
+            left_out: components["schemas"]["LeftOutEffect"][];
             /** @description Of a thermal lag that was added at rest and is not certain: what it leaves of stretches left out, and why it is not certain; else null. */
             thermal_hint: components["schemas"]["ThermalHintJson"] | null;
             /**
@@ -7729,7 +7729,7 @@ export interface components {
              * Left Out
              * @description Effects in the fitted model that an export leaves out, each with the RMS of its contribution to the rate, deg/s.
              */
-            left_out: components["schemas"]["labctl__json_types__models__LeftOut"][];
+            left_out: components["schemas"]["LeftOutEffect"][];
             /** @description Of a thermal lag that was added at rest and is not certain: what it leaves of stretches left out, and why it is not certain; else null. */
             thermal_hint: components["schemas"]["ThermalHintJson"] | null;
             /**
@@ -7827,7 +7827,7 @@ export interface components {
              * Left Out
              * @description Readings that were left out by choice when it was imported.
              */
-            left_out: components["schemas"]["labctl__recording__info__LeftOut"][];
+            left_out: components["schemas"]["LeftOut"][];
             /**
              * Courses
              * @description Each channel in bins: least and largest reading; all readings are in them.
@@ -8186,6 +8186,65 @@ export interface components {
              * @description Latest such time by the 95 % interval of the line; null: not within 50 years, or not known.
              */
             latest: string | null;
+        };
+        /**
+         * LeftOut
+         * @description Readings that were left out by choice when a recording was imported: they are marked with valid = 0.
+         */
+        LeftOut: {
+            /**
+             * What
+             * @description Kind of the finding, as a fixed word for programs, such as spikes.
+             */
+            what: string;
+            /**
+             * Channel
+             * @description Column whose readings were left out; empty: the whole rows.
+             * @default
+             */
+            channel?: string;
+            /**
+             * N
+             * @description Number of readings that were left out.
+             */
+            n: number;
+            /**
+             * Of
+             * @description Number of readings of the recording.
+             */
+            of: number;
+            /**
+             * Why
+             * @description What was found, in words.
+             */
+            why: string;
+        };
+        /**
+         * LeftOutEffect
+         * @description An effect of a fit that no correction by output and temperature contains.
+         */
+        LeftOutEffect: {
+            /**
+             * Effect
+             * @description Id of the effect.
+             */
+            effect: string;
+            /**
+             * Origin
+             * @description What the effect belongs to.
+             * @enum {string}
+             */
+            origin: "sensor" | "package" | "fixture" | "bench" | "environment";
+            /**
+             * Term
+             * @description Standard term of the effect (IEEE Std 528).
+             */
+            term: string;
+            /**
+             * Rms Dps
+             * @description RMS of what it adds to the data sets of the fit, deg/s; null or absent: unknown.
+             */
+            rms_dps?: number | null;
         };
         /**
          * LegError
@@ -9650,7 +9709,7 @@ export interface components {
             text: string;
             /**
              * Do
-             * @description What to do instead of certifying this version.
+             * @description What to do instead of certifying the version.
              */
             do: string;
         };
@@ -10298,7 +10357,7 @@ export interface components {
              * Left Out
              * @description Effects in the fitted model that the exported calibration leaves out.
              */
-            left_out: components["schemas"]["labctl__json_types__models__LeftOut"][];
+            left_out: components["schemas"]["LeftOutEffect"][];
             /** @description Of a thermal lag that was added at rest and is not certain: what it leaves of stretches left out, and why it is not certain; else null. */
             thermal_hint: components["schemas"]["ThermalHintJson"] | null;
             /** @description Residuals of the changed model, by data set. */
@@ -11930,7 +11989,7 @@ export interface components {
              * Left Out
              * @description Readings that were left out by choice, with how many and why.
              */
-            left_out: components["schemas"]["labctl__recording__info__LeftOut"][];
+            left_out: components["schemas"]["LeftOut"][];
             /**
              * New Unit
              * @description Whether this is the first recording of its unit.
@@ -12625,7 +12684,7 @@ export interface components {
              * Left Out
              * @description Effects in the fitted model that the exported calibration leaves out.
              */
-            left_out: components["schemas"]["labctl__json_types__models__LeftOut"][];
+            left_out: components["schemas"]["LeftOutEffect"][];
             /**
              * Axes
              * @description For each axis: the error over rate and temperature.
@@ -13252,7 +13311,7 @@ export interface components {
              * @description For each axis: the lines of the budget over rate and over temperature.
              */
             contributions: {
-                [key: string]: components["schemas"]["ContributionsOver"];
+                [key: string]: components["schemas"]["ContributionsOverJson"];
             };
         };
         /**
@@ -13307,7 +13366,7 @@ export interface components {
              * @description For each axis: the budget of the corrected rate, deg/s.
              */
             budget: {
-                [key: string]: components["schemas"]["BudgetResponse"];
+                [key: string]: components["schemas"]["BudgetJson"];
             };
             /**
              * Coefficients
@@ -13315,7 +13374,7 @@ export interface components {
              */
             coefficients: {
                 [key: string]: {
-                    [key: string]: components["schemas"]["BudgetResponse"];
+                    [key: string]: components["schemas"]["BudgetJson"];
                 };
             };
             /** @description null where one rate was given: about one axis after the other, the others at rest. */
@@ -13704,7 +13763,7 @@ export interface components {
              * Left Out
              * @description Effects in the fitted model that an export leaves out, each with the RMS of its contribution to the rate, deg/s.
              */
-            left_out: components["schemas"]["labctl__json_types__models__LeftOut"][];
+            left_out: components["schemas"]["LeftOutEffect"][];
             /**
              * Remembers
              * @description Temperature states (thermal lag or hysteresis) that must be updated with the temperature of every sample.
@@ -13913,65 +13972,6 @@ export interface components {
              * @description Residual divided by its noise floor, with the sign of the residual.
              */
             over_floor: number;
-        };
-        /**
-         * LeftOut
-         * @description An effect of a fit that no correction by output and temperature contains.
-         */
-        labctl__json_types__models__LeftOut: {
-            /**
-             * Effect
-             * @description Id of the effect.
-             */
-            effect: string;
-            /**
-             * Origin
-             * @description What the effect belongs to.
-             * @enum {string}
-             */
-            origin: "sensor" | "package" | "fixture" | "bench" | "environment";
-            /**
-             * Term
-             * @description Standard term of the effect (IEEE Std 528).
-             */
-            term: string;
-            /**
-             * Rms Dps
-             * @description RMS of what it adds to the data sets of the fit, deg/s; null or absent: unknown.
-             */
-            rms_dps?: number | null;
-        };
-        /**
-         * LeftOut
-         * @description Readings that were left out by choice when a recording was imported: they are marked with valid = 0.
-         */
-        labctl__recording__info__LeftOut: {
-            /**
-             * What
-             * @description Kind of the finding, as a fixed word for programs, such as spikes.
-             */
-            what: string;
-            /**
-             * Channel
-             * @description Column whose readings were left out; empty: the whole rows.
-             * @default
-             */
-            channel?: string;
-            /**
-             * N
-             * @description Number of readings that were left out.
-             */
-            n: number;
-            /**
-             * Of
-             * @description Number of readings of the recording.
-             */
-            of: number;
-            /**
-             * Why
-             * @description What was found, in words.
-             */
-            why: string;
         };
     };
     responses: never;

@@ -12,13 +12,13 @@ from fastapi.testclient import TestClient
 
 from instruments.clock import SystemClock
 from labctl import web
+from labctl.answers.admin import KeyRequest, Role
 from labctl.api import create_app
 from labctl.api.access_policy import ASKING, AccessPolicy
 from labctl.errors import BadInput, Conflict, NotFound
 from labctl.processes.settings import LOOPBACK_NAMES
 from labctl.services.admin.api_keys import create_key, digest_of, require_an_api_key, revoke_key
 from labctl.services.lab_service import LabService
-from labctl.services.schemas.admin import KeyRequest, Role
 from labctl.store import Store, open_store
 from labctl.store.connection.database import Database
 

@@ -13,12 +13,12 @@ from starlette.exceptions import HTTPException
 from starlette.types import Message, Receive, Scope, Send
 
 from instruments.clock import WallClock
+from labctl.answers.admin import KeyRequest, Role
 from labctl.api.access_policy import UPLOAD, AccessPolicy
 from labctl.api.connection_limits import RESERVED
 from labctl.api.middleware import MOST_UPLOADS, AccessMiddleware
 from labctl.services.admin.api_keys import create_key
 from labctl.services.lab_service import LabService
-from labctl.services.schemas.admin import KeyRequest, Role
 from labctl.store import open_store
 
 Loop = Callable[[Coroutine[Any, Any, Any]], Any]

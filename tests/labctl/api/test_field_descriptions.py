@@ -13,13 +13,12 @@ import pytest
 from pydantic import BaseModel
 from typing_extensions import is_typeddict
 
-import labctl.json_types
-import labctl.services.schemas
+import labctl.answers
 from instruments.laboratory import Contact, Laboratory
+from labctl.answers.certificates import Customer
+from labctl.answers.recording_head import LeftOut, OutputUnit
 from labctl.api import create_app
 from labctl.api.descriptions import typed_dictionaries
-from labctl.certificates.document import Customer
-from labctl.recording.info import LeftOut, OutputUnit
 
 #: Models of other packages that requests and responses contain.
 ELSEWHERE: tuple[type[BaseModel], ...] = (Contact, Customer, Laboratory, LeftOut, OutputUnit)
@@ -40,7 +39,7 @@ def modules(package: str, path: Iterable[str]) -> Iterator[str]:
 def models() -> list[type[BaseModel]]:
     """Return the models of requests and responses, each once."""
     found = dict.fromkeys(ELSEWHERE)
-    for name in modules("labctl.services.schemas", labctl.services.schemas.__path__):
+    for name in modules("labctl.answers", labctl.answers.__path__):
         for value in vars(importlib.import_module(name)).values():
             if isinstance(value, type) and issubclass(value, BaseModel) and value.__module__ == name:
                 found[value] = None
@@ -51,9 +50,9 @@ def typed_dicts() -> list[type]:
     """Return the typed dictionaries of results, each once."""
     found = dict.fromkeys(
         kind
-        for name in modules("labctl.json_types", labctl.json_types.__path__)
+        for name in modules("labctl.answers", labctl.answers.__path__)
         for kind in vars(importlib.import_module(name)).values()
-        if is_typeddict(kind)
+        if is_typeddict(kind) and kind.__module__ == name
     )
     return list(found)
 
@@ -106,4 +105,4 @@ def test_fields_of_typed_dictionaries_are_described_by_their_docstrings() -> Non
     assert described["Suspect", "effect"]["description"] == "Id of the effect."
     assert described["FailingRange", "from"]["description"].endswith("in the unit of the channel.")  # a keyword
     assert described["CataloguedEffect", "id"]["description"].startswith("Id by which")  # inherited
-    assert described["labctl__json_types__models__LeftOut", "effect"]["description"] == "Id of the effect."  # two names
+    assert described["LeftOutEffect", "effect"]["description"] == "Id of the effect."

@@ -12,11 +12,11 @@ from unittest.mock import patch
 
 import pytest
 
+from labctl.answers.admin import KeyRequest, Role
 from labctl.errors import NotIdentified
 from labctl.services.admin import key_memory
 from labctl.services.admin.api_keys import create_key, revoke_key
 from labctl.services.admin.key_memory import KeyMemory
-from labctl.services.schemas.admin import KeyRequest, Role
 from labctl.store import Store, open_store
 
 NOW = datetime(2026, 1, 5, tzinfo=UTC)

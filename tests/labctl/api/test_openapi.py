@@ -11,14 +11,14 @@ import schemathesis
 from hypothesis import HealthCheck, settings
 
 from instruments.clock import VirtualClock
+from labctl.answers.calibrations import FitRequest
+from labctl.answers.certification import CertifyRequest
 from labctl.api import create_app
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.commands.registry import CERTIFY, FIT, IMPORT_RECORDING
 from labctl.services.commands.requests import RecordingFolder, ToUnit, ToVersion
 from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.calibrations import FitRequest
-from labctl.services.schemas.certification import CertifyRequest
 from labctl.store import Store
 from labctl.store.connection.database import Database
 from tests.helpers.certifying import REASON

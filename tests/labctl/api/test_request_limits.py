@@ -14,6 +14,7 @@ from fastapi.testclient import TestClient
 from starlette.websockets import WebSocketDisconnect
 
 from instruments.clock import SystemClock, VirtualClock
+from labctl.answers.calibrations import FitRequest
 from labctl.api import create_app
 from labctl.api.access_policy import AccessPolicy
 from labctl.services.campaigns.bench_runner import BenchRunner
@@ -21,7 +22,6 @@ from labctl.services.commands.registry import FIT, IMPORT_RECORDING
 from labctl.services.commands.requests import RecordingFolder, ToUnit
 from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.calibrations import FitRequest
 from labctl.store import Store
 from labctl.store.connection.database import Database
 from tests.helpers.paths import EXAMPLES, RECIPES

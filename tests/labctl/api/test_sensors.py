@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
+from labctl.answers.accelerometer import AccelerometerResponse
+from labctl.answers.magnetometer import MagnetometerResponse
 from labctl.services.accelerometer import Source, accelerometer_of_files
 from labctl.services.magnetometer import Source as FieldSource
 from labctl.services.magnetometer import magnetometer_of_file
-from labctl.services.schemas.reports.accelerometer import AccelerometerResponse
-from labctl.services.schemas.reports.magnetometer import MagnetometerResponse
 from labctl.services.sensor_exports import export_of
 from labctl.services.sensor_versions import measured_data
 from tests.helpers.magnetic_turns import fields, readings_of

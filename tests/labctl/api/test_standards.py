@@ -9,8 +9,8 @@ import pytest
 from fastapi.testclient import TestClient
 from prometheus_client.parser import text_string_to_metric_families
 
+from labctl.answers.validity import CheckGyroRequest
 from labctl.services.check_gyros import set_check_gyro
-from labctl.services.schemas.validity import CheckGyroRequest
 from tests.helpers import register
 from tests.helpers.register import COUNTER, noon, thermometer
 from tests.helpers.service import service_of

@@ -9,11 +9,11 @@ from typing import Any
 import pytest
 
 from labctl.acting_user import Actor, acting
+from labctl.answers.campaigns import ResumeRequest, StartRequest
 from labctl.errors import Stopped
 from labctl.services.campaigns import preparation, resume
 from labctl.services.campaigns.execution import run_here
 from labctl.services.campaigns.resume import resume_here
-from labctl.services.schemas.campaigns import ResumeRequest, StartRequest
 from labctl.store import open_store
 from procedures.contracts.operator import HumanOperator, Prompt
 

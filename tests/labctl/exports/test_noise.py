@@ -7,9 +7,9 @@ import json
 import numpy as np
 import pytest
 
+from labctl.answers.noise import AllanJson, NoiseFigure
 from labctl.calibration import Calibration
 from labctl.errors import BadInput
-from labctl.json_types.noise import AllanJson, NoiseFigure
 from labctl.services.calibrations.served import noise_options
 from tests.helpers.exported import exported, stated
 

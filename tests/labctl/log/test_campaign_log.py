@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from instruments.clock import VirtualClock
+from labctl.answers.campaigns import CampaignResponse, ResumeRequest, StartRequest
 from labctl.errors import StoreError
 from labctl.log.campaign_journal import LoggedJournal
 from labctl.log.setup import running_log
@@ -18,7 +19,6 @@ from labctl.services.campaigns.execution import run, run_here
 from labctl.services.campaigns.preparation import prepare
 from labctl.services.campaigns.resume import resume_here
 from labctl.services.planning.loading import limits_of, load_bench, load_recipe
-from labctl.services.schemas.campaigns import CampaignResponse, ResumeRequest, StartRequest
 from labctl.store import StoreJournal, open_store
 from procedures.contracts.control import Control
 from procedures.contracts.steps import StepResult

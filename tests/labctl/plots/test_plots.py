@@ -11,38 +11,42 @@ from typing import Any
 
 import pytest
 
+from labctl.answers.criticism import CriticismResponse, ResidualMap
+from labctl.answers.ladder import LadderResponse
 from labctl.fitting.data.static_record import static_record
 from labctl.plots import Picture, pictures_of, report_html
 from labctl.plots.noise import ladder
 from labctl.plots.residual_maps import maps
 from labctl.recording import write_recording
 from labctl.services.criticism.report_text import answer_of
-from tests.helpers.criticism import held, views
+from tests.helpers.criticism import bare_criticism, held, views
 from tests.helpers.lab import Lab
 from tests.helpers.recordings import cycled
 from tests.helpers.simulated_recordings import single_axis, three_axes
 from tests.helpers.static_recordings import with_record_at_rest
 
-LADDER = {
-    "serial": "S",
-    "noise_floor_dps": 0.002,
-    "steps": [
-        {"version": 1, "model": "bias_scale", "effects": ["bias"], "rms_dps": 0.05, "heldout_rms_dps": 0.06},
-        {"version": 2, "model": "bias_scale+", "effects": ["bias", "x"], "rms_dps": 0.004, "heldout_rms_dps": None},
-    ],
-}
-CELLS = ("dataset", "rate_level_dps", "temperature_level_c", "over_floor")
+STEP = {"parent": None, "recording": 7, "raw_rms_dps": None, "noise_floor_dps": None}
+LADDER = LadderResponse.model_validate(
+    {
+        "serial": "S",
+        "noise_floor_dps": 0.002,
+        "steps": [
+            STEP | {"version": 1, "model": "bias_scale", "effects": ["bias"], "rms_dps": 0.05, "heldout_rms_dps": 0.06},
+            STEP | {"version": 2, "model": "more", "effects": ["bias", "x"], "rms_dps": 0.004, "heldout_rms_dps": None},
+        ],
+    }
+)
 #: Attributes with which a page reaches out.
 REACHING = {"src", "href", "srcset", "action", "data", "poster", "ping", "background", "manifest", "formaction"}
 
 
 @lru_cache(maxsize=1)
-def answer() -> dict[str, Any]:
+def answer() -> CriticismResponse:
     found = held(single_axis(1, scale_factor_asymmetry=4e-4), full=True)
-    shown = answer_of("FOG-0001", 3, [7], found, []).model_dump(mode="json")
+    shown = answer_of("FOG-0001", 3, [7], found, [])
     static = static_record(with_record_at_rest(30, 2e-3))
     assert static is not None
-    return {**shown, "noise": {**shown["noise"], "static": static.to_json()}}
+    return shown.model_copy(update={"noise": {**shown.noise, "static": static.to_json()}})
 
 
 def named(pictures: list[Picture]) -> dict[str, Picture]:
@@ -71,13 +75,13 @@ def test_every_picture_has_a_title_a_caption_and_something_drawn() -> None:
         assert len(picture.caption) > 80
         assert len(picture.figure.data) > 0
     assert "scale_factor_asymmetry" in found["channels"].effects
-    assert found["angle"].effects == tuple(answer()["views"]["draws"]["angle"])
+    assert found["angle"].effects == tuple(answer().views["draws"]["angle"])
 
 
 def test_the_map_has_each_data_set_where_it_was_measured_and_dims_what_means_nothing() -> None:
     figure = named(pictures_of(answer()))["map"].figure
     cells, dimmed = figure.data
-    source = answer()["maps"][0]
+    source = answer().maps[0]
     rates, warm = [float(x) for x in cells.x], [float(y) for y in cells.y]
     assert (len(rates), len(warm)) == (11, 11)
     for k in (0, 37, 120):
@@ -93,7 +97,7 @@ def test_all_maps_share_one_scale() -> None:
     criticism = held(three_axes(4), "yang2018", full=True)
     from labctl.fitting.criticism import residual_maps
 
-    shown = maps({"maps": residual_maps(criticism.data, criticism.residuals)})
+    shown = maps(bare_criticism(maps=residual_maps(criticism.data, criticism.residuals)))
     assert shown is not None
     heat = [t for t in shown.data if t.showscale is None]
     assert len(heat) == 9
@@ -103,26 +107,28 @@ def test_all_maps_share_one_scale() -> None:
 
 def test_lines_and_bands_are_those_of_the_views() -> None:
     found = named(pictures_of(answer()))
-    line = next(line for line in answer()["views"]["channels"] if line["channel"] == "table_rate_dps")
+    line = next(line for line in answer().views["channels"] if line["channel"] == "table_rate_dps")
     figure = found["channels"].figure
     drawn = [t for t in figure.data if t.name == "z" and list(t.x) == line["at"]]
     assert [list(t.y) for t in drawn] == [line["mean_dps"]]
     band = next(t for t in figure.data if t.fill == "toself" and list(t.x[: len(line["at"])]) == line["at"])
     assert list(band.y) == [*line["high_dps"], *reversed(line["low_dps"])]
-    angle = answer()["views"]["angle"][0]
+    angle = answer().views["angle"][0]
     assert list(trace(found["angle"], "z").y) == angle["over_white"]
-    noise = answer()["noise"]["static"]["axes"]["z"]
+    static = answer().noise["static"]
+    assert static is not None
+    noise = static["axes"]["z"]
     points = trace(found["allan"], "z")
     assert list(points.y) == noise["deviation_dps"]
     assert [points.y[k] + points.error_y.array[k] for k in range(3)] == pytest.approx(noise["high_dps"][:3])
 
 
 def test_legs_and_repeats_are_drawn_where_there_are_any() -> None:
-    shown = {"views": views(cycled(0.01), None, ("bias", "scale_factor"))}
+    shown = bare_criticism(views=views(cycled(0.01), None, ("bias", "scale_factor")))
     found = named(pictures_of(shown))
-    hysteresis_lines = shown["views"]["legs"][0]
+    hysteresis_lines = shown.views["legs"][0]
     assert list(trace(found["legs"], "z").y) == hysteresis_lines["mean_dps"]
-    assert list(trace(found["repeats"], "z").y) == shown["views"]["repeats"][0]["difference_dps"]
+    assert list(trace(found["repeats"], "z").y) == shown.views["repeats"][0]["difference_dps"]
     assert "thermal_hysteresis" in found["legs"].effects
 
 
@@ -177,17 +183,19 @@ def test_the_report_is_one_page_that_needs_no_network() -> None:
 def test_the_verdict_stands_before_the_pictures() -> None:
     page = Page(report_html(answer(), LADDER))
     assert page.order.index("verdict") < page.order.index("table") < page.order.index("numbers-map")
-    assert answer()["text"][0] in report_html(answer())
+    assert answer().text[0] in report_html(answer())
 
 
 def test_the_same_criticism_is_the_same_page() -> None:
     assert report_html(answer(), LADDER) == report_html(answer(), LADDER)
 
 
-def bare(**more: Any) -> dict[str, Any]:
+def a_map(numbers: list[int], rates_dps: list[float], warm_c: list[float], scores: list[float]) -> ResidualMap:
+    """Return a map of data sets that were measured at their levels."""
     return {
-        "serial": "S</script>", "version": 1, "recording": 1, "text": ["Too little <data>."], "error": {},
-        "noise": {}, "suspects": [], "experiments": [], "not_testable": [], **more,
+        "axis": "z", "position": "z", "dataset": numbers, "table_rate_dps": rates_dps, "temperature_c": warm_c,
+        "over_floor": scores, "rate_level_dps": rates_dps, "temperature_level_c": warm_c, "level_width_c": 0.0,
+        "residual_dps": scores,
     }  # fmt: skip
 
 
@@ -195,29 +203,27 @@ def bare(**more: Any) -> dict[str, Any]:
     "more",
     [
         {},
-        {"views": {}, "maps": [], "noise": {"static": None}},
+        {"views": {}, "maps": []},
         {"views": {"sets": {}, "channels": [], "time": [], "angle": [], "draws": {}}},
-        {"maps": [{"axis": "z", "position": "z", **{key: [] for key in CELLS}}]},
+        {"maps": [a_map([], [], [], [])]},
     ],
 )  # fmt: skip
 def test_an_empty_criticism_has_no_pictures_and_a_page_all_the_same(more: dict[str, Any]) -> None:
-    assert pictures_of(bare(**more), {"steps": [], "noise_floor_dps": None}) == []
-    text = report_html(bare(**more))
+    assert pictures_of(bare_criticism(**more), LADDER.model_copy(update={"steps": [], "noise_floor_dps": None})) == []
+    text = report_html(bare_criticism(**more))
     assert "Too little &lt;data&gt;." in text
     assert "</script>" not in text
 
 
 def test_a_map_of_one_data_set_is_drawn() -> None:
-    values = dict(zip(CELLS, ([1], [0.0], [25.0], [-3.0]), strict=True))
-    one = {"axis": "z", "position": "z", "level_width_c": 0.0, **values}
-    shown = maps({"maps": [one]})
+    shown = maps(bare_criticism(maps=[a_map([1], [0.0], [25.0], [-3.0])]))
     assert shown is not None
     assert list(shown.data[0].z[0]) == [-3.0]
 
 
 def test_what_is_in_the_numbers_cannot_end_the_script() -> None:
-    steps = {**LADDER, "steps": [{**LADDER["steps"][0], "model": "</script><b>"}]}
-    text = report_html(bare(), steps)
+    steps = LADDER.model_copy(update={"steps": [LADDER.steps[0].model_copy(update={"model": "</script><b>"})]})
+    text = report_html(bare_criticism(), steps)
     assert "</script><b>" not in text
     (data,) = [json.loads(s) for kind, s in Page(text).scripts if kind == "application/json"]
     assert data["data"][0]["x"] == ["1: </script><b>"]

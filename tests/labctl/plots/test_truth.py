@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from labctl.answers.comparison import ComparisonResponse
+from labctl.answers.criticism import CriticismResponse
 from labctl.fitting.criticism import residual_maps
 from labctl.fitting.data.earth import up_rate_dps
 from labctl.plots.model_lines import error_over_rate, full_turn
@@ -15,7 +17,7 @@ from labctl.plots.noise import repeats
 from labctl.plots.residual_lines import channels, previous_rate, time
 from labctl.plots.residual_maps import maps
 from labctl.recording import Recording, read_recording, to_points
-from tests.helpers.criticism import held, views
+from tests.helpers.criticism import bare_criticism, held, views
 from tests.helpers.paths import ROOT
 from tests.helpers.service import add_recording, open_client
 from tests.helpers.simulated_recordings import single_axis, three_axes
@@ -24,18 +26,18 @@ AXES = ("x", "y", "z")
 
 
 @lru_cache(maxsize=1)
-def triaxial() -> tuple[Recording, dict[str, Any]]:
+def triaxial() -> tuple[Recording, CriticismResponse]:
     """Return the means of 630 data sets about three axes, and the criticism's views and maps of them."""
     recording = three_axes(4, scale_factor_odd=3e-9)
     found = held(recording, "yang2018", full=True)
-    return to_points(recording), {"views": found.views, "maps": residual_maps(found.data, found.residuals)}
+    return to_points(recording), bare_criticism(views=found.views, maps=residual_maps(found.data, found.residuals))
 
 
 @lru_cache(maxsize=1)
-def untimed() -> dict[str, Any]:
+def untimed() -> CriticismResponse:
     recording = read_recording(ROOT / "examples" / "osu-fog")
     found = held(recording, full=True)
-    return {"views": found.views, "maps": residual_maps(found.data, found.residuals)}
+    return bare_criticism(views=found.views, maps=residual_maps(found.data, found.residuals))
 
 
 def cells_of(figure: Any) -> list[tuple[str, str, str, float]]:
@@ -71,7 +73,7 @@ def test_a_cell_has_the_residual_of_its_data_set_at_its_rate_and_temperature() -
     figure = maps(shown)
     assert figure is not None
     number = {int(n): k for k, n in enumerate(points.columns["dataset"])}
-    sets = shown["views"]["sets"]
+    sets = shown.views["sets"]
     scores = {axis: dict(zip(sets["dataset"], sets["over_floor"][axis], strict=True)) for axis in AXES}
     seen = 0
     for trace in (t for t in figure.data if t.name in AXES):
@@ -89,7 +91,7 @@ def test_a_map_without_levels_has_each_data_set_at_its_own_temperature() -> None
     shown = untimed()
     figure = maps(shown)
     assert figure is not None
-    (picture,) = shown["maps"]
+    (picture,) = shown.maps
     (cells,) = (trace for trace in figure.data if trace.name == "cells")
     drawn = [int(n) for names in cells.customdata for n in names.split(", ")]
     assert sorted(drawn) == sorted(picture["dataset"])
@@ -104,7 +106,7 @@ def test_scatters_draw_every_data_set_where_it_was_measured() -> None:
     points, shown = triaxial()
     figure = channels(shown)
     assert figure is not None
-    sets = shown["views"]["sets"]
+    sets = shown.views["sets"]
     dots = [trace for trace in figure.data if trace.name == "data sets"]
     by_position = [trace for trace in dots if len(trace.x) == 210]
     assert len(by_position) == 9
@@ -123,7 +125,7 @@ def test_a_thinned_picture_says_n_of_how_many(draw: Any, monkeypatch: pytest.Mon
     monkeypatch.setattr("labctl.fitting.criticism.diagnostics.channels.drawn_rows.__defaults__", (60,))
     found = views(single_axis(5))
     assert {rate > 0 for rate in found["sets"]["channels"]["table_rate_dps"]} == {True, False}
-    figure = draw({"views": found})
+    figure = draw(bare_criticism(views=found))
     dots = next(trace for trace in figure.data if trace.name == "data sets")
     assert len(dots.x) == 60
     assert "60 of 121 data sets drawn" in figure.layout.annotations[0].text
@@ -159,7 +161,7 @@ def test_nine_panels_have_measured_dots_and_model_lines_redder_with_temperature(
     compared: tuple[Recording, dict[str, Any]],
 ) -> None:
     points, comparison = compared
-    figure = error_over_rate(comparison)
+    figure = error_over_rate(ComparisonResponse.model_validate(comparison))
     assert figure is not None
     dots = {trace.name: trace for trace in figure.data if trace.mode == "markers"}
     assert set(dots) == {f"{axis} about {position}" for axis in AXES for position in AXES}
@@ -184,7 +186,7 @@ def test_the_error_per_turn_is_drawn_before_and_after_on_the_same_axes(
     compared: tuple[Recording, dict[str, Any]],
 ) -> None:
     _, comparison = compared
-    figure = full_turn(comparison)
+    figure = full_turn(ComparisonResponse.model_validate(comparison))
     assert figure is not None
     columns = comparison["columns"]
     for axis in AXES:

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from instruments.clock import VirtualClock
+from labctl.answers.campaigns import CampaignRequest
 from labctl.processes import supervision
 from labctl.processes.held_address import HeldAddress
 from labctl.processes.liveness import ENGINE_SILENT_S, EngineWatch
@@ -18,7 +19,6 @@ from labctl.processes.waker import Waker
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.stop_requests import NotHere
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.campaigns import CampaignRequest
 from labctl.store import Store, open_store
 from procedures.contracts.control import Control
 

@@ -100,10 +100,10 @@ def test_a_campaign_is_started_followed_and_aborted_from_the_web_process(store: 
     service.start()
     try:
         assert rings.acquire(timeout=20.0)
+        from labctl.answers.campaigns import CampaignRequest, ReasonRequest
         from labctl.services.commands.acts.abort import ABORT_CAMPAIGN
         from labctl.services.commands.acts.start import START_CAMPAIGN
         from labctl.services.commands.requests import CampaignStart, ToCampaign
-        from labctl.services.schemas.campaigns import CampaignRequest, ReasonRequest
 
         campaign = service.execute(START_CAMPAIGN, CampaignStart(CampaignRequest(recipe="short"))).id
         while access.runs(campaign):  # until its end is written

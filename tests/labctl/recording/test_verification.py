@@ -13,6 +13,7 @@ import pytest
 from instruments.bench_config import read_bench
 from instruments.clock import VirtualClock
 from instruments.drivers.resolution import resolve
+from labctl.answers.calibrations import FitRequest
 from labctl.errors import BadRecording, DataRefused, NotEnoughData
 from labctl.fitting import fit
 from labctl.fitting.criticism import criticise
@@ -28,7 +29,6 @@ from labctl.services.campaigns.preparation import prepare
 from labctl.services.criticism.verification.of_version import verify_unit
 from labctl.services.planning.loading import limits_of, load_bench, load_recipe
 from labctl.services.recordings.catalogue import data_sets
-from labctl.services.schemas.calibrations import FitRequest
 from labctl.services.simulation.plan_simulation import hidden_recording
 from labctl.store import open_store
 from procedures.planning.plan import make_plan

@@ -1,28 +1,41 @@
-"""An act on a campaign is declared once: its route, its command and the call of another process follow from that."""
+"""An act on a campaign is declared once: its route, its commands and the call of another process follow from that."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
+from inspect import signature
 from pathlib import Path
+from typing import Any
 
+import httpx
 import pytest
 from fastapi import APIRouter
 from fastapi.testclient import TestClient
+from typer._click.core import Context
+from typer.cli import get_docs_for_click
+from typer.main import get_command
+from typer.testing import CliRunner
 
 from instruments.clock import VirtualClock
+from labctl.answers.campaigns import CampaignRequest, CampaignResponse, ConfirmRequest, ReasonRequest
 from labctl.api import create_app
 from labctl.api.act_routes import add_act_route
+from labctl.cli.app import app
+from labctl.client import Client
+from labctl.errors import Conflict
 from labctl.processes.bench_calls import BENCH_ACTS
+from labctl.service_connection import ServiceRefused
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.status import campaign_status
 from labctl.services.campaigns.unattended import not_running
+from labctl.services.commands.acts import catalogue
 from labctl.services.commands.acts.campaign_act import CampaignAct
 from labctl.services.commands.acts.catalogue import CAMPAIGN_ACTS
 from labctl.services.commands.context import CommandContext, Foreground, ServiceBench
 from labctl.services.commands.requests import ToCampaign
 from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.campaigns import CampaignRequest, CampaignResponse, ReasonRequest
 from labctl.store import Store, open_store
 
 Asked = ToCampaign[ReasonRequest]
@@ -44,6 +57,8 @@ HOLD = CampaignAct(
     body=ReasonRequest,
     summary="Hold the temperature",
     description="Stay in the present soak.",
+    command_help="Stay in the present soak until the campaign is resumed.",
+    command_defaults={"reason": "held from the command line"},
     in_service=_hold_in_service,
     in_foreground=_hold_in_foreground,
     is_urgent=True,
@@ -59,17 +74,98 @@ def store(tmp_path: Path) -> Iterator[Store]:
 def test_a_declared_act_has_a_route_whose_request_is_validated_and_an_entry_in_the_audit_trail(store: Store) -> None:
     runner = BenchRunner(store, load_bench("single-axis-sim"), VirtualClock)
     campaign = runner.start(CampaignRequest(recipe="short")).id
-    app = create_app(LabService(store, VirtualClock(), runner))
+    service = create_app(LabService(store, VirtualClock(), runner))
     router = APIRouter(prefix="/api/campaigns")
     add_act_route(router, HOLD)
-    app.include_router(router)
-    with TestClient(app) as client:
-        assert app.openapi()["paths"]["/api/campaigns/{campaign}/hold"]["post"]["summary"] == "Hold the temperature"
+    service.include_router(router)
+    with TestClient(service) as client:
+        assert service.openapi()["paths"]["/api/campaigns/{campaign}/hold"]["post"]["summary"] == "Hold the temperature"
         answer = client.post(f"/api/campaigns/{campaign}/hold", json={"reason": "the door is open", "by": "Ada"})
         assert (answer.status_code, answer.json()["id"]) == (200, campaign)
         assert client.post(f"/api/campaigns/{campaign}/hold", json={"by": "Ada"}).status_code == 422
         held = [row for row in store.audit.rows() if row.action == "campaign hold"]
         assert [row.detail["reason"] for row in held] == ["the door is open (Ada)"]
+
+
+@pytest.fixture
+def with_hold(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Add the line of the catalogue."""
+    monkeypatch.setattr(catalogue, "CAMPAIGN_ACTS", (*CAMPAIGN_ACTS, HOLD))
+
+
+@pytest.mark.usefixtures("with_hold")
+def test_a_declared_act_has_a_command_with_an_option_for_each_field_of_its_request(tmp_path: Path) -> None:
+    database = str(tmp_path / "lab.sqlite")
+    shown = CliRunner().invoke(app, ["campaign", "hold", "--help"], env={"COLUMNS": "200"})
+    assert all(text in shown.stdout for text in (HOLD.command_help, "--reason", "--by", "--json", "--database"))
+    asked = ["campaign", "hold", "7", "--by", "Ada", "--database", database]
+    refused = CliRunner().invoke(app, asked)
+    assert (refused.exit_code, "campaign 7 is not in this database" in refused.stderr) == (2, True), refused.output
+    empty = CliRunner().invoke(app, [*asked, "--reason", ""])
+    assert (empty.exit_code, "--reason" in empty.stderr) == (2, True)
+
+
+@pytest.mark.usefixtures("with_hold")
+def test_the_command_of_an_act_sends_its_request(monkeypatch: pytest.MonkeyPatch) -> None:
+    sent: list[object] = []
+
+    def execute(database: str | None, command: object, asked: object) -> CampaignResponse:
+        sent.extend((database, command, asked))
+        raise Conflict("it was sent; nothing more is to be done")
+
+    monkeypatch.setattr("labctl.services.commands.open.execute", execute)
+    CliRunner().invoke(app, ["campaign", "hold", "7", "--by", "Ada", "--database", "lab.sqlite"])
+    request = ReasonRequest(reason="held from the command line", by="Ada")
+    assert sent == ["lab.sqlite", HOLD.command, ToCampaign(7, request)]
+
+
+@pytest.mark.usefixtures("with_hold")
+def test_the_reference_of_the_command_line_has_a_declared_act() -> None:
+    written = get_docs_for_click(obj=get_command(app), ctx=Context(get_command(app)), name="labctl")
+    entry = written.partition("### `labctl campaign hold`")[2].partition("### ")[0]
+    assert "* `--reason TEXT`: Reason for this action; it is recorded.  [default: held from the command line]" in entry
+    assert written.index("`labctl campaign hold`") < written.index("### `labctl campaign resume`")
+
+
+def test_every_act_has_a_command_that_is_made_or_written() -> None:
+    group = get_command(app).commands["campaign"]  # type: ignore[attr-defined]
+    names = group.list_commands(Context(group))
+    assert [act.name for act in CAMPAIGN_ACTS if act.name not in names] == []
+    assert len(names) == len(set(names))
+
+
+def sent_by_client(act: CampaignAct[Any]) -> str:
+    """Return how the client's method of an act differs from its declaration; empty: it does not."""
+    method = getattr(Client, act.name, None)
+    if method is None:
+        return f"Client has no method {act.name}"
+    given = {name: SAMPLES.get(name, f"the {name}") for name in act.body.model_fields}
+    if set(signature(method).parameters) != {"self", "campaign", *given}:
+        return f"Client.{act.name} takes {', '.join(signature(method).parameters)}; its request has {', '.join(given)}"
+    sent: list[httpx.Request] = []
+
+    def answer(request: httpx.Request) -> httpx.Response:
+        sent.append(request)
+        return httpx.Response(404, json={"title": "gone", "detail": "gone"})
+
+    with Client(transport=httpx.MockTransport(answer)) as client, pytest.raises(ServiceRefused):
+        getattr(client, act.name)(7, **given)
+    (request,) = sent
+    if (request.method, request.url.path) != (act.command.method, act.command.path.format(campaign=7)):
+        return f"Client.{act.name} sends {request.method} {request.url.path}"
+    body = act.body.model_validate_json(request.content).model_dump()
+    return "" if body == given else f"Client.{act.name} sends {body} for {given}"
+
+
+#: Values that are no text.
+SAMPLES = {"confirmed": True, "again": False}
+
+
+def test_the_client_has_a_method_for_each_act_that_sends_its_request() -> None:
+    assert [found for act in CAMPAIGN_ACTS if (found := sent_by_client(act))] == []
+    assert sent_by_client(HOLD) == "Client has no method hold"
+    other = replace(HOLD, name="pause", body=ConfirmRequest)
+    assert sent_by_client(other).startswith("Client.pause takes self, campaign, reason, by; its request has prompt")
 
 
 def test_every_act_of_the_catalogue_is_called_by_its_name_and_routed_as_it_says() -> None:

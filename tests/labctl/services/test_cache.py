@@ -9,13 +9,13 @@ from pathlib import Path
 
 import pytest
 
+from labctl.answers.base import ResponseModel
+from labctl.answers.certification import CertificationResponse
+from labctl.answers.ladder import LadderResponse
 from labctl.recording import to_points, write_recording
 from labctl.services import cache as result_cache
 from labctl.services.cache import RecentResults, cached, cached_group
 from labctl.services.criticism import evaluation, measurements
-from labctl.services.schemas.base import ResponseModel
-from labctl.services.schemas.certification import CertificationResponse
-from labctl.services.schemas.reports.ladder import LadderResponse
 from labctl.store import open_store
 from tests.helpers.lab import Lab
 from tests.helpers.simulated_recordings import single_axis

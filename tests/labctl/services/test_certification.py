@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
+from labctl.answers.criticism import CriticismResponse
 from labctl.recording import to_points, write_recording
 from labctl.services.calibrations import assessment
 from labctl.services.calibrations.assessment import LEAST_REASON_CHARACTERS, LEAST_REASON_WORDS, assess
-from labctl.services.schemas.criticism import CriticismResponse
 from labctl.store import open_store
 from tests.helpers.certifying import OVERRIDE, OVERRIDE_OPTIONS, REASON
 from tests.helpers.lab import Lab

@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from labctl.answers.calibrations import FitRequest
+from labctl.answers.validity import CheckGyroRequest
 from labctl.errors import NotEnoughData
 from labctl.metrology.control_chart import LEAST_HISTORY
 from labctl.services.calibrations.fitting import fit_unit
 from labctl.services.check_gyros import alarms, check_gyro, list_check_gyros, set_check_gyro
-from labctl.services.schemas.calibrations import FitRequest
-from labctl.services.schemas.validity import CheckGyroRequest
 from labctl.store import Store, check, open_store
 from tests.helpers import register
 from tests.helpers.certificates import simulated

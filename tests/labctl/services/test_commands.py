@@ -10,6 +10,9 @@ from typing import Any
 import pytest
 
 from instruments.clock import VirtualClock
+from labctl.answers.calibrations import FitRequest, ImproveRequest
+from labctl.answers.campaigns import CampaignRequest
+from labctl.answers.schedule import ScheduledResponse
 from labctl.api import create_app
 from labctl.errors import BadRecording, Conflict
 from labctl.service_connection import ServiceConnection, ServiceRefused
@@ -21,9 +24,6 @@ from labctl.services.commands.remote import HttpExecutor
 from labctl.services.commands.requests import CampaignStart, RecordingFolder, ToNewestOrVersion, ToStart, ToUnit
 from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.calibrations import FitRequest, ImproveRequest
-from labctl.services.schemas.campaigns import CampaignRequest
-from labctl.services.schemas.schedule import ScheduledResponse
 from labctl.store import Store, open_store
 from labctl.store.connection.database import Database
 from tests.helpers.commands import local_executor

@@ -13,12 +13,12 @@ import pytest
 import sqlalchemy as sa
 
 from instruments.clock import VirtualClock
+from labctl.answers.calibrations import FitRequest
 from labctl.errors import VersionTaken
 from labctl.services.calibrations import fitting
 from labctl.services.calibrations.next_version import TRIES, keep_next_version
 from labctl.services.commands.registry import FIT, IMPORT_RECORDING
 from labctl.services.commands.requests import RecordingFolder, ToUnit
-from labctl.services.schemas.calibrations import FitRequest
 from labctl.store import NewCalibration, Store, open_store
 from labctl.store.repositories import calibrations
 from tests.helpers.commands import local_executor

@@ -12,6 +12,8 @@ from fastapi.testclient import TestClient
 from prometheus_client.parser import text_string_to_metric_families
 
 from instruments.clock import VirtualClock
+from labctl.answers.calibrations import FitRequest as ServiceFit
+from labctl.answers.certification import CertifyRequest, RevokeRequest
 from labctl.calibration import CalibrationWarning, hash_of, read_calibration
 from labctl.client import Client, FitRequest
 from labctl.compensator import Compensator
@@ -23,8 +25,6 @@ from labctl.services.calibrations.due import interval_days, span
 from labctl.services.calibrations.fitting import fit_unit
 from labctl.services.calibrations.served import calibration_file
 from labctl.services.recordings.transfer import import_folder
-from labctl.services.schemas.calibrations import FitRequest as ServiceFit
-from labctl.services.schemas.certification import CertifyRequest, RevokeRequest
 from labctl.services.units import units_due
 from labctl.store import Store, copy_database, open_store
 from tests.helpers.certifying import OVERRIDE

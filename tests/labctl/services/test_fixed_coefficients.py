@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from instruments.clock import VirtualClock
+from labctl.answers.calibrations import FitRequest
 from labctl.api import create_app
 from labctl.calibration import read_calibration
 from labctl.compensator import Compensator
@@ -24,7 +25,6 @@ from labctl.services.commands.requests import RecordingFolder, ToUnit
 from labctl.services.fixed_coefficients import read_fixed
 from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.calibrations import FitRequest
 from labctl.store import Store
 from labctl.store.connection.database import Database
 from tests.helpers.lab import Lab

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from instruments.standards import Standard
+from labctl.answers.calibrations import FitRequest
+from labctl.answers.validity import ComparedResult, LaboratoryComparison
 from labctl.errors import BadInput, Conflict
 from labctl.services.calibrations.fitting import fit_unit
 from labctl.services.interlaboratory import compare, pair_of
-from labctl.services.schemas.calibrations import FitRequest
-from labctl.services.schemas.validity import ComparedResult, LaboratoryComparison
 from labctl.store import Store, open_store
 from tests.helpers.certificates import simulated
 from tests.helpers.register import noon

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from fastapi.testclient import TestClient
 
+from labctl.answers.orientation import OrientationOptions, OrientationQuery
 from labctl.api import create_app
 from labctl.calibration import Calibration
 from labctl.cli.commands import noise
@@ -21,7 +22,6 @@ from labctl.errors import BadInput, BadRecording, NotEnoughData
 from labctl.recording import Recording, RecordingInfo
 from labctl.recording.data_files import read_table
 from labctl.services.calibrations.orientation import orientation_of_file
-from labctl.services.schemas.reports.orientation import OrientationOptions, OrientationQuery
 from tests.helpers.lab import Lab
 from tests.helpers.service import add_recording, open_client, service_of
 

@@ -12,6 +12,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from labctl.acting_user import Actor, acting
+from labctl.answers.certification import CertifyRequest, ReleaseRequest, ReleaseRequestResponse, RevokeRequest
 from labctl.api import create_app
 from labctl.api.access_policy import AccessPolicy
 from labctl.config import TWO_PERSON_VARIABLE
@@ -20,7 +21,6 @@ from labctl.services.calibrations.certification import certify, list_certificati
 from labctl.services.calibrations.release import ReleaseRefused, list_waiting
 from labctl.services.certificates.issue import CertificateRefused, issue
 from labctl.services.certificates.served import certificate_file
-from labctl.services.schemas.certification import CertifyRequest, ReleaseRequest, ReleaseRequestResponse, RevokeRequest
 from labctl.store import Store, check, copy_database, open_store
 from tests.helpers.certificates import AT, ORDER, SERIAL, add_version, request
 from tests.helpers.lab import Lab

@@ -12,6 +12,9 @@ import pytest
 from pydantic import ValidationError
 
 from instruments.clock import VirtualClock
+from labctl.answers.calibrations import FitRequest
+from labctl.answers.certificates import RoomConditions
+from labctl.answers.validity import RoomEnvironmentRequest
 from labctl.errors import BadInput
 from labctl.services.calibrations.fitting import fit_unit
 from labctl.services.campaigns.execution import run
@@ -20,9 +23,6 @@ from labctl.services.certificates.issue import issue
 from labctl.services.certificates.served import certificate_file
 from labctl.services.planning.loading import load_bench
 from labctl.services.room_environment import add_readings, environment, of_campaign
-from labctl.services.schemas.calibrations import FitRequest
-from labctl.services.schemas.documents.certificates import RoomConditions
-from labctl.services.schemas.validity import RoomEnvironmentRequest
 from labctl.store import Store, open_store
 from tests.helpers.certificates import SERIAL, request
 

@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 
 from instruments.clock import SystemClock, VirtualClock
 from labctl.acting_user import Actor, acting
+from labctl.answers.campaigns import CampaignRequest, CampaignResponse, ConfirmRequest, ReasonRequest
 from labctl.api import create_app
 from labctl.api.access_policy import ASKING
 from labctl.cli.app import app
@@ -28,7 +29,6 @@ from labctl.services.campaigns.preparation import prepare
 from labctl.services.campaigns.status import campaign_status
 from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.campaigns import CampaignRequest, CampaignResponse, ConfirmRequest, ReasonRequest
 from labctl.store import Store, migrate, migrate_database, open_store
 from labctl.store.connection.database import Database
 from tests.helpers.certifying import OVERRIDE, OVERRIDE_OPTIONS, REASON

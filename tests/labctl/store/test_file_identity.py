@@ -12,12 +12,12 @@ import pytest
 from typer.testing import CliRunner
 
 from instruments.clock import VirtualClock
+from labctl.answers.campaigns import StartRequest
 from labctl.cli.app import app
 from labctl.errors import StoreError
 from labctl.services.campaigns.execution import run_here
 from labctl.services.campaigns.preparation import prepare
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.campaigns import StartRequest
 from labctl.store import Store, open_store
 from labctl.store.connection.sqlite_file import first_damage
 from procedures.execution import safe_state

@@ -16,6 +16,8 @@ import pytest
 from typer.testing import CliRunner
 
 from instruments.clock import VirtualClock
+from labctl.answers.calibrations import FitRequest
+from labctl.answers.certification import CertifyRequest
 from labctl.cli.app import app
 from labctl.errors import DiskFull, StoreError
 from labctl.recording import read_recording
@@ -24,8 +26,6 @@ from labctl.services.campaigns.preparation import prepare
 from labctl.services.commands.registry import CERTIFY, FIT, IMPORT_RECORDING
 from labctl.services.commands.requests import RecordingFolder, ToUnit, ToVersion
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.calibrations import FitRequest
-from labctl.services.schemas.certification import CertifyRequest
 from labctl.store import Store, check, copy_database, open_store
 from labctl.store.connection import commit_seal as seals
 from tests.helpers.certifying import REASON

@@ -14,6 +14,8 @@ import psycopg
 import pytest
 import sqlalchemy as sa
 
+from labctl.answers.campaigns import StartRequest
+from labctl.answers.certification import RevokeRequest
 from labctl.errors import DatabaseUnreachable, StoreError
 from labctl.services.calibrations.certification import revoke
 from labctl.services.calibrations.served import calibration_file
@@ -21,8 +23,6 @@ from labctl.services.calibrations.stability import Stability, stability_of
 from labctl.services.campaigns.execution import run_here
 from labctl.services.certificates.issue import issue
 from labctl.services.certificates.states import list_certificates
-from labctl.services.schemas.campaigns import StartRequest
-from labctl.services.schemas.certification import RevokeRequest
 from labctl.store import (
     CheckGyroRow,
     FetchRow,

@@ -6,9 +6,9 @@ import ast
 
 import pytest
 
+from labctl.answers.campaigns import CampaignResponse
 from labctl.api import create_app
 from labctl.services.campaigns.status import mark_abandoned
-from labctl.services.schemas.campaigns import CampaignResponse
 from procedures.contracts.campaign_state import ACTIVE, ENDED, NEXT, STOPPED_EARLY, UNDER_WAY, UNFINISHED, CampaignState
 from tests.helpers.source_files import sources
 

@@ -13,7 +13,7 @@ from labctl.cli.options import Database, Json, Serial
 from labctl.cli.output import console, print_json, stderr
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.documents.certificates import CertificateOrder, CertificateResponse
+    from labctl.answers.certificates import CertificateOrder, CertificateResponse
 
 #: The command that is meant where none is named.
 USUAL = "issue"
@@ -89,11 +89,11 @@ def issue(
     written.
     """
     from labctl.acting_user import actor
+    from labctl.answers.certificates import CertificateRequest
     from labctl.services.certificates.served import certificate_file, format_of
     from labctl.services.commands.open import execute, open_readonly
     from labctl.services.commands.registry import ISSUE_CERTIFICATE
     from labctl.services.commands.requests import ToVersion
-    from labctl.services.schemas.documents.certificates import CertificateRequest
 
     with one_clear_line():
         chosen = format_of(out.suffix)
@@ -132,10 +132,10 @@ def withdraw(
     """Withdraw a certificate. Its files stay as they were issued; the list, the page behind its QR code and the headers
     of HTTP say that it is withdrawn. `labctl revoke` withdraws every certificate of a version."""
     from labctl.acting_user import actor
+    from labctl.answers.certificates import WithdrawRequest
     from labctl.cli.printing.certificates import state_text
     from labctl.services.commands.open import execute
     from labctl.services.commands.registry import WITHDRAW_CERTIFICATE
-    from labctl.services.schemas.documents.certificates import WithdrawRequest
 
     with one_clear_line():
         request = WithdrawRequest(number=number, by=by or actor().name, reason=reason)
@@ -163,8 +163,8 @@ def read_order(path: Path | None) -> CertificateOrder:
     from pydantic import ValidationError
 
     from instruments.toml_documents import listed, read_toml, shown
+    from labctl.answers.certificates import CertificateOrder
     from labctl.errors import BadInput
-    from labctl.services.schemas.documents.certificates import CertificateOrder
 
     if path is None:
         return CertificateOrder()

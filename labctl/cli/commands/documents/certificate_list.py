@@ -13,7 +13,7 @@ from labctl.cli.options import Database, Json, Serial
 from labctl.cli.output import console, print_json
 
 if TYPE_CHECKING:
-    from labctl.services.schemas.documents.signatures import SignatureResponse, VerifiedFileResponse
+    from labctl.answers.signatures import SignatureResponse, VerifiedFileResponse
 
 app = typer.Typer(
     cls=GroupWithList,

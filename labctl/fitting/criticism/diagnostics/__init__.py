@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from labctl.answers.views import AngleSpectrum, FrequencySpectrum, StartProfile, Views
 from labctl.fitting.criticism.diagnostics.angle_spectra import angle_lines, frequency_lines, start_profile
 from labctl.fitting.criticism.diagnostics.axis import AxisView, axis_view
 from labctl.fitting.criticism.diagnostics.cells import residual_maps
@@ -18,7 +19,6 @@ from labctl.fitting.criticism.diagnostics.within_dataset import within_of
 from labctl.fitting.criticism.model_comparison import Comparison
 from labctl.fitting.criticism.residuals import Residuals
 from labctl.fitting.effects import Effect
-from labctl.json_types.views import AngleSpectrum, FrequencySpectrum, StartProfile, Views
 from labctl.recording import Recording
 
 #: Diagnostics beside the residual against each channel, which goes by the channel's name.

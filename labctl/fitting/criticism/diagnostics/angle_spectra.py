@@ -6,12 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
+from labctl.answers.views import AngleLine, AngleSpectrum, FrequencySpectrum, StartProfile
 from labctl.fitting.criticism.diagnostics.axis import BAND
 from labctl.fitting.criticism.diagnostics.within_dataset import LEAST_READINGS, Residual, Within
 from labctl.fitting.criticism.reduction import STEP_LINES
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.json_numbers import plain, plain_list
-from labctl.json_types.views import AngleLine, AngleSpectrum, FrequencySpectrum, StartProfile
 
 #: Waves in the angle are computed over data sets of at least this many turns ...
 TURNS = 2.0

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from labctl.answers.criticism import ResidualMap
 from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.criticism.residuals import Residuals
 from labctl.fitting.data.levels import level_centres, rate_levels, temperature_rows, widest
-from labctl.json_types.criticism import ResidualMap
 
 
 def residual_maps(data: ReducedRecording, left: Mapping[str, Residuals]) -> list[ResidualMap]:

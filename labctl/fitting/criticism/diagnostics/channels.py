@@ -8,13 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr
 
+from labctl.answers.views import ChannelLine, DataSetColumns, MeanLine, PreviousRateLine, TimeLine
 from labctl.fitting.criticism.channel_functions import smooth_channels
 from labctl.fitting.criticism.diagnostics.axis import BAND, AxisView
 from labctl.fitting.criticism.reduction import ReducedRecording
 from labctl.fitting.data.levels import rate_levels
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.json_numbers import plain, plain_list
-from labctl.json_types.views import ChannelLine, DataSetColumns, MeanLine, PreviousRateLine, TimeLine
 from labctl.recording.columns import OWN_DATASET, RECORDING
 
 #: Data sets that are drawn one by one; a longer recording is thinned to so many.

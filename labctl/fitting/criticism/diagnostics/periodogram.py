@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.answers.views import BetweenSets
 from labctl.fitting.criticism.diagnostics.axis import AxisView
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.json_numbers import plain_list
-from labctl.json_types.views import BetweenSets
 
 POINTS = 150
 LEAST_SETS = 16

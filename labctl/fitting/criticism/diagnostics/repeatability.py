@@ -7,12 +7,12 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.answers.views import LegLine, Repeats
 from labctl.fitting.criticism.diagnostics.axis import BAND, AxisView
 from labctl.fitting.criticism.diagnostics.channels import groups_of
 from labctl.fitting.data.noise_floor import REPEAT_RATE, REPEAT_TEMPERATURE_C
 from labctl.fitting.numeric.arrays import Array
 from labctl.fitting.numeric.json_numbers import plain, plain_list
-from labctl.json_types.views import LegLine, Repeats
 
 #: A temperature that went back by this much has turned.
 TURN_K = 2.0

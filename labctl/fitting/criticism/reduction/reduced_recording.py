@@ -8,12 +8,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.answers.criticism import OutputStep
 from labctl.fitting.data.channels import Carrier, Channels
 from labctl.fitting.data.rate_profile import Response
 from labctl.fitting.data.static_record import StaticRecord
 from labctl.fitting.effects import Column
 from labctl.fitting.numeric.arrays import Array
-from labctl.json_types.criticism import OutputStep
 from labctl.recording import RecordingInfo
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.answers.recording_head import Motion
 from labctl.fitting.criticism.reduction.basis import WAVES, orthonormal_basis
 from labctl.fitting.criticism.reduction.outliers import inlier_mask, white_level_dps
 from labctl.fitting.criticism.reduction.reduced_recording import ReducedRecording
@@ -19,7 +20,6 @@ from labctl.fitting.numeric.arrays import Array
 from labctl.recording import Recording
 from labctl.recording.columns import OWN_DATASET, RECORDING
 from labctl.recording.decimation import FASTEST_HZ, decimated_columns
-from labctl.recording.info import Motion
 from labctl.recording.output_steps import output_steps, with_quantisation
 from labctl.recording.points import dataset_starts, pieces
 from labctl.recording.quantisation import QUANTISATION

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import chdtrc
 
+from labctl.answers.criticism import Remainder
 from labctl.fitting.criticism.evidence.bayes_factors import evidence_of
 from labctl.fitting.criticism.evidence.design import Design, Discrepancy
 from labctl.fitting.criticism.evidence.elimination import eliminate_base
@@ -15,7 +16,6 @@ from labctl.fitting.criticism.model_comparison import Comparison, compare_models
 from labctl.fitting.criticism.ranking import Candidate
 from labctl.fitting.criticism.verdict import ENOUGH_NEXT, LEAD, channels_behind
 from labctl.fitting.effects import Effect, Term
-from labctl.json_types.criticism import Remainder
 
 #: Excess chi2 over its own scatter from which on something is said to remain.
 SIGNIFICANT = 5.0

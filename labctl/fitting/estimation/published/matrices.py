@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from labctl.answers.recording_head import Axis
 from labctl.fitting.effects import Reference, Term
 from labctl.fitting.estimation.published.common import (
     axis_fit,
@@ -20,7 +21,6 @@ from labctl.fitting.models.fitted_model import AxisFit, FittedModel
 from labctl.fitting.models.temperature import Constant, LagrangeTable
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording import OutputUnit, Recording
-from labctl.recording.info import Axis
 
 TERMS = (Term("bias"), Term("scale_factor"), Term("misalignment"))
 #: Temperatures that yang2018 interpolates between, and the one that single_temperature takes, deg C.

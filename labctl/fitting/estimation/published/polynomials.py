@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from labctl.answers.recording_head import Axis
 from labctl.fitting.effects import Reference, Term
 from labctl.fitting.estimation.error_metrics import ErrorFigures, rms
 from labctl.fitting.estimation.published.common import axis_fit, common, numbers, rate_range_dps, row_of, uncertainty
@@ -14,7 +15,6 @@ from labctl.fitting.models.fitted_model import AxisFit, FittedModel
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording import OutputUnit, Recording
 from labctl.recording.coefficient_forms import form_of
-from labctl.recording.info import Axis
 
 #: Letter of a column -> effect and coefficient, and its unit; higher powers of temperature are an effect of their own.
 EFFECTS = {"b": ("bias", "deg/s"), "k": ("scale_factor", "1")}

@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from labctl.answers.recording_head import Axis
 from labctl.errors import BadInput
 from labctl.fitting.effects import Reference, Term
 from labctl.fitting.estimation.published.common import (
@@ -26,7 +27,6 @@ from labctl.fitting.models.temperature import LagrangeTable
 from labctl.fitting.numeric.arrays import Array
 from labctl.recording import OutputUnit, Recording
 from labctl.recording.coefficient_forms import MATRIX, POLYNOMIALS, SCALE_OFFSET, SURFACE, form_of
-from labctl.recording.info import Axis
 
 TERMS = (Term("bias"), Term("scale_factor"))
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from labctl.json_types.inspection import CourseJson, MarkJson
+from labctl.answers.inspection import CourseJson, MarkJson
 from labctl.recording.columns import BY_NAME
 from labctl.recording.points import dataset_starts
 from labctl.recording.recording import Recording

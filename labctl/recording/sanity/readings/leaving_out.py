@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from labctl.answers.recording_head import LeftOut
 from labctl.errors import BadInput
-from labctl.recording.info import LeftOut
 from labctl.recording.recording import Recording
 from labctl.recording.sanity.readings.examination import examine
 

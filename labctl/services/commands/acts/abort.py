@@ -7,12 +7,12 @@ from contextvars import copy_context
 from typing import TYPE_CHECKING
 
 from labctl.acting_user import actor
+from labctl.answers.campaigns import CampaignResponse, ReasonRequest
 from labctl.errors import StoreError
 from labctl.services.campaigns.unattended import abort_abandoned
 from labctl.services.commands.acts.campaign_act import CampaignAct
 from labctl.services.commands.context import CommandContext, Foreground, ServiceBench
 from labctl.services.commands.requests import ToCampaign
-from labctl.services.schemas.campaigns import CampaignResponse, ReasonRequest
 from labctl.stop.latch import StopRequest
 
 if TYPE_CHECKING:

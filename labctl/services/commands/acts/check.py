@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from labctl.answers.benches import BenchCheckResponse, CheckRequest
 from labctl.errors import NotFound
 from labctl.services.commands.command import Command
 from labctl.services.commands.context import OPENS_BENCH_S, BenchAct, CommandContext, Foreground, ServiceBench
 from labctl.services.commands.requests import ToBench
-from labctl.services.schemas.benches import BenchCheckResponse, CheckRequest
 
 Asked = ToBench[CheckRequest]
 

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from labctl.answers.campaigns import CampaignResponse, ConfirmRequest
 from labctl.services.campaigns.unattended import not_running
 from labctl.services.commands.acts.campaign_act import CampaignAct
 from labctl.services.commands.context import CommandContext, Foreground, ServiceBench
 from labctl.services.commands.requests import ToCampaign
-from labctl.services.schemas.campaigns import CampaignResponse, ConfirmRequest
 
 Asked = ToCampaign[ConfirmRequest]
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from labctl.answers.live import LiveEndRequest, LiveRequest, LiveStateResponse
 from labctl.errors import Conflict
 from labctl.services.commands.command import Command
 from labctl.services.commands.context import OPENS_BENCH_S, BenchAct, CommandContext, Foreground, ServiceBench
-from labctl.services.schemas.live import LiveEndRequest, LiveRequest, LiveStateResponse
 
 
 def _start_in_service(control: ServiceBench, _: CommandContext, asked: LiveRequest) -> LiveStateResponse:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from labctl.answers.campaigns import CampaignResponse, ReasonRequest
 from labctl.services.campaigns.unattended import not_running
 from labctl.services.commands.acts.campaign_act import CampaignAct
 from labctl.services.commands.context import CommandContext, Foreground, ServiceBench
 from labctl.services.commands.requests import ToCampaign
-from labctl.services.schemas.campaigns import CampaignResponse, ReasonRequest
 
 Asked = ToCampaign[ReasonRequest]
 
@@ -30,8 +30,9 @@ PAUSE = CampaignAct(
     summary="Hold a campaign",
     description="Hold after the present data set. `wish` says that it was asked; `state` becomes `paused` when it "
     "holds.",
+    command_help="Pause a running campaign after the present data set; the bench is still monitored.",
+    command_defaults={"reason": "paused from the command line"},
     in_service=_in_service,
     in_foreground=_in_foreground,
     is_urgent=True,
 )
-PAUSE_CAMPAIGN = PAUSE.command

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from labctl.answers.campaigns import CampaignResponse
 from labctl.errors import Conflict
 from labctl.services.commands.command import Command
 from labctl.services.commands.context import OPENS_BENCH_S, BenchAct, CommandContext, Foreground, ServiceBench
 from labctl.services.commands.requests import CampaignResume
-from labctl.services.schemas.campaigns import CampaignResponse
 
 
 def _in_service(control: ServiceBench, context: CommandContext, asked: CampaignResume) -> CampaignResponse:

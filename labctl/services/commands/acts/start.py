@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from labctl.answers.campaigns import CampaignResponse
+from labctl.answers.schedule import ScheduledResponse
 from labctl.services.commands.command import Command
 from labctl.services.commands.context import OPENS_BENCH_S, BenchAct, CommandContext, Foreground, ServiceBench
 from labctl.services.commands.requests import CampaignStart
 from labctl.services.planning.fit_rules import check_fit
 from labctl.services.planning.loading import load_recipe
 from labctl.services.schedule import queue
-from labctl.services.schemas.campaigns import CampaignResponse
-from labctl.services.schemas.schedule import ScheduledResponse
 from labctl.services.simulation.effect_sizes import with_sizes
 
 

@@ -11,19 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri, fdtri
 
+from labctl.answers.fitted_model import AxisCoefficients
+from labctl.answers.verification import AxisVerification, VerificationResponse
 from labctl.calibration import Calibration, read_calibration
 from labctl.compensator import Compensator
 from labctl.errors import BadInput, LabctlError
 from labctl.fitting.data.fit_data import FitData, fit_data_of
 from labctl.fitting.data.mounting_angles import ANGLE_QUANTITIES, PLACED, leaning_rates, placed_rad, stated_rad
-from labctl.json_types.models import AxisCoefficients
 from labctl.recording import Recording
 from labctl.recording.verification import fitted_part, verification_part
 from labctl.services.criticism.measurements import Measurements
 from labctl.services.criticism.verification.of_poses import errors_in_poses
 from labctl.services.criticism.versions import version_of
 from labctl.services.recordings.loading import motion_of, newest_row, points_of, source_of
-from labctl.services.schemas.criticism import AxisVerification, VerificationResponse
 from labctl.store import CalibrationRecord, Store
 
 # What a version promises of each axis, and how far an axis may be from it before it is said to be off.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from labctl.services.schemas.criticism import AxisVerification, VerificationResponse
+from labctl.answers.verification import AxisVerification, VerificationResponse
 
 
 def verification_sentence(found: VerificationResponse) -> str:

@@ -9,11 +9,12 @@ from typing import Literal
 
 import sqlalchemy as sa
 
-from labctl.json_types import JsonObject
+from labctl.answers.json_object import JsonObject
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.manifests.contents import CAMPAIGN
 from labctl.store.repositories.audit import append
+from labctl.store.repositories.records_by_name import records_of
 from labctl.store.schema import tables
 from labctl.store.sealing.seals import changing
 from procedures.contracts.campaign_state import CampaignState
@@ -99,9 +100,12 @@ class Drafts:
 
     def _rows(self, condition: sa.ColumnElement[bool]) -> list[DraftRow]:
         d = tables.drafts.c
-        query = sa.select(d.recording_id, d.campaign_id, d.serial, d.state, d.version, d.at, d.reason, d.report)
+        query = sa.select(
+            d.recording_id.label("recording"), d.campaign_id.label("campaign"), d.serial, d.state, d.version, d.at,
+            d.reason, d.report,
+        )  # fmt: skip
         with self._database.reading() as connection:
-            return [DraftRow(*row) for row in connection.execute(query.where(condition).order_by(d.recording_id))]
+            return records_of(DraftRow, connection.execute(query.where(condition).order_by(d.recording_id)))
 
     @transaction
     def conclude(self, recording: int, report: JsonObject, event: DraftEvent, at: datetime) -> bool:

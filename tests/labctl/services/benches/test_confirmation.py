@@ -16,6 +16,7 @@ from instruments.bench_config import BenchFile
 from instruments.clock import SystemClock, VirtualClock
 from instruments.errors import NoReply
 from instruments.simulation import open_simulation
+from labctl.answers.campaigns import BENCH_CHECKS, CampaignRequest
 from labctl.cli.app import app
 from labctl.errors import Conflict, StoreError
 from labctl.services.benches import confirmation
@@ -26,7 +27,6 @@ from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.preparation import prepare
 from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.campaigns import BENCH_CHECKS, CampaignRequest
 from labctl.store import BenchRow, Store, open_store
 from labctl.store.connection.database import Database
 from labctl.store.repositories.benches import Benches

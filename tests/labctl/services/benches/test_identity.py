@@ -12,13 +12,13 @@ from instruments.bench_config import BenchFile
 from instruments.clock import VirtualClock
 from instruments.errors import WrongInstrument
 from instruments.transport.adapters import adapter_of
+from labctl.answers.campaigns import ResumeRequest
 from labctl.cli.printing.campaigns import print_campaign
 from labctl.errors import Conflict
 from labctl.services.campaigns.preparation import prepare
 from labctl.services.campaigns.resume import prepare_resume
 from labctl.services.campaigns.status import campaign_status
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.campaigns import ResumeRequest
 from labctl.store import Store, open_store
 
 #: How a simulated unit is set.

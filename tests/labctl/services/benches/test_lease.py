@@ -236,7 +236,7 @@ def test_a_table_is_at_rest_before_a_lease_that_was_not_renewed_ends(store: Stor
 
 
 def test_a_service_that_lost_its_bench_begins_nothing(shared: Store) -> None:
-    from labctl.services.schemas.campaigns import CampaignRequest
+    from labctl.answers.campaigns import CampaignRequest
 
     clock = VirtualClock(AT)
     hold = BenchHold(shared, BENCH, clock)

@@ -13,6 +13,7 @@ from fastapi.testclient import TestClient
 
 from instruments.bench_config import BenchFile
 from instruments.clock import VirtualClock
+from labctl.answers.campaigns import BENCH_CHECKS, CampaignRequest, StartRequest
 from labctl.cli import terminal_operator
 from labctl.errors import StartNotConfirmed
 from labctl.services.benches.start_confirmation import confirmation_text, start_questions
@@ -21,7 +22,6 @@ from labctl.services.campaigns.execution import run_here
 from labctl.services.planning.loading import load_bench
 from labctl.services.schedule.queue import add_start, start_status
 from labctl.services.schedule.scheduler import Scheduler
-from labctl.services.schemas.campaigns import BENCH_CHECKS, CampaignRequest, StartRequest
 from labctl.store import Store, open_store
 from labctl.store.repositories.scheduled_starts import NewStart
 from tests.helpers.service import open_client

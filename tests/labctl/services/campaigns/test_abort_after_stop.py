@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from instruments.clock import VirtualClock
+from labctl.answers.campaigns import CampaignRequest, ReasonRequest
 from labctl.errors import Conflict
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.preparation import prepare
@@ -18,7 +19,6 @@ from labctl.services.commands.context import CommandContext
 from labctl.services.commands.requests import ToCampaign
 from labctl.services.commands.service_control import ServiceControl
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.campaigns import CampaignRequest, ReasonRequest
 from labctl.stop.latch import StopRequest
 from labctl.store import Store, open_store
 from procedures.contracts.campaign_state import CampaignState

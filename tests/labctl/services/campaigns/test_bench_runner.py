@@ -13,6 +13,8 @@ from fastapi.testclient import TestClient
 from instruments.clock import SystemClock, VirtualClock
 from instruments.errors import NoReply
 from labctl.acting_user import Actor, acting
+from labctl.answers.admin import KeyRequest, Role
+from labctl.answers.campaigns import CampaignRequest, ResumeRequest
 from labctl.api import create_app
 from labctl.api.access_policy import AccessPolicy
 from labctl.errors import BenchBusy, Conflict
@@ -30,8 +32,6 @@ from labctl.services.lab_service import LabService
 from labctl.services.local_bench import LocalBench
 from labctl.services.planning.loading import load_bench
 from labctl.services.schedule.queue import start_status
-from labctl.services.schemas.admin import KeyRequest, Role
-from labctl.services.schemas.campaigns import CampaignRequest, ResumeRequest
 from labctl.store import Store
 from labctl.store.connection.database import Database
 from procedures.contracts.operator import HumanOperator

@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 
 from instruments.bench_config import BenchFile, read_bench
 from instruments.clock import SystemClock, VirtualClock
+from labctl.answers.campaigns import ResumeRequest
 from labctl.api import create_app
 from labctl.cli.app import app
 from labctl.fitting import fit
@@ -28,7 +29,6 @@ from labctl.services.campaigns.resume import resume_here
 from labctl.services.lab_service import LabService
 from labctl.services.recordings.loading import points_of
 from labctl.services.recordings.transfer import import_folder, model_for
-from labctl.services.schemas.campaigns import ResumeRequest
 from labctl.store import Store, open_store
 from labctl.store.connection.database import Database
 from tests.helpers.paced_hand import PacedHand

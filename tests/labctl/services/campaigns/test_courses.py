@@ -13,14 +13,14 @@ import pytest
 from instruments.bench_config import BenchFile, read_bench
 from instruments.clock import VirtualClock
 from instruments.drivers.resolution import resolve
+from labctl.answers.calibrations import FitRequest
+from labctl.answers.campaigns import ResumeRequest
 from labctl.fitting import fit
 from labctl.services.calibrations.fitting import fit_unit
 from labctl.services.campaigns.execution import run
 from labctl.services.campaigns.preparation import Prepared, prepare
 from labctl.services.campaigns.resume import prepare_resume
 from labctl.services.planning.loading import limits_of, load_bench, load_recipe, plan_for
-from labctl.services.schemas.calibrations import FitRequest
-from labctl.services.schemas.campaigns import ResumeRequest
 from labctl.services.simulation.plan_simulation import simulate
 from labctl.store import Store, open_store
 from procedures.contracts.control import Control

@@ -13,13 +13,13 @@ import pytest
 
 from instruments.bench_config import read_bench
 from instruments.clock import VirtualClock
+from labctl.answers.campaigns import StartRequest
 from labctl.errors import Stopped
 from labctl.fitting import fit
 from labctl.services.campaigns import execution
 from labctl.services.campaigns.execution import run, run_here
 from labctl.services.campaigns.preparation import prepare
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.campaigns import StartRequest
 from labctl.store import open_store
 from procedures.contracts.control import Control
 from procedures.monitoring.progress import Progress

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from instruments.clock import SystemClock, VirtualClock
+from labctl.answers.campaigns import CampaignRequest, CampaignResponse, ReasonRequest
 from labctl.errors import StoreError
 from labctl.services.campaigns import campaign_job
 from labctl.services.campaigns.bench_runner import BenchRunner
@@ -20,7 +21,6 @@ from labctl.services.commands.context import CommandContext
 from labctl.services.commands.requests import ToCampaign
 from labctl.services.commands.service_control import ServiceControl
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.campaigns import CampaignRequest, CampaignResponse, ReasonRequest
 from labctl.stop.latch import StopRequest
 from labctl.store import Store, open_store
 from labctl.store.connection import writer_turn

@@ -16,13 +16,13 @@ import pytest
 from instruments.bench_config import BenchFile, read_bench
 from instruments.clock import VirtualClock
 from instruments.drivers.resolution import resolve
+from labctl.answers.calibrations import FitRequest
 from labctl.recording import Recording, read_recording, to_points, write_recording
 from labctl.services.calibrations.fitting import fit_unit, one_version
 from labctl.services.calibrations.served import calibration_file
 from labctl.services.campaigns.execution import run
 from labctl.services.campaigns.preparation import prepare
 from labctl.services.criticism.criticise import criticise_unit
-from labctl.services.schemas.calibrations import FitRequest
 from labctl.store import open_store
 
 RECIPE = """format = "labctl-recipe/1"

@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 
 from instruments.clock import VirtualClock
 from instruments.conformance.described import Tried
+from labctl.answers.campaigns import CampaignRequest, ResumeRequest
 from labctl.cli.app import app
 from labctl.errors import BadInput
 from labctl.processes.settings import ServeRequest
@@ -22,7 +23,6 @@ from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.recorded_campaigns import RecordedCampaigns
 from labctl.services.live.gyro_source import recorded_source
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.campaigns import CampaignRequest, ResumeRequest
 from labctl.services.wire_replay import replay
 from labctl.stop.latch import StopRequest
 from labctl.store import open_store

@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 
 from instruments.clock import VirtualClock
 from instruments.errors import NoReply
+from labctl.answers.campaigns import ResumeRequest, StartRequest
 from labctl.cli.app import app
 from labctl.errors import Conflict
 from labctl.services.benches.power_failure import power_failed
@@ -23,7 +24,6 @@ from labctl.services.campaigns.preparation import prepare
 from labctl.services.campaigns.resumability import MAX_RESUMES, retries_exhausted
 from labctl.services.campaigns.resume import prepare_resume, resume_here
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.campaigns import ResumeRequest, StartRequest
 from labctl.store import CampaignRow, Store, open_store
 from labctl.store.connection.database import Database
 from procedures.contracts.control import Control

@@ -10,10 +10,10 @@ from types import TracebackType
 import pytest
 
 from instruments.clock import VirtualClock
+from labctl.answers.campaigns import CampaignRequest, ResumeRequest
 from labctl.errors import BenchBusy
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.campaigns import CampaignRequest, ResumeRequest
 from labctl.stop.latch import StopRequest
 from labctl.store import Store, open_store
 

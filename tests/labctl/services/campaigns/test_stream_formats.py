@@ -12,8 +12,8 @@ from instruments.bench import open_bench
 from instruments.bench_config import read_bench
 from instruments.clock import VirtualClock
 from instruments.protocols.stream_formats.document import shipped_formats
+from labctl.answers.campaigns import StartRequest
 from labctl.services.campaigns.execution import run_here
-from labctl.services.schemas.campaigns import StartRequest
 from labctl.store import open_store
 
 

@@ -9,8 +9,8 @@ import pytest
 import tomli_w
 
 from instruments.bench_config import read_bench
+from labctl.answers.campaigns import StartRequest
 from labctl.services.campaigns.execution import run_here
-from labctl.services.schemas.campaigns import StartRequest
 from labctl.store import open_store
 
 DURATION_S = 10.0  #: of a data set of the recipe "short"

@@ -15,13 +15,13 @@ from instruments.clock import VirtualClock
 from instruments.drivers.arrick_c4 import ArrickC4
 from instruments.drivers.resolution import resolve
 from instruments.standards import MEASURED_STEP_CLOCK
+from labctl.answers.campaigns import ResumeRequest
 from labctl.fitting import fit
 from labctl.recording import RecordingInfo
 from labctl.services.benches.standards import standards_of
 from labctl.services.campaigns.execution import run
 from labctl.services.campaigns.preparation import prepare
 from labctl.services.campaigns.resume import prepare_resume
-from labctl.services.schemas.campaigns import ResumeRequest
 from labctl.store import open_store
 from procedures.contracts.control import Control
 from procedures.monitoring.step_clock import CERTAIN, coverage_factor

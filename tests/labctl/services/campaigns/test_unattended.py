@@ -17,6 +17,7 @@ from typer.testing import CliRunner
 from instruments.bench_config import BenchFile
 from instruments.clock import SystemClock, VirtualClock
 from instruments.errors import NoReply
+from labctl.answers.campaigns import CampaignRequest, ReasonRequest, StartRequest
 from labctl.cli.app import app
 from labctl.errors import BenchBusy, Conflict, DiskFull, NotEnoughData, Stopped, StoreError
 from labctl.processes.supervisor import Ready
@@ -32,7 +33,6 @@ from labctl.services.commands.service_control import ServiceControl
 from labctl.services.lab_service import LabService
 from labctl.services.planning.loading import load_bench
 from labctl.services.recordings.loading import newest_row
-from labctl.services.schemas.campaigns import CampaignRequest, ReasonRequest, StartRequest
 from labctl.store import Store, open_store
 from labctl.store.connection.database import Database
 from labctl.store.paging import PageRequest

@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
+from labctl.answers.certificates import OrderedConformity
 from labctl.certificates.document import AnyAxisResult, ResultPoint
 from labctl.fitting.uncertainty.budget import Budget, BudgetLine
 from labctl.services.certificates.conformity import NoAcceptance, NoDecision, conformity, specific_risk
 from labctl.services.certificates.evidence import Errors, VerifiedError
-from labctl.services.schemas.documents.certificates import OrderedConformity
 
 OWN = {"specification": "S", "about": "own axis"}
 

@@ -13,12 +13,12 @@ from pathlib import Path
 import pytest
 
 from instruments.standards import Standard
+from labctl.answers.certificates import CertificateRequest
 from labctl.errors import BadInput, NotFound
 from labctl.recording import Recording
 from labctl.services.certificates.issue import CertificateRefused, issue
 from labctl.services.certificates.missing import MissingFacts
 from labctl.services.certificates.served import certificate_file, list_certificates
-from labctl.services.schemas.documents.certificates import CertificateRequest
 from labctl.store import Store, copy_database, open_store
 from tests.helpers.certificates import AT, ORDER, SERIAL, add_version, issued, request, simulated
 

@@ -12,6 +12,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 
+from labctl.answers.calibrations import FitRequest
 from labctl.calibration import read_calibration
 from labctl.certificates.document import Certificate
 from labctl.certificates.readable import readable_certificate
@@ -22,7 +23,6 @@ from labctl.services.calibrations.served import calibration_file
 from labctl.services.calibrations.uncertainty import uncertainty_answer
 from labctl.services.certificates.issue import issue
 from labctl.services.datasheet.sheet import datasheet
-from labctl.services.schemas.calibrations import FitRequest
 from labctl.store import Store, open_store
 from tests.helpers.certificates import AT, request
 from tests.helpers.simulated_recordings import three_axes

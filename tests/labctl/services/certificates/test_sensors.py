@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 from dcclib.validation import SchematronValidator
 
+from labctl.answers.certificates import OrderedAccelerometer
+from labctl.answers.sensors import AccelerometerRequest, MagnetometerRequest
 from labctl.certificates.document import Certificate, SensorResult
 from labctl.certificates.readable import readable_certificate
 from labctl.errors import BadInput, NotFound
@@ -23,8 +25,6 @@ from labctl.services.certificates.missing import MissingFacts
 from labctl.services.certificates.sensors import accelerometer_result
 from labctl.services.magnetometer import Source as FieldSource
 from labctl.services.magnetometer import magnetometer_of_file
-from labctl.services.schemas.documents.certificates import OrderedAccelerometer
-from labctl.services.schemas.sensors import AccelerometerRequest, MagnetometerRequest
 from labctl.services.sensor_versions import keep_accelerometer, keep_magnetometer, measured_data, one_accelerometer
 from labctl.store import Store, open_store
 from studies.accelerometer_simulation import TrueUnit, poses_at_temperatures

@@ -14,12 +14,12 @@ import pytest
 import tomli_w
 from cryptography.hazmat.primitives.hashes import SHA256
 
+from labctl.answers.certificates import SignatoryResponse, WithdrawRequest
 from labctl.errors import BadInput
 from labctl.services.admin.seal_keys import refuse_unusable_keys
 from labctl.services.certificates.issue import CertificateRefused, issue, withdraw
 from labctl.services.certificates.served import list_certificates
 from labctl.services.certificates.verification import verify_file
-from labctl.services.schemas.documents.certificates import SignatoryResponse, WithdrawRequest
 from labctl.store import CertificateForms, Store, copy_database, open_store
 from tests.helpers.certificates import AT, ORDER, SERIAL, add_version, issued, request
 from tests.helpers.lab import Lab

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.stats import t as student
 
+from labctl.answers.calibrations import FitRequest
 from labctl.certificates.document import Certificate
 from labctl.errors import BadInput
 from labctl.recording import Recording, to_points
@@ -23,7 +24,6 @@ from labctl.services.calibrations.stability import (
     years_until,
 )
 from labctl.services.certificates.issue import issue
-from labctl.services.schemas.calibrations import FitRequest
 from labctl.store import Store, open_store
 from tests.helpers.certificates import AT, SERIAL, request, simulated
 from tests.helpers.simulated_recordings import three_axes

@@ -14,6 +14,8 @@ import sqlalchemy as sa
 from alembic import command
 
 from labctl.acting_user import Actor, acting
+from labctl.answers.certificates import CertificateRequest, WithdrawRequest
+from labctl.answers.certification import RevokeRequest
 from labctl.cli.printing.certificates import state_text
 from labctl.errors import Conflict, NotFound
 from labctl.services.calibrations.certification import revoke
@@ -22,8 +24,6 @@ from labctl.services.certificates.address import HASH_DIGITS
 from labctl.services.certificates.issue import CertificateRefused, issue, withdraw
 from labctl.services.certificates.served import certificate_file, public_certificate
 from labctl.services.certificates.states import certificate_by_number, list_certificates
-from labctl.services.schemas.certification import RevokeRequest
-from labctl.services.schemas.documents.certificates import CertificateRequest, WithdrawRequest
 from labctl.store import Store, check, copy_database, migrate, migrate_database, open_store
 from labctl.withdrawal import HEADER, Withdrawn, read_withdrawn
 from tests.helpers.certificates import AT, SERIAL, add_version, request

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from labctl.answers.calibrations import FitRequest
 from labctl.calibration import read_calibration
 from labctl.certificates.document import Certificate
 from labctl.compensator import Compensator
@@ -21,7 +22,6 @@ from labctl.services.calibrations.uncertainty import budgets_at
 from labctl.services.certificates.evidence import NotVerified
 from labctl.services.certificates.issue import issue
 from labctl.services.planning.loading import limits_of, load_bench, load_recipe
-from labctl.services.schemas.calibrations import FitRequest
 from labctl.services.simulation.plan_simulation import hidden_recording
 from labctl.store import Store, open_store
 from procedures.planning.plan import make_plan

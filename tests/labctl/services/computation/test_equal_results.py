@@ -7,6 +7,8 @@ from pathlib import Path
 import pytest
 
 from instruments.clock import VirtualClock
+from labctl.answers.calibrations import FitRequest, ImproveRequest
+from labctl.answers.certification import CertifyRequest
 from labctl.processes.web_process import WORKER_MODULES
 from labctl.recording import write_recording
 from labctl.services.calibrations.certification import list_certifications
@@ -16,8 +18,6 @@ from labctl.services.commands.requests import RecordingFolder, ToNewestOrVersion
 from labctl.services.computation import InThreads, InWorkers, Limits
 from labctl.services.criticism.criticise import criticise_unit, residuals_unit
 from labctl.services.lab_service import LabService
-from labctl.services.schemas.calibrations import FitRequest, ImproveRequest
-from labctl.services.schemas.certification import CertifyRequest
 from labctl.store import open_store
 from tests.helpers.computations import Writable
 from tests.helpers.simulated_recordings import single_axis

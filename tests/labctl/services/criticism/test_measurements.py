@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from labctl.answers.calibrations import FitRequest
 from labctl.fitting.data.static_record import static_record
 from labctl.recording import Recording, RecordingInfo
 from labctl.services import forked
@@ -18,7 +19,6 @@ from labctl.services.calibrations.fitting import fit_unit
 from labctl.services.criticism.criticise import criticise_unit
 from labctl.services.criticism.decimated_readings import read_recording_of
 from labctl.services.recordings.loading import points_of
-from labctl.services.schemas.calibrations import FitRequest
 from labctl.store import open_store
 from labctl.store.repositories.recordings import Recordings
 from tests.helpers.simulated_recordings import single_axis

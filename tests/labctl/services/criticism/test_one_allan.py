@@ -10,11 +10,11 @@ import allantools
 import numpy as np
 import pytest
 
+from labctl.answers.calibrations import FitRequest
 from labctl.recording import Recording, RecordingInfo
 from labctl.services.calibrations.fitting import fit_unit
 from labctl.services.criticism.criticise import criticise_unit
 from labctl.services.recordings.allan import allan_unit
-from labctl.services.schemas.calibrations import FitRequest
 from labctl.store import Store, open_store
 
 AT = datetime(2027, 3, 1, 12, tzinfo=UTC)

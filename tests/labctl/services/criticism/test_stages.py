@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
+from labctl.answers.calibrations import FitRequest
 from labctl.progress import Cancelled, reporting_to
 from labctl.services.calibrations.fitting import fit_unit
 from labctl.services.criticism.criticise import criticise_unit
-from labctl.services.schemas.calibrations import FitRequest
 from labctl.store import Store, open_store
 from tests.helpers.simulated_recordings import single_axis
 

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from labctl.answers.calibrations import FitRequest
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.recording import Recording, to_points
 from labctl.services.calibrations.fitting import fit_unit
 from labctl.services.criticism.verification.of_version import verify_unit
 from labctl.services.datasheet.measured import figures_of
 from labctl.services.planning.loading import limits_of, load_bench, load_recipe
-from labctl.services.schemas.calibrations import FitRequest
 from labctl.services.simulation.plan_simulation import hidden_recording
 from labctl.store import open_store
 from procedures.planning.plan import make_plan

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from labctl.answers.ladder import LadderResponse
 from labctl.compensator import Compensator
 from labctl.recording import read_recording, to_points, write_recording
-from labctl.services.schemas.reports.ladder import LadderResponse
 from tests.helpers.lab import Lab
 from tests.helpers.simulated_recordings import single_axis
 

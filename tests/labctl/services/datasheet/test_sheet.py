@@ -12,13 +12,13 @@ from scipy.linalg import polar
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner
 
+from labctl.answers.datasheet import Characteristic, DatasheetResponse
 from labctl.cli.app import app
 from labctl.errors import BadInput, NotFound
 from labctl.fitting.data.fit_data import fit_data_of
 from labctl.recording import Recording
 from labctl.services.datasheet.measured import figures_of
 from labctl.services.datasheet.sheet import LINES, datasheet, decided
-from labctl.services.schemas.reports.datasheet import Characteristic, DatasheetResponse
 from labctl.store import Store, open_store
 from tests.helpers.recordings import STARTED, Triaxial
 from tests.helpers.service import add_recording, open_client

@@ -10,6 +10,10 @@ from pathlib import Path
 import pytest
 
 from instruments.clock import SystemClock, VirtualClock
+from labctl.answers.calibrations import FitRequest
+from labctl.answers.campaigns import CampaignRequest, StartRequest
+from labctl.answers.certification import CertifyRequest
+from labctl.answers.drafts import DraftResponse, DraftsRequest
 from labctl.errors import BadInput, Conflict
 from labctl.services.calibrations.certification import certify, version_in_force
 from labctl.services.calibrations.fitting import fit_unit
@@ -25,10 +29,6 @@ from labctl.services.lab_service import LabService
 from labctl.services.planning.fit_rules import check_fit
 from labctl.services.planning.loading import load_bench
 from labctl.services.schedule.queue import add_start, start_status
-from labctl.services.schemas.calibrations import FitRequest
-from labctl.services.schemas.campaigns import CampaignRequest, StartRequest
-from labctl.services.schemas.certification import CertifyRequest
-from labctl.services.schemas.reports.drafts import DraftResponse, DraftsRequest
 from labctl.store import Store, open_store
 from labctl.store.connection.database import Database
 from procedures.contracts.errors import RecipeError

@@ -11,6 +11,8 @@ import numpy as np
 import pytest
 
 from instruments.clock import VirtualClock
+from labctl.answers.campaigns import CampaignRequest
+from labctl.answers.live import LiveEndRequest, LiveRequest, LiveStateResponse
 from labctl.errors import BadInput, BenchBusy, Conflict, StoreError
 from labctl.fitting.live import PoseRequest
 from labctl.fitting.live.directions import DIRECTIONS, Direction
@@ -20,8 +22,6 @@ from labctl.services.live.assessor import InlineAssessor
 from labctl.services.live.live_sessions import UNWATCHED_S, LiveSessions
 from labctl.services.planning.loading import load_bench
 from labctl.services.recordings.live_folders import usual_folder
-from labctl.services.schemas.campaigns import CampaignRequest
-from labctl.services.schemas.live import LiveEndRequest, LiveRequest, LiveStateResponse
 from labctl.stop.latch import StopRequest
 from labctl.store import Store
 from labctl.store.connection.database import Database

@@ -13,6 +13,7 @@ import pytest
 
 from instruments.clock import VirtualClock
 from instruments.errors import LinkError
+from labctl.answers.live import LiveResponse
 from labctl.errors import BadInput, StoreError
 from labctl.fitting.live import PoseRequest, Target
 from labctl.recording import RecordingInfo, read_recording
@@ -24,7 +25,6 @@ from labctl.services.live.calibrate import calibrate_live
 from labctl.services.live.line_source import LineSource
 from labctl.services.live.source import Block, StreamEnded
 from labctl.services.recordings.live_folders import usual_folder
-from labctl.services.schemas.live import LiveResponse
 from labctl.store import open_store
 from tests.helpers.turned_unit import TurnedUnit
 

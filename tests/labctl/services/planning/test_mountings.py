@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from labctl.answers.calibrations import FitRequest
 from labctl.calibration import read_calibration
 from labctl.fitting.data.mounting_angles import ANGLE_QUANTITIES
 from labctl.recording import to_points
@@ -15,7 +16,6 @@ from labctl.services.calibrations.fitting import fit_unit
 from labctl.services.calibrations.uncertainty import coefficients_at
 from labctl.services.planning.loading import limits_of, load_bench, load_recipe
 from labctl.services.planning.plan_answer import misalignment_outlook
-from labctl.services.schemas.calibrations import FitRequest
 from labctl.services.simulation.plan_simulation import hidden_recording
 from labctl.store import open_store
 from procedures.contracts.steps import Mount

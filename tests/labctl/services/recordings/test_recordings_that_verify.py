@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from labctl.answers.calibrations import FitRequest, ImproveRequest
 from labctl.errors import NotEnoughData
 from labctl.recording import Recording, RecordingInfo, write_recording
 from labctl.services.calibrations.fitting import fit_unit
@@ -20,7 +21,6 @@ from labctl.services.criticism.verification.of_version import verify_unit
 from labctl.services.datasheet.sheet import datasheet
 from labctl.services.recordings.allan import allan_unit
 from labctl.services.recordings.allan_source import allan_of_file, allan_of_unit
-from labctl.services.schemas.calibrations import FitRequest, ImproveRequest
 from labctl.store import Store, open_store
 from tests.helpers.simulated_recordings import single_axis
 

@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 
 from instruments.bench_config import BenchFile
 from instruments.clock import VirtualClock
+from labctl.answers.campaigns import BENCH_CHECKS
 from labctl.api import create_app
 from labctl.cli.app import app
 from labctl.errors import Conflict
@@ -21,7 +22,6 @@ from labctl.services.lab_service import LabService
 from labctl.services.local_bench import LocalBench
 from labctl.services.schedule.queue import cancel_start, list_starts, start_status
 from labctl.services.schedule.scheduler import REAL_BENCH_LATE_LIMIT_S
-from labctl.services.schemas.campaigns import BENCH_CHECKS
 from labctl.store import NewCampaign, Store, StoreJournal, open_store
 from procedures.contracts.campaign_state import CampaignState
 from procedures.contracts.journal import Event

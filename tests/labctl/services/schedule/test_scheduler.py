@@ -10,6 +10,7 @@ import pytest
 from fastapi.testclient import TestClient
 
 from instruments.clock import SystemClock, VirtualClock
+from labctl.answers.campaigns import CampaignRequest
 from labctl.api import create_app
 from labctl.errors import BadInput, BenchBusy, Conflict, DiskFull
 from labctl.services.campaigns.bench_runner import BenchRunner
@@ -19,7 +20,6 @@ from labctl.services.lab_service import LabService
 from labctl.services.local_bench import LocalBench
 from labctl.services.schedule.queue import cancel_start, is_scheduled, list_starts, start_status
 from labctl.services.schedule.scheduler import Scheduler
-from labctl.services.schemas.campaigns import CampaignRequest
 from labctl.store import Store, open_store
 from labctl.store.connection.database import Database
 from procedures.contracts.errors import PlanRefused

@@ -14,6 +14,7 @@ import pytest
 from instruments.bench_config import BenchFile
 from instruments.clock import VirtualClock
 from instruments.standards import Standard
+from labctl.answers.calibrations import FitRequest
 from labctl.calibration import read_calibration
 from labctl.errors import Conflict
 from labctl.recording import RecordingInfo
@@ -25,7 +26,6 @@ from labctl.services.campaigns.preparation import prepare
 from labctl.services.certificates.issue import issue
 from labctl.services.certificates.served import certificate_file
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.calibrations import FitRequest
 from labctl.services.standards.agreement import as_used, differences, with_register
 from labctl.services.standards.register import one_standard
 from labctl.store import Store, open_store

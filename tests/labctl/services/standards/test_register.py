@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 from pydantic import ValidationError
 
+from labctl.answers.standards import StandardCertificateRequest, WithdrawFindingRequest
 from labctl.errors import BadInput, Conflict, NotFound
 from labctl.metrology.control_chart import LEAST_HISTORY
-from labctl.services.schemas.standards import StandardCertificateRequest, WithdrawFindingRequest
 from labctl.services.standards.register import add_certificate, count_by_state, one_standard, withdraw_finding
 from labctl.services.standards.usage import affected
 from labctl.store import Store, open_store

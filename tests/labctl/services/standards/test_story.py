@@ -13,14 +13,14 @@ from typing import Any
 
 import pytest
 
+from labctl.answers.certification import CertifyRequest
+from labctl.answers.standards import StandardResponse, WithdrawFindingRequest
 from labctl.errors import CertificationRefused, Conflict
 from labctl.services.calibrations.certification import certify
 from labctl.services.calibrations.fitting import list_calibrations, one_version
 from labctl.services.certificates import issue as issuing
 from labctl.services.certificates.issue import CertificateRefused, issue
 from labctl.services.certificates.served import certificate_file, list_certificates, public_certificate
-from labctl.services.schemas.certification import CertifyRequest
-from labctl.services.schemas.standards import StandardResponse, WithdrawFindingRequest
 from labctl.services.standards.register import one_standard, withdraw_finding
 from labctl.services.standards.usage import affected
 from labctl.services.units import unit

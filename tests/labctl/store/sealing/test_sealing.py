@@ -17,6 +17,8 @@ from hypothesis import strategies as st
 
 from instruments.clock import VirtualClock
 from instruments.errors import NoReply
+from labctl.answers.calibrations import FitRequest
+from labctl.answers.campaigns import ResumeRequest
 from labctl.errors import Conflict, LabctlError
 from labctl.recording import Recording
 from labctl.services.calibrations.fitting import fit_unit
@@ -24,8 +26,6 @@ from labctl.services.campaigns.execution import run
 from labctl.services.campaigns.preparation import Prepared, prepare
 from labctl.services.campaigns.resume import prepare_resume
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.calibrations import FitRequest
-from labctl.services.schemas.campaigns import ResumeRequest
 from labctl.store import DraftEvent, Store, check, copy_database, open_store
 from labctl.store.connection.database import Database
 from labctl.store.manifests.digests import digest_of_rows

@@ -10,14 +10,14 @@ from pathlib import Path
 import pytest
 
 from instruments.clock import VirtualClock
+from labctl.answers.admin import KeyRequest, Role
+from labctl.answers.calibrations import FitRequest
 from labctl.services.admin.seal_keys import create_seal_key
 from labctl.services.campaigns.execution import run
 from labctl.services.campaigns.preparation import prepare
 from labctl.services.commands.registry import CREATE_KEY, FIT, IMPORT_RECORDING
 from labctl.services.commands.requests import RecordingFolder, ToUnit
 from labctl.services.planning.loading import load_bench
-from labctl.services.schemas.admin import KeyRequest, Role
-from labctl.services.schemas.calibrations import FitRequest
 from labctl.store import Checked, PublicKey, check, open_store, read_public_key
 from labctl.store.connection.anchor_file import anchor_path, write_anchor
 from tests.helpers.certifying import REASON

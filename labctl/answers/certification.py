@@ -1,0 +1,215 @@
+"""Certification of a version: the request, the act as it was kept, and the assessment before it."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from typing import Literal
+
+from pydantic import Field
+from typing_extensions import TypedDict
+
+from labctl.answers.base import BY_KEY, Request, ResponseModel
+from labctl.answers.common_fields import (
+    ActTime,
+    CalibrationHash,
+    FittedRms,
+    HeldoutRms,
+    NoiseFloor,
+    Person,
+    RawRms,
+    Reason,
+    Serial,
+    VersionNumber,
+)
+
+DueSource = Literal["user", "recipe", "configuration"]
+DUE_FROM = "Source of the number of days; null: no number is given, and there is no due date."
+WHEN = "Time of the verdict, which is the time of the certification."
+NO_VERDICT = (
+    "Verdict of the newest criticism of the version on the recording that it was fitted to; null: none, see "
+    "`verdict_reason`."
+)
+
+
+class RevokeRequest(Request):
+    """Who revokes a version, and why."""
+
+    by: Person = Field(min_length=1)
+    reason: Reason = Field(min_length=1)
+    due_days: int | None = Field(
+        default=None,
+        ge=0,
+        le=36_500,
+        description="Only for a certification: days until the next calibration is due; 0: no due date; absent: "
+        "the number in the recipe (`recalibrate_after_days`), else in the service ($LABCTL_DUE_DAYS), else no "
+        "due date.",
+    )
+
+
+class CertifyRequest(RevokeRequest):
+    """Who certifies a version, and why."""
+
+    override: bool = Field(
+        default=False, description="Certify although there are objections; the reason must then be a sentence."
+    )
+
+
+class ReleaseRequest(Request):
+    """Who releases, as the second person, what a first one asked to certify, and why."""
+
+    by: Person = Field(min_length=1)
+    reason: Reason = Field(min_length=1)
+
+
+class ReleaseRequestResponse(ResponseModel):
+    """A version that waits for its release by a second person; it is not in force yet."""
+
+    serial: Serial
+    version: VersionNumber
+    by: Person
+    by_key: str = Field(description="Name of the API key of the first person; the second needs another one.")
+    reason: Reason
+    at: ActTime
+    due_days: int | None = Field(
+        description="Days until the next calibration is due, as the first person asked for; 0: no due date; null: "
+        "by recipe or service."
+    )
+    override: bool = Field(description="Whether the version is to be certified although there are objections.")
+    waits_for_release: Literal[True] = Field(
+        default=True, description="Always true: the version is not in force before a second person releases it."
+    )
+
+
+class Objection(TypedDict):
+    """One objection to certifying a version."""
+
+    what: Literal["verdict", "worse", "data", "standard"]
+    """verdict: the model lacks something, or there is no verdict; worse: an error without compensation or of another
+    version is smaller; data: the data are certainly wrong; standard: a reference standard was bad."""
+    text: str
+    """The objection, with figures in deg/s."""
+    do: str
+    """What to do instead of certifying the version."""
+
+
+class JudgementDetail(TypedDict, total=False):
+    """What is stored beside a verdict."""
+
+    verdict_reason: str
+    """Why there is no verdict; empty if there is one."""
+    verdict_text: str
+    """The verdict in words; empty if there is none."""
+    error: dict[str, float | None]
+    """Name -> RMS error that the version states, deg/s; null: unknown."""
+    objections: list[Objection]
+    """Objections that were overridden; empty: none."""
+    due_from: str | None
+    """Where the due date is from; null: no due date."""
+
+
+class CertifiedErrors(ResponseModel):
+    """Errors that a version states, deg/s."""
+
+    raw_rms_dps: RawRms = None
+    rms_dps: FittedRms = None
+    heldout_rms_dps: HeldoutRms = None
+    noise_floor_dps: NoiseFloor = None
+
+
+class AssessmentResponse(ResponseModel):
+    """What is known of a version when it is to be certified."""
+
+    serial: Serial
+    version: VersionNumber
+    verdict: str | None = Field(description=NO_VERDICT)
+    verdict_reason: str = Field(description="Why there is no verdict; empty if there is one.")
+    verdict_recording: int | None = Field(description="Recording that the verdict is of; null: there is no verdict.")
+    verdict_text: str = Field(description="The verdict in words; empty if there is none.")
+    error: CertifiedErrors = Field(description="Errors that the version states, deg/s.")
+    objections: list[Objection] = Field(description="Objections to certifying the version; empty: none.")
+    override_needed: bool = Field(description="Whether the version can be certified only with `override`.")
+    least_reason_characters: int = Field(description="Smallest number of characters of the reason for an override.")
+    least_reason_words: int = Field(description="Smallest number of words of the reason for an override.")
+    due_days: int | None = Field(
+        description="Days for which a certification is valid if the request gives no number; null: no due date."
+    )
+    due_from: DueSource | None = Field(description=DUE_FROM)
+
+
+class FetchResponse(ResponseModel):
+    """Who fetched a version over HTTP: one entry for each key, and one for all who sent none."""
+
+    who: str = Field(description="Name of the API key; anonymous: no key was sent.")
+    first_at: datetime = Field(description="Time of the first fetch.")
+    last_at: datetime = Field(description="The last fetch; if the service was killed, up to an hour too early.")
+
+
+class WithdrawnResponse(ResponseModel):
+    """When, by whom and why a version or its certificate was withdrawn."""
+
+    at: ActTime
+    by: Person
+    reason: Reason
+    certificate: str = Field(description="Number of the certificate; empty: the version was revoked.")
+
+
+class CalibrationStateResponse(ResponseModel):
+    """State of a version whose file a program holds, found by the hash of its calibration."""
+
+    serial: Serial
+    version: VersionNumber
+    calibration_hash: CalibrationHash
+    state: Literal["in-force", "superseded", "revoked", "not-certified"] = Field(
+        description="in-force: the unit's certified version; superseded: another version was certified later; "
+        "revoked: its certification was revoked; not-certified: it was never certified."
+    )
+    due: datetime | None = Field(description="Date until which the certification is valid; null: no date.")
+    withdrawn: WithdrawnResponse | None = Field(
+        description="The version was revoked, or its certificate was withdrawn after the version was certified last."
+    )
+    in_force: int | None = Field(description="Version of the unit that is in force; null: none.")
+
+
+class CertificationResponse(ResponseModel):
+    """A certification or its revocation; without a verdict's keys for a revocation and before verdicts were kept."""
+
+    serial: Serial
+    version: VersionNumber
+    act: Literal["certify", "revoke"] = Field(
+        description="Whether the version was certified or its certification revoked."
+    )
+    by: Person
+    by_key: str | None = Field(default=None, description=BY_KEY)
+    reason: Reason
+    at: ActTime
+    due: datetime | None = Field(
+        default=None, description="Time until which the certification is valid; null: no due date."
+    )
+    due_from: DueSource | None = Field(default=None, description=DUE_FROM)
+    verdict: str | None = Field(default=None, description=NO_VERDICT)
+    verdict_reason: str | None = Field(default=None, description="Why there is no verdict; empty if there is one.")
+    verdict_recording: int | None = Field(
+        default=None, description="Recording that the verdict is of; null: there is no verdict."
+    )
+    verdict_at: datetime | None = Field(default=None, description=WHEN)
+    verdict_text: str | None = Field(default=None, description="The verdict in words.")
+    error: CertifiedErrors | None = Field(
+        default=None, description="Errors that the version stated at its certification, deg/s; null: not kept."
+    )
+    override: bool | None = Field(
+        default=None, description="Whether the version was certified although there were objections."
+    )
+    objections: list[Objection] = Field(
+        default_factory=list, description="Objections to certifying the version at that time; empty: none."
+    )
+    released_by: str | None = Field(default=None, description="The second person; null: none was needed.")
+    released_key: str | None = Field(default=None, description="Name of the API key of the second person.")
+    release_reason: str | None = Field(
+        default=None, description="Reason that the second person gave; null: none was needed."
+    )
+    withdrawn_certificates: list[str] = Field(
+        default_factory=list, description="Only in the answer to a revocation: certificates that it withdrew."
+    )
+    fetched_by: list[FetchResponse] = Field(
+        default_factory=list, description="Only in the answer to a revocation: who has to be notified."
+    )

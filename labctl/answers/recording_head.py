@@ -1,0 +1,66 @@
+"""Parts of the head of a recording that requests and answers state too: axes, motion, outputs, readings left out."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+Axis = Literal["x", "y", "z"]
+#: What moves the unit, and so what its true rate is known from: `rates` a table, at one rate in each data set; `rest`
+#: nothing; `turns` a hand or a table, by a known angle in each data set; `profile` a table whose rate changes and is
+#: known reading by reading; `poses` a hand, between rests that gravity distinguishes.
+Motion = Literal["rates", "rest", "turns", "profile", "poses"]
+
+#: Units that are rates already: what one deg/s is in them.
+RATE_UNITS = {"deg/s": 1.0, "rad/s": math.pi / 180.0, "deg/h": 3600.0}
+
+
+class OutputUnit(BaseModel):
+    """How a gyro column becomes a rate: rate_dps = (column - offset) / scale.
+
+    For deg/s, rad/s and deg/h both have defaults; for V, mV, count and arb the nominal scale must be given.
+    """
+
+    model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True)
+
+    unit: Literal["deg/s", "rad/s", "deg/h", "V", "mV", "count", "arb"] = Field(
+        default="deg/s", description="Unit of the gyro column."
+    )
+    offset: float = Field(default=0.0, description="Value of the column at rate 0, in `unit`.")
+    scale: float = Field(
+        default=1.0,
+        description="Change of the column per deg/s, in `unit`, not 0; default for deg/s, rad/s and deg/h: that of "
+        "the unit.",
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _default_scale(cls, given: Any) -> Any:
+        if isinstance(given, dict) and "scale" not in given:
+            unit = given.get("unit", "deg/s")
+            if unit in RATE_UNITS:
+                return {**given, "scale": RATE_UNITS[unit]}
+            raise ValueError(f"unit {unit!r} needs a scale: the output's change, in that unit, per deg/s")
+        return given
+
+    @model_validator(mode="after")
+    def _usable(self) -> OutputUnit:
+        if self.scale == 0 or not math.isfinite(self.scale) or not math.isfinite(self.offset):
+            raise ValueError(
+                f"scale = {self.scale} and offset must be finite numbers, and scale must not be 0; correct them"
+            )
+        return self
+
+
+class LeftOut(BaseModel):
+    """Readings that were left out by choice when a recording was imported: they are marked with valid = 0."""
+
+    model_config = ConfigDict(defer_build=True, extra="forbid", frozen=True)
+
+    what: str = Field(description="Kind of the finding, as a fixed word for programs, such as spikes.")
+    channel: str = Field(default="", description="Column whose readings were left out; empty: the whole rows.")
+    n: int = Field(ge=0, description="Number of readings that were left out.")
+    of: int = Field(ge=0, description="Number of readings of the recording.")
+    why: str = Field(description="What was found, in words.")

@@ -1,0 +1,40 @@
+"""Rows of the database as records: each column goes to the field of its name, never by its place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import fields
+from typing import TYPE_CHECKING, TypeVar
+
+import sqlalchemy as sa
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+RecordT = TypeVar("RecordT", bound="DataclassInstance")
+RowT = TypeVar("RowT", bound=tuple[object, ...])
+
+
+def records_of(kind: type[RecordT], found: sa.Result[RowT]) -> list[RecordT]:
+    """Return the rows of a query as records. Raises TypeError where its columns are not the record's fields."""
+    _check_columns(kind, found.keys())
+    make: Callable[..., RecordT] = kind
+    return [make(**row) for row in found.mappings()]
+
+
+def record_of(kind: type[RecordT], row: sa.RowMapping) -> RecordT:
+    """Return a row, as a mapping, as a record. Raises TypeError where its columns are not the record's fields."""
+    _check_columns(kind, list(row))
+    make: Callable[..., RecordT] = kind
+    return make(**row)
+
+
+def _check_columns(kind: type[RecordT], columns: Iterable[object]) -> None:
+    given, wanted = [str(name) for name in columns], [field.name for field in fields(kind)]
+    missing, unknown = [name for name in wanted if name not in given], [name for name in given if name not in wanted]
+    if missing or unknown:
+        said = [f"lacks column {', '.join(missing)}"] if missing else []
+        said += [f"has column {', '.join(unknown)}, which is no field of it"] if unknown else []
+        raise TypeError(
+            f"a query for {kind.__name__} {' and '.join(said)}; select one column for each field, and label it so"
+        )
