@@ -15,6 +15,7 @@ from instruments.clock import VirtualClock, WallClock
 from labctl.acting_user import Actor, acting
 from labctl.errors import BenchSilent, Conflict, NotFound
 from labctl.processes.bench_calls import BenchCalls
+from labctl.processes.bench_forms import form_of
 from labctl.processes.calls import CallServer
 from labctl.processes.driver_note import DriverNoteWriter
 from labctl.processes.held_address import HeldAddress
@@ -45,7 +46,7 @@ def folder(tmp_path: Path) -> Iterator[Path]:
         address = HeldAddress(local.request_stop, local.describe_running)
         supervision = Supervision(settings, store, waker, lambda: False, address)
         calls = BenchCalls(store, local, supervision, address, WallClock())
-        servers = StopServer(tmp_path / STOP, local.request_stop), CallServer(tmp_path / CALLS, calls.answer)
+        servers = StopServer(tmp_path / STOP, local.request_stop), CallServer(tmp_path / CALLS, calls.answer, form_of)
         DriverNoteWriter(settings, store, local).write(settings)
         for server in servers:
             server.start()
@@ -122,4 +123,4 @@ def test_a_bench_process_that_was_never_heard_is_silent_and_unconfirmed(tmp_path
     assert described is not None
     assert described.name == BENCH.name
     with pytest.raises(BenchSilent):
-        RemoteWriter(tmp_path).run("Audit.record", (), {})
+        RemoteWriter(tmp_path).run("Fetches.record", ([],), {})
