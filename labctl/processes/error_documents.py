@@ -29,7 +29,7 @@ def _errors_of(module: ModuleType) -> dict[str, type[Exception]]:
 
 #: Every kind that is made again at the other end, by its name. Another one arrives as the nearest of its bases.
 KINDS: dict[str, type[Exception]] = {
-    **{kind.__name__: kind for kind in (ValueError, TypeError, KeyError, OSError, MemoryError, OtherProcessFailed)},
+    **{kind.__name__: kind for kind in (ValueError, TypeError, KeyError, OSError, OtherProcessFailed)},
     **_errors_of(instruments.errors),
     **_errors_of(procedures.contracts.errors),
     **_errors_of(labctl.errors),

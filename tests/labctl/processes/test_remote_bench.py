@@ -7,6 +7,7 @@ import pickle
 import threading
 from collections.abc import Iterator
 from datetime import UTC, datetime
+from multiprocessing.connection import Client
 from pathlib import Path
 
 import pytest
@@ -114,6 +115,19 @@ def test_a_campaign_is_started_followed_and_aborted_from_the_web_process(store: 
             service.execute(ABORT_CAMPAIGN, ToCampaign(campaign, ReasonRequest(reason="tea")))
     finally:
         service.close()
+
+
+def test_a_bench_process_that_is_sent_what_is_no_call_goes_on(store: Store, folder: Path) -> None:
+    transaction = pickle.dumps(("store.Audit.record", (AT, "backup", "x", {})))
+    for sent in (transaction, b'[{"call":"store.Audit.rows","actor":{"name":"Eve"}}]\n[[]]', b"\x80\x05."):
+        with Client(str(folder / CALLS), "AF_UNIX") as line:
+            line.send_bytes(sent)
+            assert line.recv_bytes().startswith(b"raised\n")
+            with pytest.raises(EOFError):
+                line.recv_bytes()
+    assert store.audit.rows() == []
+    store.audit.record(AT, "backup", "copy.sqlite", {})
+    assert [row.action for row in store.audit.rows()] == ["backup"]
 
 
 def test_a_bench_process_that_was_never_heard_is_silent_and_unconfirmed(tmp_path: Path) -> None:
