@@ -56,7 +56,9 @@ def test_every_transaction_gets_what_was_given(name: str, monkeypatch: pytest.Mo
 
 
 ASKED: dict[str, tuple[object, ...]] = {
-    "start": (CampaignStart(CampaignRequest(recipe="short", checks=["table_free"]), simulated_start=AT, wire_log=Path("é")),),
+    "start": (
+        CampaignStart(CampaignRequest(recipe="short", checks=["table_free"]), simulated_start=AT, wire_log=Path("é")),
+    ),
     "schedule": (CampaignStart(CampaignRequest(recipe="short"), "bench", 2.0, 7),),
     "resume": (CampaignResume(None, ResumeRequest(by="Ada")), CampaignResume(3, ResumeRequest(by="Ada", reason="on"))),
     "abort": (ToCampaign(1, ReasonRequest(reason='a "reason"')), ToCampaign(2**40, ReasonRequest(reason="x"))),
