@@ -1,10 +1,10 @@
 """uvicorn's HTTP protocol with bounds: on headers in size and time, on stalled bodies and readers, on connections.
 
 The parser behind it (httptools) bounds nothing: a header that never ends is collected, piece after piece, without end.
-uvicorn's own bounds are for its other parser (`h11_max_incomplete_event_size`, which is several times slower), or count
-requests and not connections (`limit_concurrency`), or begin after a request (`timeout_keep_alive`): none ends a header
-that stands still. So this module uses names of uvicorn that its documentation does not have;
-tests/labctl/api/test_uvicorn_names.py lists them, and pyproject.toml keeps uvicorn at the minor release that they are of.
+uvicorn's own bounds are for its other parser, which is several times slower (`h11_max_incomplete_event_size`), or
+count requests (`limit_concurrency`), or begin after a request (`timeout_keep_alive`): none ends a header that stands
+still. So this module uses names of uvicorn that its documentation does not have. The tests list them
+(tests/labctl/api/test_uvicorn_names.py), and pyproject.toml keeps uvicorn at the minor release that they are of.
 """
 
 from __future__ import annotations

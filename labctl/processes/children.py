@@ -67,7 +67,7 @@ class Child:
         Raises Failed, too, once `gives_up` returns True.
         """
         try:
-            self.line.send_bytes(Form(type(settings), "the settings of a process").encode(settings))
+            self.line.send_bytes(Form[object](type(settings), "the settings of a process").encode(settings))
             while not self.line.poll(LOOK_S):
                 if gives_up():
                     raise Failed(f"the {self.name} was not ready when it was asked to end; start the service again")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import types
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import UTC, date, datetime, timedelta
 from enum import Enum
 from pathlib import Path
@@ -30,6 +30,25 @@ PLAIN: dict[Any, tuple[object, ...]] = {
 }
 
 
+def _tuple(inner: list[list[Any]], repeats: bool) -> tuple[Any, ...]:
+    return tuple(inner[0]) if repeats else tuple(each[0] for each in inner)
+
+
+def _mapping(inner: list[list[Any]], _: bool) -> dict[str, Any]:
+    return {f"key {n}": value for n, value in enumerate(inner[1])}
+
+
+def _list(inner: list[list[Any]], _: bool) -> list[Any]:
+    return inner[0]
+
+
+#: Generic -> what makes one of the examples of its arguments, and whether they end with "...".
+COLLECTIONS: dict[Any, Callable[[list[list[Any]], bool], Any]] = {
+    tuple: _tuple, list: _list, Sequence: _list, dict: _mapping, Mapping: _mapping,
+    frozenset: lambda inner, _: frozenset(inner[0]),
+}  # fmt: skip
+
+
 def examples(kind: Any) -> Iterator[Any]:
     """Yield values of a type, at least one for each alternative of it. Raises TypeError for a type that it has not."""
     origin, args = get_origin(kind), get_args(kind)
@@ -44,15 +63,8 @@ def examples(kind: Any) -> Iterator[Any]:
         yield from examples(args[0])
     elif isinstance(kind, type) and issubclass(kind, Enum):
         yield from kind
-    elif origin is tuple:
-        inner = [list(examples(each)) for each in args if each is not Ellipsis]
-        yield tuple(inner[0]) if Ellipsis in args else tuple(each[0] for each in inner)
-    elif origin in (list, Sequence):
-        yield list(examples(args[0]))
-    elif origin is frozenset:
-        yield frozenset(examples(args[0]))
-    elif origin in (dict, Mapping):
-        yield {f"key {n}": value for n, value in enumerate(examples(args[1]))}
+    elif origin in COLLECTIONS:
+        yield COLLECTIONS[origin]([list(examples(each)) for each in args if each is not Ellipsis], Ellipsis in args)
     else:
         yield from _records(kind)
 

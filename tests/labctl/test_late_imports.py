@@ -1,4 +1,4 @@
-"""What few uses need is loaded by them alone: the reproduction of papers by its command, not by a service or another."""
+"""What few uses need is loaded by them alone: the reproduction of papers by its command, and by no service."""
 
 from __future__ import annotations
 

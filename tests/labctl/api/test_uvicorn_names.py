@@ -1,9 +1,10 @@
 """The names of uvicorn that the bounded protocol uses and uvicorn's documentation does not have.
 
-A new release of uvicorn may change each of them without notice. When a test fails after an update: read the changes of
-`uvicorn/protocols/http/httptools_impl.py` and `flow_control.py` between the two releases, adapt
-`labctl/api/http_protocol.py`, correct the lists below, run tests/labctl/api/test_bounded_http.py,
-tests/labctl/api/test_hostile_requests.py and tests/system/test_connection_attacks.py, and set `MINOR` to the new release.
+A new release of uvicorn may change each of them without notice. When a test fails after an update: read the changes
+of `uvicorn/protocols/http/httptools_impl.py` and `flow_control.py` between the two releases; adapt
+`labctl/api/http_protocol.py` and the lists below; run tests/labctl/api/test_bounded_http.py,
+tests/labctl/api/test_hostile_requests.py and tests/system/test_connection_attacks.py; then set `MINOR` to the new
+release.
 """
 
 from __future__ import annotations
@@ -98,7 +99,7 @@ def test_a_connection_has_each_attribute(name: str) -> None:
 
 def test_requests_and_flow_have_what_is_read_and_set() -> None:
     init = inspect.signature(RequestResponseCycle.__init__)
-    given: dict[str, Any] = {name: None for name in list(init.parameters)[1:]}
+    given: dict[str, Any] = dict.fromkeys(list(init.parameters)[1:])
     cycle = RequestResponseCycle(**given | {"message_event": asyncio.Event()})
     for name in OF_A_CYCLE:
         assert hasattr(cycle, name), f"uvicorn's RequestResponseCycle has no {name}; {DO}"

@@ -82,7 +82,7 @@ def test_every_act_gets_what_was_asked(name: str) -> None:
 def test_an_act_on_what_no_request_may_say_is_refused() -> None:
     form = form_of("control.start_live")
     document = form.call(LiveRequest(serial="HG-1")).replace(b"HG-1", b"../1")
-    why = r"what call control\.start_live was given is not as expected at 0\.serial: .*; stop the service and start it again"
+    why = r"what call control\.start_live was given is not as expected at 0\.serial: .*; stop the service and start it"
     with pytest.raises(BadDocument, match=why):
         read_call(document, form_of)
 

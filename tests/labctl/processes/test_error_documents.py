@@ -65,16 +65,13 @@ def test_a_kind_beside_the_table_keeps_what_a_user_sees() -> None:
 
 
 def test_an_error_of_the_program_arrives_with_its_traceback() -> None:
-    try:
+    with pytest.raises(ValueError, match="Expecting") as of_json:
         json.loads("{")
-        raise AssertionError
-    except ValueError as error:
-        assert type(crossed(error)) is ValueError
-    try:
-        raise ZeroDivisionError("division by nothing")
-    except ZeroDivisionError as error:
-        found = crossed(error)
-    assert (type(found), str(found)) == (OtherProcessFailed, "ZeroDivisionError: division by nothing")
+    assert type(crossed(of_json.value)) is ValueError  # JSONDecodeError is beside the table
+    with pytest.raises(ZeroDivisionError) as raised:
+        json.loads("1", parse_int=lambda _: 1 // 0)
+    found = crossed(raised.value)
+    assert (type(found), str(found)) == (OtherProcessFailed, f"ZeroDivisionError: {raised.value}")
     assert "test_error_documents.py" in found.__notes__[0]
 
 
