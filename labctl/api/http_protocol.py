@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Callable, Coroutine
+from collections.abc import Awaitable, Callable
 from http import HTTPStatus
 from typing import ClassVar, cast
 
@@ -160,7 +160,7 @@ class BoundedHttpProtocol(HttpToolsProtocol):
         self.scope.setdefault("state", {})[RESERVED] = self.table.on_reserve(self)
         super().on_headers_complete()
 
-    def _start_asgi_task(self, cycle: RequestResponseCycle, app: Callable[..., Coroutine[None, None, None]]) -> None:
+    def _start_asgi_task(self, cycle: RequestResponseCycle, app: Callable[..., Awaitable[None]]) -> None:
         self._answered = cycle
         super()._start_asgi_task(cycle, app)
 

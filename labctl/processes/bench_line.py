@@ -71,7 +71,7 @@ class BenchLine:
             line.send_bytes(supervisor_form("supervise").call(settings))
             if not line.poll(ANSWER_S):
                 self._end_silent()
-            value_of(SAID_BY_BENCH, receive(line))
+            said = receive(line)
         except (EOFError, OSError) as error:
             line.close()
             raise BenchSilent(
@@ -79,6 +79,11 @@ class BenchLine:
                 "log for the cause, then start the service again"
             ) from error
         except BaseException:
+            line.close()
+            raise
+        try:
+            value_of(SAID_BY_BENCH, said)
+        except Exception:
             line.close()
             raise
         return line

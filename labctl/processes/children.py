@@ -21,7 +21,7 @@ from typing import Literal, NoReturn, TypeVar
 from labctl.errors import LabctlError
 from labctl.log.settings import level_asked
 from labctl.log.setup import begin_log
-from labctl.processes.documents import Form, answer, receive, refusal, value_of
+from labctl.processes.documents import BadDocument, Form, answer, receive, refusal, value_of
 
 Line = Connection
 #: What a child says: once that it is ready, then that it lives.
@@ -71,15 +71,20 @@ class Child:
             while not self.line.poll(LOOK_S):
                 if gives_up():
                     raise Failed(f"the {self.name} was not ready when it was asked to end; start the service again")
-            value_of(SAID_BY_CHILD, receive(self.line))
+            said = receive(self.line)
         except (EOFError, OSError):
             self._process.wait()
             raise Failed(
                 f"the {self.name} ended with exit status {self._process.returncode} while it started; "
                 "read the log for the cause"
             ) from None
-        except BaseException:
-            self._process.wait()
+        try:
+            value_of(SAID_BY_CHILD, said)
+        except BadDocument:
+            self.kill()  # it may go on, and what it does is not known
+            raise
+        except Exception:
+            self._process.wait()  # it has said why it ends
             raise
 
     def has_ended(self) -> bool:
