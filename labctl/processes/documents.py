@@ -20,8 +20,10 @@ from labctl.errors import LabctlError
 from labctl.processes.error_documents import ErrorDocument
 
 #: Longest frame, bytes. The largest that is sent is a part of an import (`labctl.store.import_parts`): 2 MiB of packed
-#: readings or 2000 rows, and one block of 2 MiB that does not fit with others, a third longer in base 64.
-LONGEST_BYTES = 64 << 20
+#: readings or 2000 rows, and one block of 2 MiB that does not fit with others, a third longer in base 64. A longer one would also keep the process that reads it from its other threads, one of which hears stops.
+LONGEST_BYTES = 16 << 20
+#: Of it, for the first line.
+SPARE_BYTES = 1 << 16
 VALUE, RAISED = b"value", b"raised"
 #: How many of the characters that were sent a refusal shows.
 SHOWN = 60
@@ -49,12 +51,18 @@ class Form(Generic[ValueT]):
         """Return a value as one line. Raises BadDocument for one that has no form in JSON."""
         try:
             plain = self._adapter.dump_python((value,), exclude_unset=True, round_trip=True, warnings=False)
-            return to_json(plain, bytes_mode="base64", inf_nan_mode="constants", fallback=_plain)
+            document = to_json(plain, bytes_mode="base64", inf_nan_mode="constants", fallback=_plain)
         except (PydanticSerializationError, TypeError, ValueError) as error:
             raise BadDocument(
                 f"{self.name} cannot be sent between processes ({error}); report this text and the version of labctl "
                 "to its maintainers"
             ) from error
+        if len(document) > LONGEST_BYTES - SPARE_BYTES:
+            raise BadDocument(
+                f"{self.name} has {len(document)} bytes and cannot be sent between processes (limit "
+                f"{LONGEST_BYTES - SPARE_BYTES}); send less at a time"
+            )
+        return document
 
     def decode(self, document: bytes) -> ValueT:
         """Return the value of a document. Raises BadDocument for one of another type, or that is no JSON."""

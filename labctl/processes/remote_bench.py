@@ -54,7 +54,7 @@ class RemoteWriter:
 
     def run(self, name: str, args: tuple[object, ...], kwargs: Mapping[str, object]) -> object:
         """Run a transaction there; returns or raises what it did. Raises BenchSilent."""
-        return self._caller.call(f"store.{name}", *args, **kwargs)
+        return self._caller.call(f"store.{name}", *args, **cast(Mapping[str, Any], kwargs))
 
     def __reduce__(self) -> tuple[type[RemoteWriter], tuple[Path]]:
         """Return what unpickling calls in another process."""

@@ -112,6 +112,12 @@ def test_a_call_that_the_other_end_does_not_have_is_not_sent(tmp_path: Path) -> 
             caller.call("any", 1)
 
 
+def test_what_is_too_long_for_a_frame_is_not_sent(tmp_path: Path) -> None:
+    long, why = "x" * LONGEST_BYTES, r"the answer to call any has \d+ bytes and cannot be sent .*; send less at a time"
+    with serving(tmp_path / "calls", lambda *_: Answer([long])) as caller, pytest.raises(LabctlError, match=why):
+        caller.call("any", 1, 2.0)
+
+
 class Opens:
     """Unpickled, it makes a folder: what an attacker's code would do."""
 
