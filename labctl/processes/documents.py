@@ -20,7 +20,8 @@ from labctl.errors import LabctlError
 from labctl.processes.error_documents import ErrorDocument
 
 #: Longest frame, bytes. The largest that is sent is a part of an import (`labctl.store.import_parts`): 2 MiB of packed
-#: readings or 2000 rows, and one block of 2 MiB that does not fit with others, a third longer in base 64. A longer one would also keep the process that reads it from its other threads, one of which hears stops.
+#: readings or 2000 rows, and one block of 2 MiB that does not fit with others, a third longer in base 64. A longer
+#: one would also keep the process that reads it from its other threads, one of which hears stops.
 LONGEST_BYTES = 16 << 20
 #: Of it, for the first line.
 SPARE_BYTES = 1 << 16
