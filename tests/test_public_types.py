@@ -12,7 +12,8 @@ from tests.helpers.source_files import SourceFile, sources
 PASSED_ON = "settings of a library's constructor, passed on as they are; the library leaves them without types"
 DIFFERENT = "objects of one generic class, each with types of its own, in a row"
 STRUCTLOG = "what structlog hands its processors: a record's fields may hold anything"
-PICKLED = "any data that can be pickled: both ends are one installation, and the name of the call says what it is"
+KIND = "a type, of any kind that Python has for one: a class, a union, a generic with its arguments"
+BY_NAME = "the name of the call says which types its arguments and its answer have, which are checked at both ends"
 #: Module -> what says Any there, and why.
 ALLOWED = {
     "instruments/conformance/stand.py": ({"Stand.driver"}, "a driver of any kind: the checks of its kind know which"),
@@ -30,8 +31,9 @@ ALLOWED = {
     "labctl/api/descriptions.py": ({"DescribedAPI.openapi"}, "the document is FastAPI's, which types it so"),
     "labctl/log/redaction.py": ({"Redaction.fields"}, STRUCTLOG),
     "labctl/log/rendering.py": ({"Fields", "Rendering.__call__", "error_fields"}, STRUCTLOG),
-    "labctl/processes/calls.py": ({"Call.args", "Call.kwargs", "Answer.value", "Caller.call"}, PICKLED),
-    "labctl/processes/children.py": ({"line_to_parent"}, PICKLED),
+    "labctl/processes/call_forms.py": ({"CallForm.__init__", "parameter"}, KIND),
+    "labctl/processes/calls.py": ({"Answer.value", "Caller.call"}, BY_NAME),
+    "labctl/processes/documents.py": ({"Form.__init__"}, KIND),
     "labctl/service_connection.py": (
         {"ServiceConnection.request", "json_of"},
         "keyword arguments of httpx, passed on; JSON before its model has looked at it",

@@ -1,16 +1,20 @@
 """uvicorn's HTTP protocol with bounds: on headers in size and time, on stalled bodies and readers, on connections.
 
 The parser behind it (httptools) bounds nothing: a header that never ends is collected, piece after piece, without end.
+uvicorn's own bounds are for its other parser, which is several times slower (`h11_max_incomplete_event_size`), or
+count requests (`limit_concurrency`), or begin after a request (`timeout_keep_alive`): none ends a header that stands
+still. So this module uses names of uvicorn that its documentation does not have. The tests list them
+(tests/labctl/api/test_uvicorn_names.py), and pyproject.toml keeps uvicorn at the minor release that they are of.
 """
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
+from collections.abc import Awaitable, Callable
 from http import HTTPStatus
 from typing import ClassVar, cast
 
-from uvicorn._types import ASGI3Application
 from uvicorn.config import Config
 from uvicorn.protocols.http.httptools_impl import HttpToolsProtocol, RequestResponseCycle
 from uvicorn.server import ServerState
@@ -156,7 +160,7 @@ class BoundedHttpProtocol(HttpToolsProtocol):
         self.scope.setdefault("state", {})[RESERVED] = self.table.on_reserve(self)
         super().on_headers_complete()
 
-    def _start_asgi_task(self, cycle: RequestResponseCycle, app: ASGI3Application) -> None:
+    def _start_asgi_task(self, cycle: RequestResponseCycle, app: Callable[..., Awaitable[None]]) -> None:
         self._answered = cycle
         super()._start_asgi_task(cycle, app)
 

@@ -4,17 +4,20 @@ from __future__ import annotations
 
 import contextlib
 import threading
-from dataclasses import dataclass
 from multiprocessing.connection import Connection
-from typing import Any
+from typing import Any, cast
 
 from instruments.clock import Clock
 from labctl.acting_user import acting
 from labctl.errors import BenchSilent
 from labctl.log import get_logger
 from labctl.log.context import for_request
-from labctl.processes.calls import Answer, Call, UnderWay, answer_with
+from labctl.processes.bench_forms import Beat, form_of
+from labctl.processes.call_forms import Call
+from labctl.processes.calls import Answer, UnderWay, answer_with
+from labctl.processes.documents import answer
 from labctl.processes.held_address import HeldAddress
+from labctl.processes.settings import BenchSettings
 from labctl.processes.supervision import Supervision
 from labctl.services.commands.acts.catalogue import BENCH_ACTS
 from labctl.services.commands.context import CommandContext
@@ -29,16 +32,6 @@ BEAT_S = 1.0
 LEAST_BEAT_S = 0.1
 #: Calls that are under way when the process ends have so long to be answered, s.
 UNDER_WAY_S = 2.0
-
-
-@dataclass(frozen=True)
-class Beat:
-    """What a watcher hears: that the process lives, and what it does."""
-
-    running: int | None  #: the campaign
-    stops: bool
-    schedule_trouble: str
-    not_stopped: str = ""  #: what is known of a stop that is late; empty: none is
 
 
 class BenchCalls:
@@ -71,7 +64,7 @@ class BenchCalls:
         try:
             if call.name == "supervise":
                 return self._supervise(call, connection)
-            with acting(call.actor), for_request(getattr(call, "request_id", "")):  # an older service sends none
+            with acting(call.actor), for_request(call.request_id):
                 return answer_with(lambda: self._value(call))
         finally:
             self._under_way.end()
@@ -85,37 +78,38 @@ class BenchCalls:
             log.warning("calls.under_way", count=left, waited_s=UNDER_WAY_S)
 
     def _supervise(self, call: Call, connection: Connection) -> Answer | None:
-        answer = answer_with(lambda: self._supervision.take_charge(call.args[0], connection))
-        if answer.raised is not None:
-            return answer
-        return None
+        wanted = cast(BenchSettings, call.arguments["wanted"])
+        found = answer_with(lambda: self._supervision.take_charge(wanted, connection))
+        return None if found.raised is None else found
 
     def _value(self, call: Call) -> Any:
         area, _, name = call.name.partition(".")
         if area == "store":
-            return self._store.run(name, *call.args)
+            return self._store.run(name, (), call.arguments)
         if area == "control":
-            return BENCH_ACTS[name].execute(self._context, *call.args)
+            return BENCH_ACTS[name].execute(self._context, call.arguments["asked"])
         if call.name == "bench.live":
-            return self._local.runs(*call.args), self._local.status(*call.args)
+            campaign = cast(int, call.arguments["campaign"])
+            return self._local.runs(campaign), self._local.status(campaign)
         if call.name == "bench.describe":
             return self._local.describe()
         if call.name == "bench.live_state":
-            return self._local.live_state(watched=bool(call.args[0]))
+            return self._local.live_state(watched=bool(call.arguments["watched"]))
         if call.name == "bench.live_history":
             return self._local.live_history()
         raise KeyError(call.name)
 
     def _watch(self, connection: Connection) -> None:
         """Tell a watcher what happens, until it goes; this thread is the watcher's."""
-        changed, never = threading.Event(), threading.Event()
+        changed, never, form = threading.Event(), threading.Event(), form_of("watch").result
         remove = self._local.listen(changed.set)
         self._watchers.add(connection)
         try:
             with contextlib.suppress(OSError):
                 while True:
                     local = self._local
-                    connection.send(Beat(local.running, local.stops, local.schedule_trouble, local.not_stopped))
+                    beat = Beat(local.running, local.stops, local.schedule_trouble, local.not_stopped)
+                    connection.send_bytes(answer(form, beat))
                     changed.wait(BEAT_S)
                     changed.clear()
                     never.wait(LEAST_BEAT_S)

@@ -13,12 +13,15 @@ from multiprocessing.reduction import send_handle
 from typing import NoReturn
 
 from instruments.clock import WallClock
-from labctl.errors import BenchSilent
+from labctl.errors import BenchSilent, LabctlError
 from labctl.log import get_logger
-from labctl.processes.calls import Call, Caller
+from labctl.processes.call_forms import supervisor_form
+from labctl.processes.calls import Caller
 from labctl.processes.children import Child
+from labctl.processes.documents import receive, value_of
 from labctl.processes.liveness import Silence
 from labctl.processes.settings import CALLS, BenchSettings, ServeRequest
+from labctl.processes.supervision import SAID_BY_BENCH, SAID_BY_SUPERVISOR, SupervisorWord
 from labctl.services.benches.bench_left import BenchLeft
 from labctl.services.benches.lease import driver_of, this_machine
 from labctl.services.planning.loading import load_bench
@@ -29,9 +32,6 @@ log = get_logger()
 ANSWER_S = 10.0
 #: On a busy computer a bench process may be silent so much longer, for as long as it gets no processor, s.
 EXCUSED_S = 7.0
-#: What a bench process says once a second; the second one while its table is known to stand.
-BEAT, AT_REST = "beat", "at rest"
-BEATS = frozenset({BEAT, AT_REST})
 
 
 class BenchLine:
@@ -59,19 +59,19 @@ class BenchLine:
         self.at_rest = False  #: whether the table was known to stand when it answered last
         if listener is not None:
             with contextlib.suppress(OSError):  # it has ended, which is noticed by itself
-                self._line.send("listener")
+                self._line.send_bytes(SAID_BY_SUPERVISOR.encode("listener"))
                 send_handle(self._line, listener.fileno(), pid)
         self._heard = Silence(pid, EXCUSED_S)
         self._thread = threading.Thread(target=self._hear, name="bench-line", daemon=True)
         self._thread.start()
 
     def _take_charge(self, settings: BenchSettings) -> Connection:
-        line = Caller(settings.folder / CALLS, ANSWER_S).connect()
+        line = Caller(settings.folder / CALLS, ANSWER_S, supervisor_form).connect()
         try:
-            line.send(Call("supervise", (settings,)))
+            line.send_bytes(supervisor_form("supervise").call(settings))
             if not line.poll(ANSWER_S):
                 self._end_silent()
-            said = line.recv()
+            said = receive(line)
         except (EOFError, OSError) as error:
             line.close()
             raise BenchSilent(
@@ -81,9 +81,11 @@ class BenchLine:
         except BaseException:
             line.close()
             raise
-        if said not in BEATS:
+        try:
+            value_of(SAID_BY_BENCH, said)
+        except Exception:
             line.close()
-            raise said.raised
+            raise
         return line
 
     def _end_silent(self) -> NoReturn:
@@ -97,11 +99,11 @@ class BenchLine:
         )
 
     def _hear(self) -> None:
-        with contextlib.suppress(EOFError, OSError):
+        with contextlib.suppress(EOFError, OSError, LabctlError):  # what it cannot say counts as its silence
             while True:
-                said = self._line.recv()
+                said = value_of(SAID_BY_BENCH, receive(self._line))
                 self._heard.restart()
-                self.at_rest = said == AT_REST
+                self.at_rest = said == "at rest"
                 if isinstance(said, BenchLeft):
                     self.left = said
 
@@ -114,10 +116,10 @@ class BenchLine:
         """Count its silence from now on: this process itself was late."""
         self._heard.restart()
 
-    def tell(self, what: str) -> None:
+    def tell(self, what: SupervisorWord) -> None:
         """Say `begin` or `end`, or `beat`: that the guardian lives."""
         with contextlib.suppress(OSError):
-            self._line.send(what)
+            self._line.send_bytes(SAID_BY_SUPERVISOR.encode(what))
 
     def wait(self, seconds: float) -> bool:
         """Wait for its end; returns whether it came."""

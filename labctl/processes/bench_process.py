@@ -19,8 +19,9 @@ from instruments.clock import Clock, WallClock
 from labctl.errors import BadInput, LabctlError
 from labctl.log import get_logger
 from labctl.processes.bench_calls import BenchCalls
+from labctl.processes.bench_forms import form_of
 from labctl.processes.calls import CallServer
-from labctl.processes.children import begin_child_log, leave, line_to_parent, tell
+from labctl.processes.children import begin_child_log, leave, line_to_parent, tell, tell_refusal
 from labctl.processes.driver_note import DriverNoteWriter
 from labctl.processes.held_address import HeldAddress
 from labctl.processes.liveness import EngineWatch
@@ -105,7 +106,7 @@ class BenchProcess:
             local.scheduler.attended = lambda: self._supervision.alone_s == 0.0
         self._calls = BenchCalls(store, local, self._supervision, self._address, WallClock(settings.ahead))
         self._stop_server = StopServer(settings.folder / STOP, local.request_stop)
-        self._call_server = CallServer(settings.folder / CALLS, self._calls.answer)
+        self._call_server = CallServer(settings.folder / CALLS, self._calls.answer, form_of)
 
     def run(self, line: Connection) -> None:
         """Serve until asked to end, or left alone; the bench is safe and the database closed when this returns."""
@@ -174,14 +175,14 @@ def main() -> int:
     """Run the process that the supervisor has started; returns its exit status."""
     of_the_bench()
     sys.setswitchinterval(SWITCH_S)  # a stop has a thread of its own, which waits for the interpreter only so long
-    line, settings = line_to_parent()
+    line, settings = line_to_parent(BenchSettings)
     threading.current_thread().name = "bench"
     begin_child_log("bench", settings.location)
     try:
         store, local = open_bench_service(settings)
     except Exception as error:
         log.debug("process.refused", exc_info=error)
-        tell(line, error)
+        tell_refusal(line, error)
         return 2
     start = settings.simulated_start
     started = {"version": version("labctl"), "bench": settings.bench, "speed": settings.speed}

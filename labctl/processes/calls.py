@@ -1,39 +1,28 @@
-"""Calls from one labctl process to another: a name, data, and who acts, over a Unix socket in a private folder.
+"""Calls from one labctl process to another over a Unix socket in a private folder.
 
-Both ends are processes of one user and one installation, so calls and answers are pickled. The folder (mode 0700) keeps
-others out.
+A call and its answer are documents of declared types (`labctl.processes.documents`), so the process that answers runs
+nothing that a caller sends. The folder (mode 0700) keeps other users out.
 """
 
 from __future__ import annotations
 
 import contextlib
-import pickle
 import socket
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from multiprocessing.connection import Client, Connection, Listener
 from pathlib import Path
 from typing import Any
 
-from labctl.acting_user import Actor, actor
-from labctl.errors import BenchSilent, LabctlError
-from labctl.log.context import request_id
+from labctl.errors import BadInput, BenchSilent
+from labctl.log import get_logger
+from labctl.processes.call_forms import Call, CallForm, FormOf, read_call
+from labctl.processes.documents import BadDocument, answer, receive, refusal, value_of
+
+log = get_logger()
 
 BACKLOG = 64
-#: A caller that was accepted has this long to say what it wants, where callers are answered one after the other, s.
-SAID_WITHIN_S = 1.0
-
-
-@dataclass(frozen=True)
-class Call:
-    """What is asked, and in whose name."""
-
-    name: str
-    args: tuple[Any, ...] = ()
-    kwargs: dict[str, Any] = field(default_factory=dict)
-    actor: Actor = field(default_factory=actor)
-    request_id: str = field(default_factory=request_id)  #: the HTTP request that asks, for the log
 
 
 @dataclass(frozen=True)
@@ -76,10 +65,14 @@ class UnderWay:
 
 
 class CallServer:
-    """Answers calls at a Unix socket: each caller in a thread of its own, or all in turn in one thread."""
+    """Answers calls at a Unix socket, each caller in a thread of its own.
 
-    def __init__(self, path: Path, respond: Respond, *, in_turn: bool = False) -> None:
-        self._path, self._respond, self._in_turn = path, respond, in_turn
+    A caller that sends what is no call gets a refusal, and its connection is closed; the log has one line.
+    """
+
+    def __init__(self, path: Path, respond: Respond, form_of: FormOf) -> None:
+        """`form_of` has the types of a call by its name."""
+        self._path, self._respond, self._form_of = path, respond, form_of
         self._listener = Listener(str(path), "AF_UNIX", backlog=BACKLOG)
         self._over = False
         self._thread = threading.Thread(target=self._accept, name=f"calls-{path.name}", daemon=True)
@@ -108,27 +101,28 @@ class CallServer:
             if self._over:
                 connection.close()
                 return
-            if not self._in_turn:
-                threading.Thread(target=self._serve, args=(connection,), name="call", daemon=True).start()
-            elif connection.poll(SAID_WITHIN_S):
-                self._one(connection)
-                connection.close()
+            threading.Thread(target=self._serve, args=(connection,), name="call", daemon=True).start()
 
     def _serve(self, connection: Connection) -> None:
-        while self._one(connection):
-            pass
-
-    def _one(self, connection: Connection) -> bool:
-        """Answer one call; returns whether the connection waits for another."""
         try:
-            call = connection.recv()
-            answer = self._respond(call, connection)
-            if answer is None:
-                return False
-            connection.send_bytes(_packed(answer))
+            while self._one(connection):
+                pass
         except (EOFError, OSError):
             connection.close()
+
+    def _one(self, connection: Connection) -> bool:
+        """Answer one call; returns whether the connection waits for another. Raises EOFError, OSError at its end."""
+        try:
+            call, form = read_call(receive(connection), self._form_of)
+        except (BadDocument, BadInput) as error:
+            log.warning("call.refused", error=str(error))
+            with contextlib.suppress(OSError), connection:
+                connection.send_bytes(refusal(error))
             return False
+        found = self._respond(call, connection)
+        if found is None:
+            return False
+        connection.send_bytes(_document(form, found))
         return True
 
 
@@ -140,43 +134,43 @@ def answer_with(work: Callable[[], object]) -> Answer:
         return Answer(raised=error)
 
 
-def _packed(answer: Answer) -> bytes:
+def _document(form: CallForm, found: Answer) -> bytes:
+    if found.raised is not None:
+        return refusal(found.raised)
     try:
-        return pickle.dumps(answer)
-    except Exception as error:  # noqa: BLE001  what cannot be pickled is sent as text
-        text = str(answer.raised or error)
-        return pickle.dumps(
-            Answer(
-                raised=LabctlError(
-                    f"an answer cannot be sent between processes; report this text and the version of labctl to "
-                    f"its maintainers: {text}"
-                )
-            )
-        )
+        return answer(form.result, found.value)
+    except BadDocument as error:
+        return refusal(error)
 
 
 class Caller:
     """Calls the process behind a Unix socket. Any thread may call; each call has a connection to itself.
 
-    Connections are kept for further calls, unless the other end answers one call on each.
+    Connections are kept for further calls.
     """
 
-    def __init__(self, path: Path, timeout_s: float, *, keeps: bool = True) -> None:
-        self._path, self._timeout_s, self._keeps = path, timeout_s, keeps
+    def __init__(self, path: Path, timeout_s: float, form_of: FormOf) -> None:
+        """`form_of` has the types of a call by its name."""
+        self._path, self._timeout_s, self._form_of = path, timeout_s, form_of
         self._idle: list[Connection] = []
         self._guard = threading.Lock()
 
     def call(self, name: str, *args: Any, timeout_s: float | None = None, **kwargs: Any) -> Any:
-        """Return what the other process answers, or raise what it raised. Raises BenchSilent without an answer."""
+        """Return what the other process answers, or raise what it raised.
+
+        Raises BenchSilent without an answer, BadDocument for arguments or an answer of other types than declared.
+        """
         wait_s = self._timeout_s if timeout_s is None else timeout_s
+        form = self._form_of(name)
+        document = form.call(*args, **kwargs)
         connection = self._taken()
         try:
-            connection.send(Call(name, args, kwargs))
+            connection.send_bytes(document)
             if not connection.poll(wait_s):
                 raise BenchSilent(
                     f"the bench process has not answered within {wait_s:g} s; inspect the bench if this continues"
                 )
-            answer: Answer = connection.recv()
+            found = receive(connection)
         except (EOFError, OSError) as error:
             connection.close()
             raise BenchSilent(
@@ -185,14 +179,9 @@ class Caller:
         except BaseException:
             connection.close()  # an answer that comes later must not be taken for that of the next call
             raise
-        if self._keeps:
-            with self._guard:
-                self._idle.append(connection)
-        else:
-            connection.close()
-        if answer.raised is not None:
-            raise answer.raised
-        return answer.value
+        with self._guard:
+            self._idle.append(connection)
+        return value_of(form.result, found)
 
     def _taken(self) -> Connection:
         with self._guard:

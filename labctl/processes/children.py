@@ -16,13 +16,18 @@ import sys
 from collections.abc import Callable, Sequence
 from logging import INFO
 from multiprocessing.connection import Connection
-from typing import Any, NoReturn
+from typing import Literal, NoReturn, TypeVar
 
 from labctl.errors import LabctlError
 from labctl.log.settings import level_asked
 from labctl.log.setup import begin_log
+from labctl.processes.documents import BadDocument, Form, answer, receive, refusal, value_of
 
 Line = Connection
+#: What a child says: once that it is ready, then that it lives.
+ChildWord = Literal["ready", "beat"]
+SAID_BY_CHILD: Form[ChildWord] = Form(ChildWord, "what a process of the service says")
+SettingsT = TypeVar("SettingsT")
 #: Of linux/prctl.h.
 PR_SET_PDEATHSIG = 1
 LOOK_S = 0.5
@@ -62,20 +67,25 @@ class Child:
         Raises Failed, too, once `gives_up` returns True.
         """
         try:
-            self.line.send(settings)
+            self.line.send_bytes(Form[object](type(settings), "the settings of a process").encode(settings))
             while not self.line.poll(LOOK_S):
                 if gives_up():
                     raise Failed(f"the {self.name} was not ready when it was asked to end; start the service again")
-            said = self.line.recv()
+            said = receive(self.line)
         except (EOFError, OSError):
             self._process.wait()
             raise Failed(
                 f"the {self.name} ended with exit status {self._process.returncode} while it started; "
                 "read the log for the cause"
             ) from None
-        if isinstance(said, BaseException):
-            self._process.wait()
-            raise said
+        try:
+            value_of(SAID_BY_CHILD, said)
+        except BadDocument:
+            self.kill()  # it may go on, and what it does is not known
+            raise
+        except Exception:
+            self._process.wait()  # it has said why it ends
+            raise
 
     def has_ended(self) -> bool:
         """Return whether the process is over."""
@@ -112,8 +122,8 @@ def begin_child_log(name: str, location: str) -> None:
     begin_log(name, INFO if level is None else level, locations=(location,))
 
 
-def line_to_parent() -> tuple[Line, Any]:
-    """Return the line to the process that started this one, and the settings that came over it.
+def line_to_parent(kind: type[SettingsT]) -> tuple[Line, SettingsT]:
+    """Return the line to the process that started this one, and the settings of this type that came over it.
 
     Raises SystemExit where that process ended before it sent settings: no process is left to report to, and nothing
     was begun.
@@ -121,7 +131,7 @@ def line_to_parent() -> tuple[Line, Any]:
     line = Connection(int(sys.argv[1]))
     os.set_inheritable(line.fileno(), False)
     try:
-        return line, line.recv()
+        return line, Form[SettingsT](kind, "the settings of a process").decode(receive(line))
     except (EOFError, ConnectionError):
         sys.exit(1)
 
@@ -146,7 +156,13 @@ def leave(status: int) -> NoReturn:
     os._exit(status)
 
 
-def tell(line: Line, what: object) -> None:
+def tell(line: Line, what: ChildWord) -> None:
     """Say something to the parent; nothing where it has gone."""
     with contextlib.suppress(OSError, ValueError):
-        line.send(what)
+        line.send_bytes(answer(SAID_BY_CHILD, what))
+
+
+def tell_refusal(line: Line, error: Exception) -> None:
+    """Tell the parent why this process does not begin; nothing where it has gone."""
+    with contextlib.suppress(OSError, ValueError):
+        line.send_bytes(refusal(error))

@@ -14,10 +14,11 @@ from labctl.acting_user import actor
 from labctl.answers.benches import BenchDescription, StopResponse
 from labctl.answers.campaigns import CampaignResponse, ReasonRequest
 from labctl.answers.live import LiveHistoryResponse, LiveStateResponse
-from labctl.errors import BenchSilent, Conflict, NotStopped
+from labctl.errors import BenchSilent, Conflict, LabctlError, NotStopped
 from labctl.log import get_logger
-from labctl.processes.bench_calls import Beat
-from labctl.processes.calls import Call, Caller
+from labctl.processes.bench_forms import Beat, form_of
+from labctl.processes.calls import Caller
+from labctl.processes.documents import receive, value_of
 from labctl.processes.liveness import Elapsed
 from labctl.processes.settings import CALLS
 from labctl.services.benches.bench_left import BenchLeft
@@ -49,11 +50,11 @@ class RemoteWriter:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._caller = Caller(folder / CALLS, WRITES_S)
+        self._caller = Caller(folder / CALLS, WRITES_S, form_of)
 
     def run(self, name: str, args: tuple[object, ...], kwargs: Mapping[str, object]) -> object:
         """Run a transaction there; returns or raises what it did. Raises BenchSilent."""
-        return self._caller.call(f"store.{name}", args, kwargs)
+        return self._caller.call(f"store.{name}", *args, **cast(Mapping[str, Any], kwargs))
 
     def __reduce__(self) -> tuple[type[RemoteWriter], tuple[Path]]:
         """Return what unpickling calls in another process."""
@@ -78,7 +79,7 @@ class RemoteControl:
         """`may_run`: whether a campaign runs, or may; `last_live`: how it was when the bench process answered last."""
         self._bench, self._place = bench, place
         self._may_run, self._last_live = may_run, last_live
-        self._calls = Caller(folder / CALLS, ANSWER_S)
+        self._calls = Caller(folder / CALLS, ANSWER_S, form_of)
 
     def bench_of(self, _: CampaignStart) -> BenchFile:
         """Return the bench of the bench process. Raises Conflict without one."""
@@ -162,7 +163,7 @@ class RemoteBench:
         self.bench = bench
         self._place = None if bench is None or not location else place_of(location, bench.name)
         self.control = RemoteControl(folder, bench, self._place, self._may_run, self._last_of)
-        self._caller = Caller(folder / CALLS, ANSWER_S)
+        self._caller = Caller(folder / CALLS, ANSWER_S, form_of)
         self._listeners = ChangeListeners()
         self._beat = Beat(running=None, stops=False, schedule_trouble="")
         self._heard = Elapsed()
@@ -217,10 +218,10 @@ class RemoteBench:
     def _silence(self) -> str:
         return f"the bench process has not answered for {self.heard_s:.0f} s: the bench may move; inspect it"
 
-    def _ask(self, name: str, *args: Any) -> Any:
+    def _ask(self, name: str, *args: Any, **kwargs: Any) -> Any:
         if self.heard_s > SILENT_S:
             raise BenchSilent(self._silence)
-        return self._caller.call(name, *args)
+        return self._caller.call(name, *args, **kwargs)
 
     def runs(self, campaign: int) -> bool:
         """Whether this campaign runs now, or did when the bench process last answered."""
@@ -270,7 +271,7 @@ class RemoteBench:
 
     def live_state(self, *, watched: bool = False) -> LiveStateResponse:
         """Return the live calibration that runs, or the last. Raises BenchSilent."""
-        answer: LiveStateResponse = self._ask("bench.live_state", watched)
+        answer: LiveStateResponse = self._ask("bench.live_state", watched=watched)
         return answer
 
     def live_history(self) -> LiveHistoryResponse:
@@ -285,7 +286,7 @@ class RemoteBench:
 
     def _keep_watching(self) -> None:
         while not self._over.is_set():
-            with contextlib.suppress(BenchSilent, EOFError, OSError):
+            with contextlib.suppress(LabctlError, EOFError, OSError):  # silent, ended, or of another version
                 self._hear()
             if self.heard_s > SILENT_S and not self._over.is_set():
                 self._note(silent=True)
@@ -294,13 +295,14 @@ class RemoteBench:
 
     def _hear(self) -> None:
         with self._caller.connect() as connection:
-            connection.send(Call("watch"))
+            form = form_of("watch")
+            connection.send_bytes(form.call())
             while not self._over.is_set():
                 if not connection.poll(SILENT_S):
                     self._note(silent=True)
                     self._listeners.notify()  # silence is a change too
                     continue
-                self._beat = connection.recv()
+                self._beat = value_of(form.result, receive(connection))
                 self._heard.restart()
                 self._note(silent=False)
                 self._listeners.notify()

@@ -9,8 +9,11 @@ import threading
 from collections.abc import Callable
 from multiprocessing.connection import Connection
 from multiprocessing.reduction import recv_handle
+from typing import Literal
 
 from labctl.errors import Conflict, StoreError
+from labctl.log import get_logger
+from labctl.processes.documents import BadDocument, Form, answer, receive
 from labctl.processes.held_address import HeldAddress
 from labctl.processes.liveness import Elapsed, Silence
 from labctl.processes.settings import BenchSettings
@@ -18,6 +21,16 @@ from labctl.processes.waker import Waker
 from labctl.services.benches.bench_left import BenchLeft
 from labctl.services.benches.lease import this_machine
 from labctl.store import ServiceAddress, Store
+
+log = get_logger()
+
+#: What a supervisor says; `listener` comes with the socket that the service listens at.
+SupervisorWord = Literal["listener", "begin", "end", "beat"]
+SAID_BY_SUPERVISOR: Form[SupervisorWord] = Form(SupervisorWord, "what the supervisor says")
+#: What a bench process says once a second, the second one while its table is known to stand; at its end, how the bench
+#: was left.
+BenchWord = Literal["beat", "at rest"] | BenchLeft
+SAID_BY_BENCH: Form[BenchWord] = Form(BenchWord, "what the bench process says")
 
 BEAT_S = 1.0
 #: A supervisor that says nothing for so long guards nothing, s; on a busy computer so much longer at most.
@@ -96,8 +109,7 @@ class Supervision:
 
     def _hear(self, line: Connection) -> None:
         with contextlib.suppress(EOFError, OSError):
-            while True:
-                said = line.recv()
+            while (said := self._said(line)) is not None:
                 if self._heard is not None:
                     self._heard.restart()
                 if said == "listener":
@@ -110,14 +122,24 @@ class Supervision:
                     self._waker.end()
         self._let_go(line)
 
+    @staticmethod
+    def _said(line: Connection) -> SupervisorWord | None:
+        """Return the next word of a supervisor, None where what it sent is none: it is then in charge no longer."""
+        try:
+            return SAID_BY_SUPERVISOR.decode(receive(line))
+        except BadDocument as error:
+            log.warning("supervisor.refused", error=str(error))
+            line.close()
+            return None
+
     def _beat(self, line: Connection) -> None:
         never = threading.Event()
         with contextlib.suppress(OSError):
-            line.send("beat")  # the answer that it is in charge
+            line.send_bytes(answer(SAID_BY_BENCH, "beat"))  # that it is in charge
             while self._line is line:
                 never.wait(BEAT_S)
                 if not self._is_stuck():
-                    line.send("at rest" if self._is_at_rest() else "beat")
+                    line.send_bytes(answer(SAID_BY_BENCH, "at rest" if self._is_at_rest() else "beat"))
 
     def _let_go(self, line: Connection) -> None:
         with self._guard:
@@ -130,4 +152,4 @@ class Supervision:
         line, self._line = self._line, None
         if line is not None:
             with contextlib.suppress(OSError):
-                line.send(left)
+                line.send_bytes(answer(SAID_BY_BENCH, left))

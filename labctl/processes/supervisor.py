@@ -26,6 +26,7 @@ from labctl.errors import BenchSilent, BenchUnconfirmed, Conflict, LabctlError
 from labctl.log import get_logger
 from labctl.processes import systemd
 from labctl.processes.bench_line import EXCUSED_S, BenchLine, bench_process_of
+from labctl.processes.call_forms import supervisor_form
 from labctl.processes.calls import Caller
 from labctl.processes.children import Child
 from labctl.processes.guardian import Guardian, GuardianStop
@@ -96,7 +97,7 @@ def _ask_for_address(request: ServeRequest) -> None:
         if holder is None or holder.calls is None:
             return
         try:
-            Caller(Path(holder.calls) / CALLS, ADDRESS_S).call("address.give_back")
+            Caller(Path(holder.calls) / CALLS, ADDRESS_S, supervisor_form).call("address.give_back")
         except BenchSilent:
             log.error("child.silent", child="bench", child_pid=holder.pid, silent_s=ADDRESS_S)
             end_process(ProcessId.of(holder.pid))

@@ -9,7 +9,8 @@ from collections.abc import Callable
 
 from labctl.errors import LabctlError
 from labctl.log import get_logger
-from labctl.processes.children import Child
+from labctl.processes.children import SAID_BY_CHILD, Child
+from labctl.processes.documents import receive, value_of
 from labctl.processes.held_address import HeldAddress
 from labctl.processes.listening import Listening
 from labctl.processes.liveness import Elapsed, Restarts, Silence
@@ -115,8 +116,11 @@ class WebKeeper:
     def _hear(self) -> None:
         while self._process.line.poll(0):
             try:
-                self._process.line.recv()
+                value_of(SAID_BY_CHILD, receive(self._process.line))
             except (EOFError, OSError):
+                return
+            except LabctlError as error:  # what it says cannot be read: as if it said nothing
+                log.warning("child.unread", child="web", child_pid=self.pid, error=str(error))
                 return
             self._count_from_now()
             self._address.close_page()

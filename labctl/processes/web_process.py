@@ -18,7 +18,7 @@ from labctl.api.connection_limits import limits_for, raise_open_files
 from labctl.api.http_protocol import bounded_http
 from labctl.config import os_user
 from labctl.log import get_logger
-from labctl.processes.children import begin_child_log, end_with_parent, leave, line_to_parent, tell
+from labctl.processes.children import begin_child_log, end_with_parent, leave, line_to_parent, tell, tell_refusal
 from labctl.processes.remote_bench import RemoteBench, RemoteWriter
 from labctl.processes.settings import KEYS, LOOPBACK_NAMES, ServeRequest, WebSettings, is_loopback
 from labctl.processes.supervisor_watch import SupervisorWatch
@@ -78,7 +78,7 @@ def access_for(request: ServeRequest, store: Store, at: str) -> AccessPolicy:
 def _end_with(line: Connection) -> None:
     """End this process when its supervisor has gone: another one may want its address."""
     with contextlib.suppress(EOFError, OSError):
-        line.recv()
+        line.recv_bytes(1)  # it says nothing more
     os.kill(os.getpid(), signal.SIGTERM)
 
 
@@ -144,14 +144,14 @@ def main() -> int:
     """Run the process that the supervisor has started; returns its exit status."""
     end_with_parent()
     of_the_pages()
-    line, settings = line_to_parent()
+    line, settings = line_to_parent(WebSettings)
     signal.signal(signal.SIGHUP, signal.SIG_IGN)  # the supervisor hears it
     begin_child_log("web", settings.request.location)
     try:
         serve(line, settings)
     except Exception as error:
         log.debug("process.refused", exc_info=error)
-        tell(line, error)
+        tell_refusal(line, error)
         return 2
     return 0
 

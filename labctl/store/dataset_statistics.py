@@ -29,6 +29,10 @@ NOT_CHANNELS = frozenset(
 )
 
 
+#: Column of a table -> value, which SQL and JSON take as it is.
+Row = dict[str, str | int | float | bool | None]
+
+
 @dataclass(frozen=True)
 class Statistics:
     """Figures of one channel in one data set, in the channel's unit."""
@@ -54,9 +58,9 @@ def statistics(values: NDArray[np.float64], *, spectrum: bool) -> Statistics:
 
 def means_rows(
     recording: int, number: int, columns: Mapping[str, NDArray[np.generic]], valid: NDArray[np.bool_]
-) -> list[dict[str, object]]:
+) -> list[Row]:
     """Return the rows of data_set_means of one data set; only valid readings count."""
-    rows = []
+    rows: list[Row] = []
     for name, values in columns.items():
         if name in NOT_CHANNELS or values.dtype.kind not in "fiu":
             continue

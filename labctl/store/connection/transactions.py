@@ -24,16 +24,19 @@ class Repository(Protocol):
 
 RepositoryT = TypeVar("RepositoryT", bound=Repository)
 
-#: Names of all methods that may be sent, as `Benches.mark`.
-TRANSACTIONS: set[str] = set()
+#: All methods that may be sent, by their names, as `Benches.mark`.
+TRANSACTIONS: dict[str, Callable[..., object]] = {}
 
 
 def transaction(
     method: Callable[Concatenate[RepositoryT, ArgumentsP], ResultT],
 ) -> Callable[Concatenate[RepositoryT, ArgumentsP], ResultT]:
-    """Mark a repository's method as one short transaction. Arguments and result are data that can be pickled."""
+    """Mark a repository's method as one short transaction.
+
+    Arguments and result travel as JSON, by the types that the method declares (`labctl.processes.call_forms`).
+    """
     name = method.__qualname__
-    TRANSACTIONS.add(name)
+    TRANSACTIONS[name] = method
 
     @functools.wraps(method)
     def run(self: RepositoryT, /, *args: ArgumentsP.args, **kwargs: ArgumentsP.kwargs) -> ResultT:

@@ -88,7 +88,10 @@ class Imports:
         with self._database.writing(synced=False) as connection:
             _give_sign(connection, ticket)
             for name in TABLES:
-                if rows := part.rows[name]:
+                rows: list[dict[str, Any]] = [*part.rows[name]]
+                if name == tables.sample_blocks.name:
+                    rows = [{**row, "data": data} for row, data in zip(rows, part.packed, strict=True)]
+                if rows:
                     connection.execute(sa.insert(tables.metadata.tables[name]), rows)
 
     @transaction

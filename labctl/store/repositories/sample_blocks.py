@@ -37,7 +37,7 @@ _ADD_BLOCK = sa.insert(tables.sample_blocks)
 
 def write_block(connection: sa.Connection, recording: int, number: int, seq: int, block: sample_codec.Block) -> None:
     """Write one block of the readings of a data set; `seq` counts the blocks of a data set from 0."""
-    connection.execute(_ADD_BLOCK, block_row(recording, number, seq, block))
+    connection.execute(_ADD_BLOCK, {**block_row(recording, number, seq, block), "data": block.data})
 
 
 def write_final_block(

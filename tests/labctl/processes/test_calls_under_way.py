@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, cast
 
@@ -12,6 +13,7 @@ from instruments.clock import WallClock
 from labctl.errors import BenchSilent
 from labctl.processes import bench_calls
 from labctl.processes.bench_calls import BenchCalls
+from labctl.processes.bench_forms import form_of
 from labctl.processes.calls import Caller, CallServer
 from labctl.processes.held_address import HeldAddress
 from labctl.processes.supervision import Supervision
@@ -19,6 +21,8 @@ from labctl.services.local_bench import LocalBench
 from labctl.store import Store
 
 WAIT_S = 20.0
+AT = datetime(2026, 1, 5, 8, tzinfo=UTC)
+RENEW, RENEWAL = "store.Leases.renew", ("bench", "owner", AT, AT)
 
 
 class SlowStore:
@@ -30,11 +34,11 @@ class SlowStore:
         self.begun, self.go_on = threading.Event(), threading.Event()
         self.is_closed, self.used_closed = False, False
 
-    def run(self, *_: Any) -> str:
+    def run(self, *_: Any) -> bool:
         self.begun.set()
         self.go_on.wait(WAIT_S)
         self.used_closed |= self.is_closed
-        return "stored"
+        return True
 
 
 class Bench:
@@ -46,12 +50,12 @@ class Bench:
         self.calls = BenchCalls(
             cast(Store, self.store), local, cast(Supervision, None), cast(HeldAddress, None), WallClock()
         )
-        self.server = CallServer(folder / "calls", self.calls.answer)
+        self.server = CallServer(folder / "calls", self.calls.answer, form_of)
         self.server.start()
-        self.caller, self.other = (Caller(folder / "calls", WAIT_S) for _ in range(2))
+        self.caller, self.other = (Caller(folder / "calls", WAIT_S, form_of) for _ in range(2))
         assert self.caller.call("bench.describe") is None  # its connection is kept
         self.answers: list[object] = []
-        self.asking = threading.Thread(target=lambda: self.answers.append(self.other.call("store.x")))
+        self.asking = threading.Thread(target=lambda: self.answers.append(self.other.call(RENEW, *RENEWAL)))
         self.asking.start()
         self.store.begun.wait(WAIT_S)
 
@@ -76,11 +80,11 @@ def test_a_call_that_is_under_way_is_answered_before_the_database_is_closed(tmp_
     while not bench.calls._under_way._is_over:
         threading.Event().wait(0.01)
     with pytest.raises(BenchSilent, match="the bench process is ending; wait for its restart, then try again"):
-        bench.caller.call("store.x")  # over the connection that is kept
+        bench.caller.call(RENEW, *RENEWAL)  # over the connection that is kept
     assert ending.is_alive()
     bench.leave()
     ending.join(WAIT_S)
-    assert (bench.answers, bench.store.used_closed) == (["stored"], False)
+    assert (bench.answers, bench.store.used_closed) == ([True], False)
 
 
 def test_a_call_that_does_not_end_is_not_waited_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,10 +11,11 @@ import pytest
 from instruments.clock import VirtualClock
 from labctl.answers.campaigns import CampaignRequest
 from labctl.processes import supervision
+from labctl.processes.documents import receive, value_of
 from labctl.processes.held_address import HeldAddress
 from labctl.processes.liveness import ENGINE_SILENT_S, EngineWatch
 from labctl.processes.settings import BenchSettings
-from labctl.processes.supervision import Supervision
+from labctl.processes.supervision import SAID_BY_BENCH, Supervision
 from labctl.processes.waker import Waker
 from labctl.services.campaigns.bench_runner import BenchRunner
 from labctl.services.campaigns.stop_requests import NotHere
@@ -82,9 +83,9 @@ def test_a_stuck_engine_sends_one_beat_to_its_supervisor_and_no_more(
     address = HeldAddress(lambda _: NotHere("no bench", stands=True), lambda: "")
     guarded = Supervision(settings, store, waker, lambda: stuck[0], address, lambda: False)
     guarded.take_charge(settings, there)
-    assert here.recv() == "beat"  # the answer that it is in charge
+    assert value_of(SAID_BY_BENCH, receive(here)) == "beat"  # the answer that it is in charge
     assert not here.poll(0.2)
     stuck[0] = False
-    assert here.recv() == "beat"
+    assert value_of(SAID_BY_BENCH, receive(here)) == "beat"
     here.close()
     waker.close()

@@ -7,6 +7,7 @@ import pickle
 import threading
 from collections.abc import Iterator
 from datetime import UTC, datetime
+from multiprocessing.connection import Client
 from pathlib import Path
 
 import pytest
@@ -15,6 +16,7 @@ from instruments.clock import VirtualClock, WallClock
 from labctl.acting_user import Actor, acting
 from labctl.errors import BenchSilent, Conflict, NotFound
 from labctl.processes.bench_calls import BenchCalls
+from labctl.processes.bench_forms import form_of
 from labctl.processes.calls import CallServer
 from labctl.processes.driver_note import DriverNoteWriter
 from labctl.processes.held_address import HeldAddress
@@ -45,7 +47,7 @@ def folder(tmp_path: Path) -> Iterator[Path]:
         address = HeldAddress(local.request_stop, local.describe_running)
         supervision = Supervision(settings, store, waker, lambda: False, address)
         calls = BenchCalls(store, local, supervision, address, WallClock())
-        servers = StopServer(tmp_path / STOP, local.request_stop), CallServer(tmp_path / CALLS, calls.answer)
+        servers = StopServer(tmp_path / STOP, local.request_stop), CallServer(tmp_path / CALLS, calls.answer, form_of)
         DriverNoteWriter(settings, store, local).write(settings)
         for server in servers:
             server.start()
@@ -115,6 +117,19 @@ def test_a_campaign_is_started_followed_and_aborted_from_the_web_process(store: 
         service.close()
 
 
+def test_a_bench_process_that_is_sent_what_is_no_call_goes_on(store: Store, folder: Path) -> None:
+    transaction = pickle.dumps(("store.Audit.record", (AT, "backup", "x", {})))
+    for sent in (transaction, b'[{"call":"store.Audit.rows","actor":{"name":"Eve"}}]\n[[]]', b"\x80\x05."):
+        with Client(str(folder / CALLS), "AF_UNIX") as line:
+            line.send_bytes(sent)
+            assert line.recv_bytes().startswith(b"raised\n")
+            with pytest.raises(EOFError):
+                line.recv_bytes()
+    assert store.audit.rows() == []
+    store.audit.record(AT, "backup", "copy.sqlite", {})
+    assert [row.action for row in store.audit.rows()] == ["backup"]
+
+
 def test_a_bench_process_that_was_never_heard_is_silent_and_unconfirmed(tmp_path: Path) -> None:
     access = RemoteBench(tmp_path, BENCH)
     assert (access.running, access.status(1), access.runs(1)) == (None, None, False)
@@ -122,4 +137,4 @@ def test_a_bench_process_that_was_never_heard_is_silent_and_unconfirmed(tmp_path
     assert described is not None
     assert described.name == BENCH.name
     with pytest.raises(BenchSilent):
-        RemoteWriter(tmp_path).run("Audit.record", (), {})
+        RemoteWriter(tmp_path).run("Fetches.record", ([],), {})
