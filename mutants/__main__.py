@@ -46,14 +46,14 @@ def _arguments() -> argparse.Namespace:
     return parser.parse_args()
 
 
-def _judged(
-    runner: Runner, target: Target, only: set[str] | None, left: dict[str, list[str]]
-) -> tuple[int, int, int]:
+def _judged(runner: Runner, target: Target, only: set[str] | None, left: dict[str, list[str]]) -> tuple[int, int, int]:
     """Return how many mutants a module has, how many were noticed, and how many cannot be; `left` gets the rest."""
     source = (ROOT / target.module).read_text(encoding="utf-8")
     plain = runner.load_for(target.module, target.tests)
     if plain.status != PASSED:
-        what = "hold no test" if plain.status == NOTHING_COLLECTED else f"fail without any mutant (status {plain.status})"
+        what = (
+            "hold no test" if plain.status == NOTHING_COLLECTED else f"fail without any mutant (status {plain.status})"
+        )
         sys.exit(f"{target.module}: its tests {what}; mend them, or name others in targets.toml\n{plain.output}")
     found = [each for each in mutants_of(source) if only is None or each.text in only]
     same = [each for each in found if target.why_equivalent(each) is not None]

@@ -34,6 +34,8 @@ FROM_COSMIC_RAY = (
 )  # fmt: skip
 #: Where `*` and `/` are no operators but marks in a list of parameters.
 MARKS = frozenset({"parameters", "lambdef", "import_from"})
+#: Arguments by which a class only promises what mypy checks: no program of the project changes a frozen object.
+PROMISES = frozenset({"frozen", "slots"})
 LITERALS = frozenset({"(", "[", "{"})
 
 
@@ -152,6 +154,8 @@ def _says_nothing(operator: str, node: Any) -> bool:
     """Return whether a change is none, or the same as that of another operator."""
     if operator == "AddNot":  # the opposite of a comparison, and a `not` that is left out, are there already
         return node.children[1 if node.type in {"if_stmt", "while_stmt"} else 2].type in {"comparison", "not_test"}
+    if node.parent is not None and node.parent.type == "argument":
+        return node.parent.children[0].get_code().strip() in PROMISES
     return node.parent is not None and node.parent.type in MARKS
 
 
