@@ -148,7 +148,7 @@ def _become_a_test(loaded: Path, output: int, tests: Sequence[str], limit_s: flo
         resource.setrlimit(resource.RLIMIT_CPU, (int(limit_s) + 1, int(limit_s) + 5))
         status = int(pytest.main([*OPTIONS, *tests]))
         loaded.write_text("\n".join(list(sys.modules)), encoding="utf-8")
-    except BaseException:  # the process ends here, whatever happened
+    except BaseException:  # noqa: BLE001  the process ends here, whatever happened
         traceback.print_exc()
     finally:
         sys.stdout.flush()

@@ -1,7 +1,7 @@
 """The changes that are made to a module: those of cosmic-ray that are likely mistakes, and three more.
 
-Cosmic-ray changes comparisons, numbers, conditions and loops. What it lacks are the mistakes of a procedure: a call that
-is left out, an answer that is not given, and a list that has become empty.
+Cosmic-ray changes comparisons, numbers, conditions and loops. What it lacks are the mistakes of a procedure: a call
+that is left out, an answer that is not given, and a list that has become empty.
 """
 
 from __future__ import annotations

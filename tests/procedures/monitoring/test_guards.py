@@ -45,8 +45,8 @@ def test_a_trip_names_device_value_limit_and_unit(
     assert device in event.message
 
 
-#: Guard, the bench exactly at its limit, and the bench just beyond: limits -70 to 150 deg C of the chamber, -40 to 85 deg C
-#: of the unit, with the margins of the rules.
+#: Guard, the bench exactly at its limit, and the bench just beyond. The chamber has -70 to 150 deg C, the unit -40 to
+#: 85 deg C; the margins are those of the rules.
 BOUNDS = [
     ("chamber_limits", {"chamber_c": 152.0}, {"chamber_c": 152.01}),
     ("chamber_limits", {"chamber_c": -72.0}, {"chamber_c": -72.01}),
@@ -110,7 +110,7 @@ def test_air_that_follows_the_set_point_of_others_is_judged_by_the_guard_of_that
     guards = Guards(GuardRules.model_validate({"actions": {"foreign_change": action}}), limits)
     changed = replace(WELL, chamber_c=27.0, foreign=("the set point is 27 deg C, labctl gave 20 deg C",))
     kinds = {trip.kind for trip in guards.check(changed)}
-    assert kinds == {"foreign_change", "chamber_deviation"} if trips else {"foreign_change"}
+    assert kinds == ({"foreign_change", "chamber_deviation"} if trips else {"foreign_change"})
     assert {trip.kind for trip in guards.check(replace(changed, foreign=()))} == {"chamber_deviation"}
 
 
