@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import signal
 import sys
 from pathlib import Path
 
@@ -19,6 +20,7 @@ LEAST = 0.90
 def main() -> int:
     """Run the mutants of the modules that are named, or of all; returns 1 when the tests of one notice too few."""
     arguments = _arguments()
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit("ended by a signal"))  # the copy is removed
     wanted = [each for each in targets() if not arguments.modules or any(n in each.module for n in arguments.modules)]
     before = json.loads(arguments.survivors.read_text()) if arguments.again else {}
     left: dict[str, list[str]] = {}

@@ -94,8 +94,7 @@ class Runner:
         outcome = self.run(module, code, tests, LONGEST_S)
         loaded = self._loaded.read_text(encoding="utf-8").split()
         own = module.removesuffix(".py").replace("/", ".").removesuffix(".__init__")
-        changed = {own, *self._importers.find_downstream_modules(own)}
-        changed |= {name.rpartition(".")[0] for name in changed}  # a package may hold what its modules offer
+        changed = self._all_importers(own)
         for name in [each for each in sys.modules if each.split(".")[0] in PACKAGES]:
             del sys.modules[name]
         for name in loaded:
@@ -107,6 +106,16 @@ class Runner:
         if own in sys.modules:
             raise RuntimeError(f"{own} was loaded before its mutants by a module that is not known to import it")
         return outcome
+
+    def _all_importers(self, module: str) -> set[str]:
+        """Return a module and what imports it, also through a package that loads its modules when they are needed."""
+        found, left = set[str](), {module}
+        while left:
+            found |= left
+            packages = {each.rpartition(".")[0] for each in left} - {"", *PACKAGES}
+            left = {each for name in left for each in self._importers.find_modules_that_directly_import(name)}
+            left = (left | packages) - found
+        return found
 
     def run(self, module: str, code: str, tests: Sequence[str], limit_s: float) -> Outcome:
         """Return how the tests end with `code` in the place of a module, which is as before afterwards."""

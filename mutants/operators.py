@@ -7,6 +7,7 @@ that is left out, an answer that is not given, and a list that has become empty.
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -177,4 +178,5 @@ def _mutant(operator: str, source: str, code: str) -> Mutant:
 
 
 def _joined(lines: list[str]) -> str:
-    return " ".join(line.strip() for line in lines)
+    """Return lines as one, without the space that cosmic-ray puts before what it changes."""
+    return re.sub(r"(?<=[(\[{])\s+|\s+(?=\s)", "", " ".join(line.strip() for line in lines))

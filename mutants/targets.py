@@ -5,8 +5,10 @@ from __future__ import annotations
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from mutants.operators import Mutant
+if TYPE_CHECKING:
+    from mutants.operators import Mutant
 
 TARGETS = Path(__file__).with_name("targets.toml")
 
