@@ -106,6 +106,7 @@ def test_ramp_and_acceleration_are_those_of_the_bench_and_infinite_without(limit
     assert (limits.max_acceleration_dps2, limits.ramp_c_per_min) == (200, 10)
     bare = BenchLimits(None, None, {})
     assert (bare.max_acceleration_dps2, bare.ramp_c_per_min) == (math.inf, math.inf)
+    assert (bare.needs_person, bare.is_driven) == (True, True)  # the longer time, and the fewer courses
 
 
 def test_the_limits_of_an_open_bench(rig: Any) -> None:
