@@ -15,7 +15,7 @@ from instruments.interfaces.rate_course import Ramp, SineSweep
 from instruments.interfaces.table import TableLimits
 from procedures.contracts.errors import PlanRefused
 from procedures.planning.limits import ADVICE, CONSTANT_ONLY, NEEDS, BenchLimits, fit_to_bench, missing_instruments
-from procedures.recipe.recipe import Recipe
+from procedures.recipe.recipe import Recipe, read_recipe
 from tests.helpers.fake_instruments import CHAMBER, TABLE
 
 POINTS = {"temperatures_c": [20.0], "rates_dps": [10.0]}
@@ -148,6 +148,7 @@ def test_instruments_that_a_recipe_needs_are_named(limits: BenchLimits) -> None:
     assert missing_instruments(recipe(), replace(limits, table=None)) == (table,)
     assert missing_instruments(recipe(), replace(limits, chamber=None)) == (chamber,)
     assert missing_instruments(recipe(), limits) == ()
+    assert missing_instruments(read_recipe("by-hand"), BenchLimits(None, None, {})) == ()
     with pytest.raises(PlanRefused, match="a rate table is needed") as refused:
         fit_to_bench(recipe(), replace(limits, table=None), clip=True)
     assert NEEDS in str(refused.value)
