@@ -73,6 +73,7 @@ def test_nothing_is_missing_below_the_evidence_that_is_enough(first: bool, enoug
     below, at_limit = (judge(compared(effect("bias", e)), first=first) for e in (enough - STEP, enough))
     assert (below.form, below.group) == ("adequate", ())
     assert below.leader is not None
+    assert below.share_removed == 0.0
     assert (at_limit.form, at_limit.group) == ("missing", ("bias",))
 
 
@@ -95,6 +96,37 @@ def test_an_effect_below_what_is_enough_is_not_named_beside_a_channel_that_has_i
 def test_a_simpler_channel_has_to_lead_by_more_than_20_to_1(lead: float, form: str) -> None:
     candidates = effect("bias", 10.0, z=1), channel("t_s", 10.0 + lead, z=0)
     assert judge(compared(*candidates)).form == form
+
+
+@pytest.mark.parametrize(("behind", "form"), [(LEAD, "missing"), (LEAD - STEP, "unexplained"), (0.0, "unexplained")])
+def test_an_effect_at_the_end_of_its_range_has_to_lead_over_every_channel(
+    monkeypatch: pytest.MonkeyPatch, behind: float, form: str
+) -> None:
+    monkeypatch.setattr(module, "is_at_end", lambda *_: True)
+    assert judge(compared(effect("self_heating", 20.0), channel("t_s", 20.0 - behind))).form == form
+
+
+def test_a_channel_with_little_evidence_of_its_own_is_what_is_left_of_an_effect_at_its_end(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(module, "is_at_end", lambda *_: True)
+    step = judge(compared(effect("self_heating", 5.0), channel("t_s", 4.0), channel("power_s", 3.0)))
+    assert (step.form, step.depends_on) == ("unexplained", ("t_s",))
+
+
+def test_a_higher_order_of_what_the_base_has_is_not_named_but_an_effect_like_it_is(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(module, "refines_base", lambda _comparison, candidate: candidate.id == "poly")
+    refined = effect("poly", 20.0)
+    alone = judge(compared(refined))
+    assert (alone.form, alone.group, alone.leader) == ("unexplained", (), None)
+    step = judge(compared(refined, effect("saturation", 19.0)))
+    assert (step.form, step.group) == ("ambiguous", ("saturation", "poly"))
+    assert step.leader is not None
+    assert step.leader.id == "saturation"
+    weak = judge(compared(effect("poly", 5.0), effect("saturation", ENOUGH - STEP)))
+    assert (weak.form, weak.group) == ("unexplained", ())
 
 
 @pytest.mark.parametrize(("name", "limit"), [("table_rate_dps", 0.90), ("t_s", 0.75)])
