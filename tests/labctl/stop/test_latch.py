@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import json
 import os
 import threading
 from collections.abc import Callable
@@ -151,8 +153,9 @@ def test_the_mark_stays_while_its_stop_cannot_be_noted_as_carried_out(
     (stop,) = latch.state().open
     with monkeypatch.context() as patched:
         patched.setattr(os, "write", lambda _handle, line: len(line) - 1)
-        with pytest.raises(OSError, match="does not fit on the disk"):
+        with pytest.raises(OSError, match="does not fit on the disk") as full:
             latch.carried_out([stop.id], "safe")
+    assert full.value.errno == errno.ENOSPC
     assert latch.state().open == (stop,)
 
 
@@ -201,6 +204,37 @@ def test_a_latch_is_made_in_folders_that_are_not_there_and_leaves_nothing_beside
     assert len(list(Path("/proc/self/fd").iterdir())) == descriptors
     assert [path.name for path in folder.iterdir()] == [NAME]
     assert folder.stat().st_mode & 0o777 == 0o700
+
+
+def test_each_entry_is_one_line_with_its_time(latch: StopLatch) -> None:
+    first, second = asked("first"), asked("second")
+    latch.request(first)
+    latch.request(second)
+    latch.at_rest([first.id], "the table stands")
+    latch.carried_out([first.id], "safe")
+    latch.take_back([first.id], "Bob")
+    head, *lines, last = (latch._folder / NAME).read_bytes().split(b"\n")
+    assert (head, last) == (b" ", b"")
+    entries = [json.loads(line) for line in lines]
+    assert [next(iter(each)) for each in entries] == ["stop", "stop", "at_rest", "carried_out", "taken_back"]
+    assert all(each["at"].endswith("+00:00") for each in entries[2:])
+
+
+def test_an_empty_line_hides_nothing_after_it(latch: StopLatch) -> None:
+    latch.prepare()
+    with (latch._folder / NAME).open("ab") as file:
+        file.write(b"\n\n")
+    stop = asked()
+    latch.request(stop)
+    assert latch.state().open == (stop,)
+
+
+def test_the_mark_is_the_first_byte_and_changes_no_other(latch: StopLatch) -> None:
+    latch.request(asked())
+    before, handles = (latch._folder / NAME).read_bytes(), len(list(Path("/proc/self/fd").iterdir()))
+    latch._mark(MARK)
+    assert (latch._folder / NAME).read_bytes() == MARK + before[1:]
+    assert len(list(Path("/proc/self/fd").iterdir())) == handles
 
 
 def test_each_line_is_on_the_disk_before_the_call_returns(latch: StopLatch, monkeypatch: pytest.MonkeyPatch) -> None:
