@@ -193,6 +193,28 @@ def test_a_bench_of_a_shared_database_is_held_for_its_campaign(shared: Store) ->
     assert shared.leases.holder(bench.name) is None
 
 
+def test_a_hold_for_a_campaign_is_renewed_and_forgotten_once_it_is_closed(
+    shared: Store, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kept: list[BenchHold] = []
+    monkeypatch.setattr(BenchHold, "keep", lambda held: kept.append(held))  # noqa: PLW0108  bound as a method
+    hold = hold_bench(shared, load_bench("single-axis-sim"), VirtualClock(AT))
+    assert hold is not None
+    assert kept == [hold]
+    assert hold._owner in module._HELD_HERE
+    hold.close()
+    assert hold._owner not in module._HELD_HERE
+
+
+def test_an_import_that_a_process_left_unfinished_is_discarded_before_a_campaign(
+    shared: Store, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    discarded: list[object] = []
+    monkeypatch.setattr(type(shared.imports), "discard_unfinished", lambda each: discarded.append(each))  # noqa: PLW0108
+    with open_for(load_bench("single-axis-sim"), str(tmp_path / "other.sqlite")) as store:
+        assert discarded == [store.imports]
+
+
 def test_a_database_that_is_held_is_refused_with_who_drives_the_bench(tmp_path: Path) -> None:
     location, bench = str(tmp_path / "lab.sqlite"), load_bench("single-axis-sim")
     with open_for(bench, location) as store:
