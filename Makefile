@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 unexport PYTHONDONTWRITEBYTECODE
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 
-.PHONY: install demo test lint types docs bench study attack lock clean
+.PHONY: install demo test mutants lint types docs bench study attack lock clean
 
 install: $(VENV)/.installed
 demo: install
@@ -42,6 +42,10 @@ bench: $(VENV)/.tested
 study: $(VENV)/.studied
 	@OPENBLAS_NUM_THREADS=1 $(BIN)/python -m studies
 
+# Small changes of the modules that keep a bench safe, each of which a test has to notice (hours; MODULES="guards limits").
+mutants: $(VENV)/.mutated
+	@OPENBLAS_NUM_THREADS=1 $(BIN)/python -m mutants $(MODULES)
+
 # Every attack that labctl is to withstand, against services on loopback, and what an abort takes meanwhile.
 attack: $(VENV)/.tested
 	@$(BIN)/python -m pytest -q tests/system/test_connection_attacks.py tests/system/test_service_faults.py tests/labctl/api/test_hostile_requests.py
@@ -63,6 +67,10 @@ $(VENV)/.studied: requirements/study.txt $(VENV)/.installed
 	$(PIP) install --require-hashes -r requirements/study.txt
 	@touch $@
 
+$(VENV)/.mutated: requirements/mutants.txt $(VENV)/.tested
+	$(PIP) install --require-hashes -r requirements/mutants.txt
+	@touch $@
+
 $(VENV)/.documented: requirements/docs.txt $(VENV)/.installed
 	$(PIP) install --require-hashes -r requirements/docs.txt
 	@touch $@
@@ -73,6 +81,7 @@ lock:
 	uv pip compile pyproject.toml --extra lab --extra build --extra dev --extra docs --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --quiet -c requirements/run.txt -o requirements/dev.txt
 	uv pip compile pyproject.toml --extra lab --extra build --extra study --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --quiet -c requirements/run.txt -o requirements/study.txt
 	uv pip compile pyproject.toml --extra lab --extra build --extra docs --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --quiet -c requirements/run.txt -o requirements/docs.txt
+	uv pip compile pyproject.toml --extra lab --extra build --extra dev --extra mutants --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header --quiet -c requirements/dev.txt -o requirements/mutants.txt
 
 clean:
 	rm -rf docs/_build $(VENV) node_modules .mypy_cache .ruff_cache .pytest_cache .import_linter_cache

@@ -5,7 +5,8 @@ Whatever drives the bench next carries out what is open before anything moves. A
 moving by itself until a named person takes it back.
 
 The file only grows, one JSON document per line, so that two processes can write at the same time and nothing that was
-asked for is lost. Its first byte is a mark of its own, for a disk on which no line fits any more.
+asked for is lost. Its first byte is a mark of its own, for a disk on which no line fits any more. A stop that only the
+mark remembers gets an id by how many of those were carried out before, so that the next one is another stop.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from uuid import uuid4
@@ -27,6 +28,7 @@ SERVICE_STOPS = "the service stops"
 FILE, FOLDER = 0o600, 0o700
 #: The first line while the mark is not set, and the byte that sets it.
 UNMARKED, MARK = b" \n", b"!"
+#: How the ids of stops begin that only the mark remembers.
 MARK_ID = "mark"
 
 
@@ -114,7 +116,10 @@ class StopLatch:
 
     def carried_out(self, ids: Iterable[str], text: str) -> None:
         """Note that stops were carried out, and how the bench was left. Raises OSError."""
-        self._append({"carried_out": self._noted(ids), "at": _now(), "text": text})
+        noted = list(ids)
+        self._append({"carried_out": noted, "at": _now(), "text": text})
+        if any(each.startswith(MARK_ID) for each in noted):  # only now, so that it stays where no line fits yet
+            self._mark(UNMARKED[:1])
 
     def at_rest(self, ids: Iterable[str], text: str) -> None:
         """Note that the table was confirmed to stand; the stops stay open. Raises OSError."""
@@ -122,13 +127,7 @@ class StopLatch:
 
     def take_back(self, ids: Iterable[str], by: str) -> None:
         """Note that a person lets the bench move again. Raises OSError."""
-        self._append({"taken_back": self._noted(ids), "at": _now(), "by": by})
-
-    def _noted(self, ids: Iterable[str]) -> Sequence[str]:
-        noted = list(ids)
-        if MARK_ID in noted:
-            self._mark(UNMARKED[:1])
-        return noted
+        self._append({"taken_back": list(ids), "at": _now(), "by": by})
 
     def state(self) -> LatchState:
         """Return what the latch says. A line that cannot be read counts as a stop: it may have been one."""
@@ -142,8 +141,6 @@ class StopLatch:
         done: set[str] = set()
         back: set[str] = set()
         stands: set[str] = set()
-        if lines[0].strip():
-            asked[MARK_ID] = _unnamed(MARK_ID, "asked for while the disk was full")
         for line in lines[1:]:
             if not line.strip():
                 continue
@@ -158,6 +155,8 @@ class StopLatch:
             except (ValueError, TypeError, AttributeError):
                 torn = f"torn-{crc32(line):08x}"
                 asked[torn] = _unnamed(torn, "a line of the latch cannot be read; it may have been a stop")
+        for marked in _marked(done, is_set=bool(lines[0].strip())):
+            asked[marked] = _unnamed(marked, "asked for while the disk was full")
         still = tuple(stop for stop in asked.values() if stop.id not in done)
         held = tuple(stop for stop in asked.values() if stop.id not in back and (stop.holds or stop.id not in done))
         return LatchState(still, held, frozenset(asked), frozenset(stands))
@@ -184,6 +183,12 @@ class StopLatch:
             os.fsync(handle)
         finally:
             os.close(handle)
+
+
+def _marked(done: set[str], *, is_set: bool) -> list[str]:
+    """Return the ids of the stops that the mark remembered, and of the one that it remembers while it is set."""
+    before = sorted(each for each in done if each.startswith(MARK_ID))
+    return [*before, f"{MARK_ID}-{len(before)}"] if is_set else before
 
 
 def _now() -> str:

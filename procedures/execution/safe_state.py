@@ -61,18 +61,17 @@ def _parts(bench: Bench, clock: Clock) -> Iterator[tuple[str, Callable[[], str |
 
 
 def _tried(what: str, part: Callable[[], str | None]) -> str:
-    """Try one part; returns what is to be complained of, empty when it is confirmed."""
-    for attempt in (1, 2):
+    """Try one part, once more after an interrupt; returns what is to be complained of, empty when it is confirmed."""
+    try:
         try:
             complaint = part()
-        except Exception as error:  # noqa: BLE001  whatever one part does, the others are still tried
-            return f"{what}: {str(error) or type(error).__name__}"
         except KeyboardInterrupt:
-            if attempt == 2:
-                return f"{what}: interrupted twice"
-        else:
-            return f"{what}: {complaint}" if complaint else ""
-    return ""
+            complaint = part()
+    except KeyboardInterrupt:
+        return f"{what}: interrupted twice"
+    except Exception as error:  # noqa: BLE001  whatever one part does, the others are still tried
+        return f"{what}: {str(error) or type(error).__name__}"
+    return f"{what}: {complaint}" if complaint else ""
 
 
 def stop_table(table: RateTable, clock: Clock) -> str | None:

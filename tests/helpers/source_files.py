@@ -11,7 +11,7 @@ from pathlib import Path
 from tests.helpers.paths import ROOT
 
 PACKAGES = ("instruments", "procedures", "labctl")
-OTHERS = ("migrations", "tests", "benchmarks", "examples", "studies")
+OTHERS = ("migrations", "tests", "benchmarks", "examples", "mutants", "studies")
 
 
 @dataclass(frozen=True)

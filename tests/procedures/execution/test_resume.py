@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -10,6 +11,7 @@ from instruments.errors import NoReply
 from procedures.contracts.campaign_state import CampaignState
 from procedures.contracts.operator import HumanOperator
 from procedures.execution.resume import Restart, soak_matters_after_s
+from procedures.execution.safe_state import PAUSES_S
 from procedures.recipe.rules import ResumeRules
 
 
@@ -58,7 +60,106 @@ def test_a_short_gap_needs_no_soak_and_a_long_one_does(rig: Any) -> None:
         each.run(start_at=at(each, "acquire", 1), restart=Restart(gap_s=gap_s))
         outcomes.append(soaked_again(each))
         assert [header.step.dataset for header in each.journal.headers] == [2, 3, 4]
+        assert [header.run for header in each.journal.headers] == [1, 2, 2]  # the sessions of the plan, none added
     assert outcomes == [False, True]  # the chamber ramps 10 deg C/min through a band of +-0.5: 6 s
+
+
+def resumed_after(rig: Any, gap_s: float, air_c: float = 30.0, **changes: Any) -> Any:
+    """Resume at the second data set, with the air found somewhere, and at its set point 10 s later."""
+    rig.chamber.make_safe = lambda: rig.chamber.safe_c
+    at_temperature(rig)
+    until_s = rig.clock.now_s() + 10.0
+    rig.chamber.air_c = lambda: air_c if rig.clock.now_s() < until_s else 30.0
+    rig.run(rig.recipe(**changes), start_at=at(rig, "acquire", 1), restart=Restart(gap_s=gap_s))
+    return rig
+
+
+@pytest.mark.parametrize(("gap_s", "soaks"), [(6.0, False), (6.01, True)])
+def test_a_gap_matters_from_when_the_air_could_have_left_its_band_and_come_back(
+    rig: Any, gap_s: float, soaks: bool
+) -> None:
+    assert soaked_again(resumed_after(rig, gap_s)) == soaks
+
+
+@pytest.mark.parametrize(("air_c", "soaks"), [(30.5, False), (29.5, False), (30.51, True), (29.49, True)])
+def test_air_at_the_edge_of_its_band_is_still_soaked(rig: Any, air_c: float, soaks: bool) -> None:
+    assert soaked_again(resumed_after(rig, 1.0, air_c)) == soaks
+
+
+def test_the_journal_says_what_was_done_before_the_first_step(rig: Any) -> None:
+    resumed_after(rig, 1.0, 30.25)
+    first = at(rig, "acquire", 1)
+    kinds = {"safe_state", "lead_in", "soak_holds", "lead_in_done"}
+    said = [event for event in rig.journal.events if event.kind in kinds]
+    assert said[0].message == "setting the bench to its safe state before resuming"
+    assert said[1].message == f"step repeated before step {first + 1}: home"
+    holds = next(event for event in said if event.kind == "soak_holds")
+    assert (holds.value, holds.limit, holds.unit) == (1.0, pytest.approx(6.0), "s")
+    assert "1 s; the air was never more than 0.25 deg C from the set point" in holds.message
+    assert said[-1].message == f"ready for step {first + 1}"
+
+
+def rounds_s(rig: Any, failures: int) -> list[float]:
+    """Let the chamber fail so often, and return a list that gets when each round of the safe state began, s."""
+    rig.chamber.fail("make_safe", NoReply("chamber", "boots"), times=failures)
+    fault, begun_s, called_s = rig.chamber.faults["make_safe"], rig.clock.now_s(), []
+
+    def timed() -> None:
+        called_s.append(rig.clock.now_s() - begun_s)
+        fault()
+
+    rig.chamber.faults["make_safe"] = timed
+    return called_s
+
+
+def test_the_pauses_between_rounds_of_the_safe_state_grow_to_half_a_minute(rig: Any) -> None:
+    called_s = rounds_s(rig, failures=28)
+    rig.run(rig.recipe(resume={"instruments_within_s": 1000.0}), at(rig, "acquire", 1), Restart(gap_s=5.0))
+    in_a_round_s = sum(PAUSES_S)
+    begun_s = called_s[:29:4]
+    assert [later - earlier - in_a_round_s for earlier, later in pairwise(begun_s)] == [2, 4, 8, 16, 30, 30, 30]
+
+
+@pytest.mark.parametrize(("within_s", "rounds"), [(42.0, 1), (42.01, 2), (86.0, 2), (86.01, 3)])
+def test_instruments_are_waited_for_until_the_time_of_the_recipe_is_over(
+    rig: Any, within_s: float, rounds: int
+) -> None:
+    """A round takes 42 s, the pause after the first one 2 s."""
+    called_s = rounds_s(rig, failures=100)
+    outcome = rig.run(rig.recipe(resume={"instruments_within_s": within_s}), at(rig, "acquire", 1), Restart(gap_s=5.0))
+    assert outcome.state == CampaignState.FAILED
+    assert rig.trace.count("table.home") == 0
+    after_the_end = len(PAUSES_S) + 1  # the campaign that failed makes the bench safe once more
+    assert len(called_s) == rounds * (len(PAUSES_S) + 1) + after_the_end
+    assert "resumed, but the bench could not be made safe first: chamber to its safe set point" in outcome.reason
+
+
+def test_a_pause_is_not_obeyed_before_the_bench_is_safe(rig: Any) -> None:
+    called_s = rounds_s(rig, failures=4)
+    rig.control.pause()
+    paused_s: list[float] = []
+
+    def hook(what: str, detail: Any) -> None:
+        if what == "state" and detail == CampaignState.PAUSED:
+            paused_s.append(rig.clock.now_s())
+            rig.control.resume()
+
+    rig.journal.hooks.append(hook)
+    begun_s = rig.clock.now_s()
+    rig.run(start_at=at(rig, "acquire", 1), restart=Restart(gap_s=5.0))
+    assert called_s[:5] == [0.0, 2.0, 12.0, 42.0, 44.0]
+    assert paused_s
+    assert paused_s[0] - begun_s >= 44.0
+
+
+def test_after_a_power_cut_the_unit_handler_switches_the_units_on_and_they_warm_up(rig: Any) -> None:
+    times_s: dict[str, float] = {}
+    rig.journal.hooks.append(lambda what, _detail: times_s.setdefault(what, rig.clock.now_s()))
+    rig.table.faults["home"] = lambda: times_s.setdefault("home", rig.clock.now_s())
+    restart = Restart(gap_s=1.0, power_lost=True, added_runs=1)
+    rig.run(rig.recipe(warm_up_s=900.0), at(rig, "acquire", 1), restart)
+    assert rig.trace.index("hand.power True") < rig.trace.index("imu.start")
+    assert times_s["home"] - times_s["session_began"] >= 900.0
 
 
 def test_air_that_is_found_off_its_temperature_is_soaked_however_short_the_gap(rig: Any) -> None:
@@ -99,6 +200,8 @@ def test_after_a_power_cut_a_person_is_asked_only_when_a_unit_stays_silent(rig: 
         restart = Restart(power_lost=True, added_runs=1)
         assert each.run(start_at=at(each, "acquire", 3), restart=restart, observer=answer).state == CampaignState.DONE
         assert bool(asked) is silent
+        assert each.journal.dropped == []  # a unit without power is no unit that failed
+        assert ("units_off" in each.journal.kinds()) is silent
         assert not asked or "the power failed" in asked[0]
 
 

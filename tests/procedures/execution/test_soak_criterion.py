@@ -86,3 +86,56 @@ def test_figures_are_the_result() -> None:
         "restarts": 0.0,
         "drift_c.imu": pytest.approx(0.0, abs=1e-12),
     }
+
+
+def test_a_drift_is_allowed_up_to_its_limit() -> None:
+    """A straight line of 0.1 deg C in the window, in numbers that the processor has exactly."""
+    step = Soak(temperature_c=20, hold_s=60, band_c=0.5, max_drift_c=0.125, drift_window_s=320, timeout_s=5000)
+    at_limit = [20 + index * 0.125 / 32 for index in range(33)]
+    judge = reported([20.0] * 33, at_limit, step)
+    assert judge.drift_c() == {"imu": 0.125}
+    assert judge.settled()
+    assert judge.why_not() == ""
+    falling = reported([20.0] * 33, [40 - each for each in at_limit], step)
+    assert falling.settled()
+    beyond = reported([20.0] * 33, [20 + 1.01 * (each - 20) for each in at_limit], step)
+    assert not beyond.settled()
+    assert beyond.why_not() == "imu still changes by +0.13 deg C in 320 s, more than 0.125 deg C"
+
+
+def test_only_the_last_window_counts() -> None:
+    """What lies before the window has no part in the line through it."""
+    settled = [30.0] * 40 + [20.0] * 31
+    assert reported([20.0] * 71, settled).drift_c() == {"imu": 0.0}
+    last_but_one = [30.0] * 40 + [20.0] * 30
+    drift_c = reported([20.0] * 70, last_but_one).drift_c()["imu"]
+    assert drift_c is not None
+    assert drift_c < -0.1  # the reading at the begin of the window is one of it
+
+
+def test_the_window_begins_at_its_first_reading_and_not_with_the_clock() -> None:
+    judge = SoakCriterion(STEP)
+    for index in range(30):
+        judge.add(5000.0 + 10 * index, 20.0, {"imu": 20.0})
+    assert judge.drift_c() == {"imu": None}
+    judge.add(5300.0, 20.0, {"imu": 20.0})
+    assert judge.drift_c() == {"imu": 0.0}
+
+
+def test_polls_further_apart_than_the_window_make_a_line_of_two() -> None:
+    step = Soak(temperature_c=20, hold_s=600, band_c=0.5, max_drift_c=0.1, drift_window_s=5, timeout_s=5000)
+    judge = reported([20.0] * 61, [20.0] * 60 + [20.2], step)
+    assert judge.drift_c() == {
+        "imu": pytest.approx(0.1)
+    }  # half of it: the window is half as long as the polls are apart
+    assert not reported([20.0], [20.0], step).settled()
+    assert reported([20.0], [20.0], step).drift_c() == {"imu": None}
+
+
+def test_nothing_is_missing_once_the_time_is_held() -> None:
+    assert reported([20.0] * 61).why_not() == ""
+    assert reported([20.0] * 60).why_not() == "the air was within 0.5 deg C of 20 deg C for 590 s of 600 s"
+
+
+def test_an_answer_before_the_time_is_held_is_no() -> None:
+    assert reported([20.0] * 60).settled() is False

@@ -45,6 +45,75 @@ def test_a_trip_names_device_value_limit_and_unit(
     assert device in event.message
 
 
+#: Guard, the bench exactly at its limit, and the bench just beyond. The chamber has -70 to 150 deg C, the unit -40 to
+#: 85 deg C; the margins are those of the rules.
+BOUNDS = [
+    ("chamber_limits", {"chamber_c": 152.0}, {"chamber_c": 152.01}),
+    ("chamber_limits", {"chamber_c": -72.0}, {"chamber_c": -72.01}),
+    ("unit_air", {"chamber_c": 87.0}, {"chamber_c": 87.01}),
+    ("unit_air", {"chamber_c": -42.0}, {"chamber_c": -42.01}),
+    ("unit_temperature", {"gyro_c": {"imu": 100.0}}, {"gyro_c": {"imu": 100.01}}),
+    ("unit_temperature", {"gyro_c": {"imu": -55.0}}, {"gyro_c": {"imu": -55.01}}),
+    ("chamber_deviation", {"chamber_c": 22.0}, {"chamber_c": 22.01}),
+    ("chamber_deviation", {"chamber_c": 18.0}, {"chamber_c": 17.99}),
+    ("unit_off_air", {"gyro_c": {"imu": 40.0}}, {"gyro_c": {"imu": 40.01}}),
+    ("unit_off_air", {"gyro_c": {"imu": 0.0}}, {"gyro_c": {"imu": -0.01}}),
+    ("stale", {"silent_s": {"imu": 30.0}}, {"silent_s": {"imu": 30.01}}),
+    (
+        "damaged_readings",
+        {"counts": {"imu": ReadingCounts(1000, damaged=21)}},
+        {"counts": {"imu": ReadingCounts(1000, damaged=22)}},
+    ),
+    (
+        "invalid_readings",
+        {"counts": {"imu": ReadingCounts(1000, invalid=501)}},
+        {"counts": {"imu": ReadingCounts(1000, invalid=502)}},
+    ),
+    ("rate", {"rate_dps": 101.0}, {"rate_dps": 101.01}),
+    ("rate", {"rate_dps": 99.0}, {"rate_dps": 98.99}),
+    ("rate", {"asked_dps": -100.0, "rate_dps": -101.0}, {"asked_dps": -100.0, "rate_dps": 100.0}),
+]
+
+
+@pytest.mark.parametrize(("kind", "at_limit", "beyond"), BOUNDS)
+def test_a_limit_is_allowed_and_what_is_beyond_it_trips(
+    guards: Guards, kind: str, at_limit: dict[str, Any], beyond: dict[str, Any]
+) -> None:
+    assert kind not in [trip.kind for trip in guards.check(replace(WELL, **at_limit))]
+    assert [trip.kind for trip in guards.check(replace(WELL, **beyond))].count(kind) == 1
+
+
+def test_the_limit_that_is_named_is_the_one_that_was_passed(guards: Guards) -> None:
+    low, high = (
+        next(trip for trip in guards.check(replace(WELL, gyro_c={"imu": each_c})) if trip.kind == "unit_temperature")
+        for each_c in (-60.0, 110.0)
+    )
+    assert (low.limit, high.limit) == (-55.0, 100.0)
+    assert low.message == "imu: its own thermometer: -60 deg C, limit -55"
+
+
+@pytest.mark.parametrize("change", [{"chamber_c": None}, {"setpoint_c": None}, {"chamber_c": None, "setpoint_c": None}])
+def test_without_a_chamber_no_guard_of_the_air_trips(guards: Guards, change: dict[str, Any]) -> None:
+    assert guards.check(replace(WELL, **change)) == []
+    assert guards.check(replace(WELL, chamber_c=None, setpoint_c=None, gyro_c={"imu": 90.0})) == []
+
+
+def test_limits_of_a_bench_without_a_chamber_trip_no_guard_of_it(limits: BenchLimits) -> None:
+    trips = Guards(GuardRules(), replace(limits, chamber=None)).check(replace(WELL, chamber_c=200.0, setpoint_c=200.0))
+    assert {trip.kind for trip in trips} == {"unit_air", "unit_off_air"}
+
+
+@pytest.mark.parametrize(("action", "trips"), [("warn", True), ("suspend", False), ("fail", False)])
+def test_air_that_follows_the_set_point_of_others_is_judged_by_the_guard_of_that(
+    limits: BenchLimits, action: str, trips: bool
+) -> None:
+    guards = Guards(GuardRules.model_validate({"actions": {"foreign_change": action}}), limits)
+    changed = replace(WELL, chamber_c=27.0, foreign=("the set point is 27 deg C, labctl gave 20 deg C",))
+    kinds = {trip.kind for trip in guards.check(changed)}
+    assert kinds == ({"foreign_change", "chamber_deviation"} if trips else {"foreign_change"})
+    assert {trip.kind for trip in guards.check(replace(changed, foreign=()))} == {"chamber_deviation"}
+
+
 def test_a_single_bad_reading_is_no_trend(guards: Guards) -> None:
     tally = ReadingCounts(expected=10, valid=9, damaged=1)
     assert guards.check(replace(WELL, counts={"imu": tally})) == []
