@@ -1,4 +1,4 @@
-"""The readings of a data set, during its gate and just after: cut to the gate, written down and counted."""
+"""The readings of a data set, just before its gate, during it and just after: cut to the gate, written, counted."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from instruments.errors import LinkError
 from instruments.interfaces.gyro import Gyro, Readings
+from instruments.interfaces.self_checks import StreamingGyro
 from procedures.contracts.errors import BadData
 from procedures.execution import late_readings
 from procedures.execution.context import ExecutionContext, raise_violation
@@ -13,6 +14,31 @@ from procedures.execution.waiting import checkpoint
 from procedures.monitoring.bench_snapshot import ReadingCounts
 from procedures.monitoring.campaign_time import CampaignTime
 from procedures.monitoring.event_recorder import warning
+
+#: Before a data set a stream of unknown period is read for at most so long, s of the clock, in slices of so long: that
+#: is enough behind an adapter that holds bytes back for 16 ms.
+LEARN_S, SLICE_S = 4.0, 0.25
+
+
+def learn_periods(context: ExecutionContext) -> None:
+    """Read the units whose periods are not known until they are: the times of the first readings need them.
+
+    Raises InstrumentError, Aborted.
+    """
+    until_s = context.clock.now_s() + LEARN_S
+    while context.clock.now_s() < until_s:
+        unknown = {name: gyro for name, gyro in context.bench.gyros.items() if _is_period_unknown(gyro)}
+        if not unknown:
+            return
+        for name, gyro in unknown.items():
+            readings = gyro.read(max(SLICE_S / len(unknown), 1.5 / gyro.sample_rate_hz))
+            if len(readings):
+                context.monitor.add_readings(name, gyro, readings)
+        checkpoint(context)
+
+
+def _is_period_unknown(gyro: Gyro) -> bool:
+    return isinstance(gyro, StreamingGyro) and gyro.period.measured_s is None
 
 
 def read_late(
