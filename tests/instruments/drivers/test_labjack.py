@@ -135,12 +135,9 @@ def test_a_reading_arrives_with_the_packet_of_its_last_scan(labjack: Callable[..
     s = labjack(average=20)
     s.gyro.start()
     s.gyro.read_latest()
-    parts = []
+    found = s.gyro.read(0.01)
     for _ in range(400):
-        parts.append(s.gyro.read(0.01))
-    found = parts[0]
-    for part in parts[1:]:
-        found = part.after(found)
+        found = s.gyro.read(0.01).after(found)
     assert found.arrival_s is not None
     assert len(found) == pytest.approx(200, abs=3)
     late_s = found.arrival_s - found.t_s

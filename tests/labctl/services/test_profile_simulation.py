@@ -82,9 +82,7 @@ def test_a_hidden_delay_is_found_and_the_recording_is_a_sound_profile() -> None:
 def test_a_simulated_profile_states_the_time_of_its_reference() -> None:
     """Without wires it is known: the budget of a delay has a line of 0, and none of unknown size."""
     recording = simulated(time_delay=0.005)
-    assert {name: np.unique(recording.columns[name]).tolist() for name in RATE_TIME_U} == dict.fromkeys(
-        RATE_TIME_U, [0.0]
-    )
+    assert not any(np.any(recording.columns[name]) for name in RATE_TIME_U)
     fitted = FittedModel.from_dict(fit(recording, None, EFFECTS_FITTED).fitted.to_dict())
     budget = response_budgets(fitted, evidence={}, bench=conditions_of(recording.info, {}))["z"]["delay"]
     assert budget.not_stated == ()
