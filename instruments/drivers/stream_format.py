@@ -14,7 +14,7 @@ from instruments.drivers.streamed_readings import (
 from instruments.interfaces.gyro import Channel, GyroIdentity, GyroLimits
 from instruments.protocols.stream_formats.frames import FrameDecoder
 from instruments.protocols.stream_formats.lines import LineDecoder
-from instruments.protocols.stream_formats.readings import Decoder, scale_of, stamp_ticks
+from instruments.protocols.stream_formats.readings import Decoder, pulse_ticks, scale_of, stamp_ticks
 from instruments.protocols.stream_formats.settings import StreamSettings
 from instruments.transport.factory import Ports
 from instruments.transport.serial_stream import SerialStream, line_of
@@ -39,7 +39,11 @@ class StreamFormatGyro(StreamedGyro):
             line=line_of(settings.options),
         )  # fmt: skip
         law = StreamLaw(
-            self.sample_rate_hz, [each.name for each in self._fields], format_.counter, stamp_ticks(format_)
+            self.sample_rate_hz,
+            [each.name for each in self._fields],
+            format_.counter,
+            stamp_ticks(format_),
+            pulse_ticks(format_),
         )
         readings = StreamedReadings(self.name, settings.port or "", stream, decoder, law, clock, self._unread)
         super().__init__(stream, readings)

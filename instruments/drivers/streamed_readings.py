@@ -14,9 +14,9 @@ from instruments.errors import NoReply
 from instruments.interfaces.gyro import Gyro, GyroIdentity, Readings
 from instruments.interfaces.self_checks import StreamPeriod
 from instruments.protocols.stream_formats.document import Counter
-from instruments.protocols.stream_formats.readings import Decoded, Decoder, StampTicks
+from instruments.protocols.stream_formats.readings import Decoded, Decoder, PulseTicks, StampTicks
 from instruments.transport.adapters import require_adapter
-from instruments.transport.device_time import DeviceTime
+from instruments.transport.device_time import CountedPulseTime, DeviceClock, DeviceTime, PulseTime
 from instruments.transport.sample_counter import SampleCounter
 from instruments.transport.sample_timing import FRESH_PERIODS, StreamTime, refuse_other_rate
 from instruments.transport.serial_stream import SerialStream
@@ -54,6 +54,7 @@ class StreamLaw:
     channels: Sequence[str]
     counter: Counter | None
     stamps: StampTicks | None = None
+    pulses: PulseTicks | None = None
 
 
 class StreamedReadings:
@@ -138,8 +139,16 @@ class StreamedReadings:
         given = self._law.counter
         return None if given is None else SampleCounter(self._device, self._port, step=given.step, wrap=given.wrap)
 
-    def _new_device_time(self) -> DeviceTime | None:
-        """Return the unit's own time: by its time stamps, or by its counter; None without either."""
+    def _new_device_time(self) -> DeviceClock | None:
+        """Return the unit's own time: by pulses, by its time stamps, or by its counter; None without any."""
+        own, pulses = self._new_own_time(), self._law.pulses
+        if pulses is None:
+            return own
+        if pulses.tick_s:
+            return PulseTime(pulses.tick_s, pulses.interval_s)
+        return None if own is None else CountedPulseTime(own, pulses.interval_s)
+
+    def _new_own_time(self) -> DeviceTime | None:
         if (ticks := self._law.stamps) is not None:
             return DeviceTime(ticks.tick_s, ticks.wrap)
         if (given := self._law.counter) is not None:
@@ -178,10 +187,20 @@ class StreamedReadings:
         refuse_other_rate(self._device, self._port, self._time.line)
         counts = self._counter is not None or self._law.stamps is not None
         lost = int(advance.sum()) - len(advance) + uncounted if counts else uncounted
-        told = self._law.stamps or self._law.counter
-        ticks = None if told is None else found.values[told.field][kept].astype(np.int64)
+        ticks = self._ticks(found, kept)
         readings = Readings(times, raw, valid, lost, damaged, None, arrival_s)
         return self._undecided.pass_on(readings, self._time, self._device_time, ticks)
+
+    def _ticks(self, found: Decoded, kept: NDArray[np.bool_]) -> NDArray[np.int64] | None:
+        """Return what each reading says of the unit's own time, (n,), or (n, 2) with the number of pulses."""
+        own, pulses = self._law.stamps or self._law.counter, self._law.pulses
+        if own is None and pulses is None:
+            return None
+        fields = [each.field for each in (own, pulses) if each is not None]
+        if pulses is not None and pulses.tick_s:
+            fields = [pulses.field]
+        columns = [found.values[field][kept].astype(np.int64) for field in fields]
+        return columns[0] if len(columns) == 1 else np.stack(columns, axis=1)
 
     def _advance(self, found: Decoded, kept: NDArray[np.bool_]) -> NDArray[np.int64]:
         """Return how many periods each reading, (n,), is from the one before."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from instruments.interfaces.gyro import Readings
-from instruments.transport.device_time import DeviceTime
+from instruments.transport.device_time import DeviceClock
 from instruments.transport.sample_timing import StreamTime
 
 Ticks = NDArray[np.int64]
@@ -25,12 +25,12 @@ class Undecided:
         self._kept.clear()
 
     def pass_on(
-        self, readings: Readings, time: StreamTime, device_time: DeviceTime | None = None, ticks: Ticks | None = None
+        self, readings: Readings, time: StreamTime, device_time: DeviceClock | None = None, ticks: Ticks | None = None
     ) -> Readings:
         """Return the readings whose times are decided: none, or `readings` after those that were kept.
 
-        `time` has just given the times of `readings`, n >= 1. `ticks` (n,) are their numbers by the device's own clock,
-        of which `device_time` makes times: a number that begins again needs to know how much time has passed.
+        `time` has just given the times of `readings`, n >= 1. `ticks` (n,) or (n, 2) are their numbers by the device's
+        own clock, of which `device_time` makes times: a number that begins again needs the time that has passed.
         """
         if time.is_late:
             self._kept.append((replace(readings, damaged=0), ticks))
