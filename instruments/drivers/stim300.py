@@ -154,6 +154,10 @@ class Stim300:
         """Control the stream: close the port; safe to call twice."""
         self._stream.close()
 
+    def kept_back(self) -> Readings | None:
+        """Get the readings that are kept back because the stream is late, each once; None where none are."""
+        return self._undecided.take(self._device_time)
+
     @property
     def period(self) -> StreamPeriod:
         """Get what is known of the period since the start."""

@@ -86,6 +86,10 @@ class StreamedReadings:
         """Whether the stream is too far behind the clock, so that readings may be lost."""
         return self._time.is_late
 
+    def kept_back(self) -> Readings | None:
+        """Return the readings that are kept back because the stream is late, each once; None where none are."""
+        return self._undecided.take(self._device_time)
+
     @property
     def period(self) -> StreamPeriod:
         """What is known of the period since `begin`."""
@@ -249,6 +253,10 @@ class StreamedGyro:
     def is_late(self) -> bool:
         """Get whether the stream is too far behind the clock, so that readings may be lost."""
         return self._readings.is_late
+
+    def kept_back(self) -> Readings | None:
+        """Get the readings that are kept back because the stream is late, each once; None where none are."""
+        return self._readings.kept_back()
 
     @property
     def period(self) -> StreamPeriod:
