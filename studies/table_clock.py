@@ -97,36 +97,79 @@ class LateReplies:
         return self._phase_s + ticks * self._latency_s + late_s
 
 
+class TimedTable:
+    """A simulated table whose step clock is timed, from the bytes of its controller."""
+
+    def __init__(self, kind: Kind, latency_s: float, rng: np.random.Generator) -> None:
+        self.clock = VirtualClock()
+        self._opened = open_bench(bench(), self.clock)
+        self.table: Any = self._opened.table
+        device: Any = self._opened.simulation.device("sim://arrick")  # type: ignore[union-attr]
+        self._device = device._device  # noqa: SLF001
+        self._kind, self._latency_s, self._rng = kind, latency_s, rng
+        self._ppm = kind.ppm(rng)
+        self.runs: list[ClockRun] = []
+        self.connect()
+        self.table.home()
+
+    def connect(self) -> None:
+        """Begin a session: the timer of the adapter has another phase."""
+        self._device.passed_on_s = LateReplies(self._kind, self._latency_s, self._rng)
+
+    def ratio(self, t_s: float) -> float:
+        """Return the true step rate over the nominal one at a time, s."""
+        return 1.0 + 1e-6 * (self._ppm(t_s) - OFF_PPM)
+
+    def time_block(self, number: int, session: int, block: int) -> MeasuredClock | None:
+        """Time some runs; returns the clock by all so far."""
+        for steady_s in run_lengths_s(number, len(self.runs), 10.0, self.table.limits.clock_run_s):
+            self._device.clock_ratio = self.ratio(self.clock.now_s() + steady_s / 2)
+            run = self.table.time_run(RATE_DPS, steady_s, self.clock.sleep)
+            middle_s = run.began_s + run.duration_s / 2
+            self.runs.append(ClockRun(session, block, middle_s, run.nominal_s, run.duration_s, run.step_hz))
+        return measured(self.runs, self.table.step_clock)
+
+    def close(self) -> None:
+        """Close the bench."""
+        self._opened.close()
+
+
 def campaign(kind: Kind, latency_s: float, seed: tuple[int, ...]) -> tuple[float, float, float]:
     """Return of one campaign the share of its rates inside U, U in ppm, and the error of their mean over U."""
-    rng, clock = np.random.default_rng(seed), VirtualClock()
-    opened = open_bench(bench(), clock)
-    table: Any = opened.table
-    device: Any = opened.simulation.device("sim://arrick")._device  # type: ignore[union-attr]  # noqa: SLF001
-    device.passed_on_s = LateReplies(kind, latency_s, rng)
-    ppm, runs, planned, times_s = kind.ppm(rng), [], 0, []
+    timed, times_s = TimedTable(kind, latency_s, np.random.default_rng(seed)), []
     found: MeasuredClock | None = None
     try:
-        table.home()
         for block in range(BLOCKS):
-            number = LATER_RUNS if block else FIRST_RUNS
-            for steady_s in run_lengths_s(number, planned, 10.0, table.limits.clock_run_s):
-                device.clock_ratio = 1.0 + 1e-6 * (ppm(clock.now_s() + steady_s / 2) - OFF_PPM)
-                run = table.time_run(RATE_DPS, steady_s, clock.sleep)
-                middle_s = run.began_s + run.duration_s / 2
-                runs.append(ClockRun(1, block, middle_s, run.nominal_s, run.duration_s, run.step_hz))
-            planned += number
-            found = measured(runs, table.step_clock)
+            found = timed.time_block(LATER_RUNS if block else FIRST_RUNS, 1, block)
             if block < BLOCKS - 1:
-                times_s += [clock.now_s() + BLOCK_EVERY_S * (n + 0.5) / TIMES for n in range(TIMES)]
-                clock.sleep(BLOCK_EVERY_S)
+                times_s += [timed.clock.now_s() + BLOCK_EVERY_S * (n + 0.5) / TIMES for n in range(TIMES)]
+                timed.clock.sleep(BLOCK_EVERY_S)
     finally:
-        opened.close()
+        timed.close()
     assert found is not None
-    true = np.array([1.0 + 1e-6 * (ppm(t_s) - OFF_PPM) for t_s in times_s])
+    true = np.array([timed.ratio(t_s) for t_s in times_s])
     errors_ppm = 1e6 * (np.array([found.fit.ratio(t_s) for t_s in times_s]) / true - 1.0)
     inside = float(np.mean(np.abs(errors_ppm) <= found.expanded_ppm))
     return inside, found.expanded_ppm, float(errors_ppm.mean() / found.expanded_ppm)
+
+
+def resumed_campaign(kind: Kind, latency_s: float, seed: tuple[int, ...]) -> tuple[float, float]:
+    """Return the error of the deviation that a resumed campaign states at its end, and its U, both in ppm.
+
+    Its runs are those before the first data set, as many when it is resumed half an hour later, and two at the end.
+    """
+    timed = TimedTable(kind, latency_s, np.random.default_rng(seed))
+    try:
+        timed.time_block(FIRST_RUNS, 1, 1)
+        timed.clock.sleep(1800.0)
+        timed.connect()
+        timed.time_block(FIRST_RUNS, 2, 2)
+        timed.clock.sleep(1800.0)
+        found = timed.time_block(LATER_RUNS, 2, 3)
+    finally:
+        timed.close()
+    assert found is not None
+    return 1e6 * (found.ratio - timed.ratio(found.fit.until_s)), found.deviation_expanded_ppm
 
 
 def run(campaigns: int = CAMPAIGNS) -> str:

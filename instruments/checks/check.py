@@ -183,8 +183,8 @@ def _judge_stream(gyro: StreamingGyro, report: DeviceReport) -> None:
         text = f"counter step {found}"
         if found != meant:
             text += (
-                f", but the bench file gives {meant}: correct sample_rate_hz or datagram in the bench file, "
-                "or configure the unit"
+                f", but by the bench file it is {meant}: correct sample_rate_hz, datagram or the step of the counter "
+                "there, or configure the unit"
             )
         report.add([Finding("counter", text, "good" if found == meant else "bad", value=float(found))])
 

@@ -6,7 +6,13 @@ from importlib import resources
 
 from instruments.clock import Clock
 from instruments.drivers.driver import GyroDriver, Trial
-from instruments.drivers.streamed_readings import SILENCE_S, StreamedReadings, StreamLaw
+from instruments.drivers.streamed_readings import (
+    SILENCE_S,
+    StreamedGyro,
+    StreamedReadings,
+    StreamLaw,
+    identify_stream,
+)
 from instruments.errors import LinkError
 from instruments.interfaces.gyro import Channel, GyroIdentity, GyroLimits, Readings
 from instruments.protocols.can.cycles import CycleDecoder
@@ -18,7 +24,7 @@ from instruments.transport.factory import Ports
 from instruments.transport.serial_stream import SerialStream
 
 
-class CanGyro:
+class CanGyro(StreamedGyro):
     """A gyro that sends its readings as messages of a CAN bus. Raw values are the whole numbers of the signals."""
 
     def __init__(self, settings: CanSettings, ports: Ports, clock: Clock) -> None:
@@ -30,10 +36,12 @@ class CanGyro:
         self._scales = layout.scales
         self._decoder = CycleDecoder(layout)
         port = settings.port or ""
-        self._stream = SerialStream(self.name, port, ports, clock, baudrate=0, timeout_s=SILENCE_S)
+        stream = SerialStream(self.name, port, ports, clock, baudrate=0, timeout_s=SILENCE_S)
         counter = _counter(settings, layout.counter_bits)
         law = StreamLaw(self.sample_rate_hz, list(layout.scales), counter)
-        self._readings = StreamedReadings(self.name, port, self._stream, self._decoder, law, clock, self._unread)
+        super().__init__(
+            stream, StreamedReadings(self.name, port, stream, self._decoder, law, clock, self._unread)
+        )  # fmt: skip
 
     @property
     def channels(self) -> tuple[Channel, ...]:
@@ -42,15 +50,7 @@ class CanGyro:
 
     def identify(self) -> GyroIdentity:
         """Get the unit's identity from the bench file, after one reading came; raises NoReply, LinkError."""
-        settings = self.settings
-        was_open = self._stream.is_open
-        self.start()
-        self.read_latest()
-        if not was_open:
-            self.stop()
-        return GyroIdentity(
-            settings.serial, settings.model or "gyro on a CAN bus", settings.technology or "mems", settings.datasheet
-        )
+        return identify_stream(self, self.settings, self._stream, ("gyro on a CAN bus", "mems"))
 
     def start(self) -> None:
         """Control the stream: open the bus, send the frames that start the unit, drop what is old; LinkError."""
@@ -62,24 +62,15 @@ class CanGyro:
         Raises NoReply after SILENCE_S, or five sampling periods, without a reading; MalformedReply for a counter that
         stands; WrongInstrument for another rate; LinkError, also where the interface has left the bus.
         """
-        found = self._readings.read(duration_s)
+        found = super().read(duration_s)
         self._refuse_bus_off()
         return found
 
     def read_latest(self) -> Readings:
         """Get one fresh reading and drop everything older; raises NoReply after SILENCE_S, LinkError."""
-        found = self._readings.read_latest()
+        found = super().read_latest()
         self._refuse_bus_off()
         return found
-
-    def stop(self) -> None:
-        """Control the stream: close the bus; safe to call twice."""
-        self._stream.close()
-
-    @property
-    def is_late(self) -> bool:
-        """Get whether the stream is too far behind the clock, so that readings may be lost."""
-        return self._readings.is_late
 
     def _refuse_bus_off(self) -> None:
         if self._decoder.is_bus_off:

@@ -11,6 +11,7 @@ import numpy as np
 from instruments.clock import Clock
 from instruments.drivers import probes
 from instruments.drivers.driver import GyroDriver, Trial
+from instruments.drivers.streamed_readings import identify_stream
 from instruments.errors import LimitError, NoReply
 from instruments.interfaces.gyro import Channel, GyroIdentity, GyroLimits, Readings
 from instruments.interfaces.self_checks import StreamPeriod
@@ -26,7 +27,6 @@ from instruments.protocols.kvh_lines import (
     LineFormat,
     parse_line,
 )
-from instruments.transport.adapters import require_adapter
 from instruments.transport.factory import Ports
 from instruments.transport.sample_timing import FRESH_PERIODS, StreamTime, refuse_other_rate
 from instruments.transport.serial_stream import SerialStream, line_of
@@ -90,17 +90,8 @@ class KvhGyro:
 
         Raises WrongInstrument where the port is on another USB adapter than the bench file names, NoReply, LinkError.
         """
-        adapter = require_adapter(self.name, self.settings.port, self.settings.options.adapter)
-        was_open = self._stream.is_open
-        self.start()
-        self.read_latest()
-        if not was_open:
-            self.stop()
-        settings = self.settings
-        return GyroIdentity(
-            settings.serial, settings.model or self._model.name, settings.technology or "fog", settings.datasheet,
-            reported=adapter,
-        )  # fmt: skip
+        adapter, usual = self.settings.options.adapter, (self._model.name, "fog")
+        return identify_stream(self, self.settings, self._stream, usual, adapter=adapter)
 
     def start(self) -> None:
         """Control the stream: open the port, ask for rates, and drop stale or partial lines; raises LinkError."""
@@ -136,6 +127,10 @@ class KvhGyro:
     def stop(self) -> None:
         """Control the stream: close the port; safe to call twice."""
         self._stream.close()
+
+    def kept_back(self) -> Readings | None:
+        """Get the readings that are kept back because the stream is late, each once; None where none are."""
+        return self._undecided.take()
 
     @property
     def period(self) -> StreamPeriod:

@@ -29,16 +29,6 @@ def _in_one_line(said: object) -> str:
     return one_line(", ".join(str(part) for part in said) if isinstance(said, list | tuple) else str(said))
 
 
-def serial_in(said: str) -> str:
-    """Return the serial number in an answer to `*IDN?`; empty where it has none.
-
-    By IEEE Std 488.2, 10.14, that answer has four fields: manufacturer, model, serial number and firmware. A serial
-    number that is not available is 0; some classes write NA.
-    """
-    fields = [field.strip() for field in said.split(",")]
-    return fields[2] if len(fields) == 4 and any(each in "123456789" for each in fields[2]) else ""
-
-
 class LibraryInstrument:
     """An instrument of another library, opened at first use."""
 

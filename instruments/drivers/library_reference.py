@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from instruments.clock import Clock
 from instruments.drivers.driver import ReferenceDriver, Trial
-from instruments.drivers.library_instrument import LibraryInstrument, serial_in
-from instruments.errors import WrongInstrument
+from instruments.drivers.library_instrument import LibraryInstrument
+from instruments.drivers.serial_numbers import refuse_other_serial
 from instruments.interfaces.gyro import Channel
 from instruments.interfaces.reference import ReferenceState
 from instruments.protocols.library_settings import LibraryReferenceSettings
@@ -26,13 +26,7 @@ class LibraryReference:
     def identify(self) -> str:
         """Get what the instrument says of itself; raises WrongInstrument for another serial number, InstrumentError."""
         settings, said = self.settings, self._instrument.identity()
-        tells_serial = settings.identity or serial_in(said)
-        if settings.serial and tells_serial and settings.serial not in said:
-            raise WrongInstrument(
-                self.name,
-                f"identifies itself as {said!r}, but the bench file gives serial number "
-                f"{settings.serial!r}; correct the address, or serial and certificate, in the bench file",
-            )
+        refuse_other_serial(self.name, said, settings.serial, is_told=bool(settings.identity))
         self.read()
         certificate = f"; certificate {settings.certificate}" if settings.certificate else ""
         return f"{settings.instrument} of {settings.library} {said}".strip() + certificate

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 from instruments.clock import Clock
 from instruments.drivers.driver import ReferenceDriver, Trial
-from instruments.errors import MalformedReply, WrongInstrument
+from instruments.drivers.serial_numbers import refuse_other_serial
+from instruments.errors import MalformedReply
 from instruments.interfaces.gyro import Channel
 from instruments.interfaces.reference import ReferenceState
 from instruments.protocols.text_lines.line_syntax import LineSyntax
@@ -51,22 +52,11 @@ class LineReference:
         """
         said = ""
         if self._model.identity:
-            reply = self._lines.ask(self._model.identity, r".*\S.*", "say what it is")[0]
-            said = self._checked_serial(reply)
+            said = self._lines.ask(self._model.identity, r".*\S.*", "say what it is")[0]
+            refuse_other_serial(self.name, said, self.settings.serial, is_told=True)
         self.read()
         certificate = f"; certificate {self.settings.certificate}" if self.settings.certificate else ""
         return f"{said or self._model.title}{certificate}"
-
-    def _checked_serial(self, reply: str) -> str:
-        parts = [part.strip() for part in reply.split(",")]
-        wanted = self.settings.serial
-        if wanted and wanted not in parts:
-            raise WrongInstrument(
-                self.name,
-                f"identifies itself as {reply!r}, but the bench file gives serial number {wanted!r}; correct "
-                "the port, or serial and certificate, in the bench file",
-            )
-        return reply
 
     def read(self) -> ReferenceState:
         """Get one reading of every quantity; raises MalformedReply for another unit, NoReply, LinkError."""

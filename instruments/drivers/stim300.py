@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from instruments.clock import Clock
 from instruments.drivers import probes
 from instruments.drivers.driver import GyroDriver
+from instruments.drivers.streamed_readings import identify_stream
 from instruments.errors import NoReply, WrongInstrument
 from instruments.interfaces.gyro import Channel, GyroIdentity, GyroLimits, Readings
 from instruments.interfaces.self_checks import StreamPeriod
@@ -36,7 +37,6 @@ from instruments.protocols.stim300.frames import (
 )
 from instruments.protocols.stim300.layouts import SPECIALS
 from instruments.protocols.stim300.settings import Stim300Settings
-from instruments.transport.adapters import require_adapter
 from instruments.transport.device_time import DeviceTime
 from instruments.transport.factory import Ports
 from instruments.transport.sample_counter import SampleCounter
@@ -105,17 +105,8 @@ class Stim300:
 
         Raises WrongInstrument for a unit that is another one or set otherwise, NoReply, LinkError.
         """
-        settings = self.settings
-        adapter = require_adapter(self.name, settings.port, self.options.adapter)
-        was_open = self._stream.is_open
-        self.start()
-        self.read_latest()
-        if not was_open:
-            self.stop()
-        return GyroIdentity(
-            settings.serial, settings.model or "Sensonor STIM300", settings.technology or "mems", settings.datasheet,
-            reported=self._reported() | adapter,
-        )  # fmt: skip
+        adapter, usual = self.options.adapter, ("Sensonor STIM300", "mems")
+        return identify_stream(self, self.settings, self._stream, usual, adapter=adapter, reported=self._reported)
 
     def start(self) -> None:
         """Control the stream: open the port and drop stale bytes; raises LinkError."""
@@ -162,6 +153,10 @@ class Stim300:
     def stop(self) -> None:
         """Control the stream: close the port; safe to call twice."""
         self._stream.close()
+
+    def kept_back(self) -> Readings | None:
+        """Get the readings that are kept back because the stream is late, each once; None where none are."""
+        return self._undecided.take(self._device_time)
 
     @property
     def period(self) -> StreamPeriod:

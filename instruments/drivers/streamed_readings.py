@@ -1,19 +1,22 @@
-"""Readings of a stream that a decoder takes apart: their times, their counter, what is lost, damaged or silent."""
+"""Gyros that send unasked: what their drivers share, and the readings of a stream that a decoder takes apart."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from instruments.bench_config import GyroSettings
 from instruments.clock import Clock
 from instruments.errors import NoReply
-from instruments.interfaces.gyro import Readings
+from instruments.interfaces.gyro import Gyro, GyroIdentity, Readings
+from instruments.interfaces.self_checks import StreamPeriod
 from instruments.protocols.stream_formats.document import Counter
-from instruments.protocols.stream_formats.readings import Decoded, Decoder, StampTicks
-from instruments.transport.device_time import DeviceTime
+from instruments.protocols.stream_formats.readings import Decoded, Decoder, PulseTicks, StampTicks
+from instruments.transport.adapters import require_adapter
+from instruments.transport.device_time import CountedPulseTime, DeviceClock, DeviceTime, PulseTime
 from instruments.transport.sample_counter import SampleCounter
 from instruments.transport.sample_timing import FRESH_PERIODS, StreamTime, refuse_other_rate
 from instruments.transport.serial_stream import SerialStream
@@ -24,6 +27,25 @@ SILENCE_S = 2.0
 PORT_BUFFER_BYTES, EMPTY_EVERY_S, LONG_MESSAGE_BYTES = 4096, 1.0, 160
 
 
+def identify_stream(
+    gyro: Gyro, settings: GyroSettings, stream: SerialStream, usual: tuple[str, str], *, adapter: str | None = None,
+    reported: Callable[[], Mapping[str, str]] = dict,
+) -> GyroIdentity:  # fmt: skip
+    """Return the identity of a unit by its bench file and by what it reports, after one reading came.
+
+    `usual` are the model and the technology where the bench file gives none; a stream that was closed is closed
+    again. Raises WrongInstrument where the port is on another USB adapter than `adapter`, NoReply, LinkError.
+    """
+    on = require_adapter(gyro.name, settings.port, adapter)
+    was_open = stream.is_open
+    gyro.start()
+    gyro.read_latest()
+    if not was_open:
+        gyro.stop()
+    model, technology = settings.model or usual[0], settings.technology or usual[1]
+    return GyroIdentity(settings.serial, model, technology, settings.datasheet, reported={**reported(), **on})
+
+
 @dataclass(frozen=True)
 class StreamLaw:
     """What is known of a stream: its readings per second, the channels that are kept, its counter and time stamps."""
@@ -32,6 +54,7 @@ class StreamLaw:
     channels: Sequence[str]
     counter: Counter | None
     stamps: StampTicks | None = None
+    pulses: PulseTicks | None = None
 
 
 class StreamedReadings:
@@ -62,6 +85,21 @@ class StreamedReadings:
     def is_late(self) -> bool:
         """Whether the stream is too far behind the clock, so that readings may be lost."""
         return self._time.is_late
+
+    def kept_back(self) -> Readings | None:
+        """Return the readings that are kept back because the stream is late, each once; None where none are."""
+        return self._undecided.take(self._device_time)
+
+    @property
+    def period(self) -> StreamPeriod:
+        """What is known of the period since `begin`."""
+        return self._time.known
+
+    @property
+    def counter_step(self) -> tuple[int, int] | None:
+        """Usual step of the counter, and the one that is stated; None without, and before two readings came."""
+        step = None if self._counter is None else self._counter.step
+        return None if step is None or self._law.counter is None else (step, self._law.counter.step)
 
     def begin(self, requests: Sequence[bytes]) -> None:
         """Open the port, send what starts the stream, drop what is old; raises LinkError."""
@@ -105,8 +143,16 @@ class StreamedReadings:
         given = self._law.counter
         return None if given is None else SampleCounter(self._device, self._port, step=given.step, wrap=given.wrap)
 
-    def _new_device_time(self) -> DeviceTime | None:
-        """Return the unit's own time: by its time stamps, or by its counter; None without either."""
+    def _new_device_time(self) -> DeviceClock | None:
+        """Return the unit's own time: by pulses, by its time stamps, or by its counter; None without any."""
+        own, pulses = self._new_own_time(), self._law.pulses
+        if pulses is None:
+            return own
+        if pulses.tick_s:
+            return PulseTime(pulses.tick_s, pulses.interval_s)
+        return None if own is None else CountedPulseTime(own, pulses.interval_s)
+
+    def _new_own_time(self) -> DeviceTime | None:
         if (ticks := self._law.stamps) is not None:
             return DeviceTime(ticks.tick_s, ticks.wrap)
         if (given := self._law.counter) is not None:
@@ -145,10 +191,20 @@ class StreamedReadings:
         refuse_other_rate(self._device, self._port, self._time.line)
         counts = self._counter is not None or self._law.stamps is not None
         lost = int(advance.sum()) - len(advance) + uncounted if counts else uncounted
-        told = self._law.stamps or self._law.counter
-        ticks = None if told is None else found.values[told.field][kept].astype(np.int64)
+        ticks = self._ticks(found, kept)
         readings = Readings(times, raw, valid, lost, damaged, None, arrival_s)
         return self._undecided.pass_on(readings, self._time, self._device_time, ticks)
+
+    def _ticks(self, found: Decoded, kept: NDArray[np.bool_]) -> NDArray[np.int64] | None:
+        """Return what each reading says of the unit's own time, (n,), or (n, 2) with the number of pulses."""
+        own, pulses = self._law.stamps or self._law.counter, self._law.pulses
+        if own is None and pulses is None:
+            return None
+        fields = [each.field for each in (own, pulses) if each is not None]
+        if pulses is not None and pulses.tick_s:
+            fields = [pulses.field]
+        columns = [found.values[field][kept].astype(np.int64) for field in fields]
+        return columns[0] if len(columns) == 1 else np.stack(columns, axis=1)
 
     def _advance(self, found: Decoded, kept: NDArray[np.bool_]) -> NDArray[np.int64]:
         """Return how many periods each reading, (n,), is from the one before."""
@@ -169,3 +225,45 @@ class StreamedReadings:
             moved %= ticks.wrap
         self._stamp = int(stamps[-1])
         return np.maximum(np.rint(moved / period), 1.0).astype(np.int64)
+
+
+class StreamedGyro:
+    """Part of the drivers whose units a file describes: the stream, its period and its end."""
+
+    def __init__(self, stream: SerialStream, readings: StreamedReadings) -> None:
+        self._stream, self._readings = stream, readings
+
+    def read(self, duration_s: float) -> Readings:
+        """Get every reading of the next `duration_s` seconds; fewer where messages are missing.
+
+        Raises NoReply after SILENCE_S, or five sampling periods, without a reading; MalformedReply for a counter that
+        stands; WrongInstrument for another rate; LinkError.
+        """
+        return self._readings.read(duration_s)
+
+    def read_latest(self) -> Readings:
+        """Get one fresh reading and drop everything older; raises NoReply after SILENCE_S, LinkError."""
+        return self._readings.read_latest()
+
+    def stop(self) -> None:
+        """Control the stream: close it; safe to call twice."""
+        self._stream.close()
+
+    @property
+    def is_late(self) -> bool:
+        """Get whether the stream is too far behind the clock, so that readings may be lost."""
+        return self._readings.is_late
+
+    def kept_back(self) -> Readings | None:
+        """Get the readings that are kept back because the stream is late, each once; None where none are."""
+        return self._readings.kept_back()
+
+    @property
+    def period(self) -> StreamPeriod:
+        """Get what is known of the period since the start."""
+        return self._readings.period
+
+    @property
+    def counter_step(self) -> tuple[int, int] | None:
+        """Get the usual step of the counter, and the one that is stated; None without, and before two readings."""
+        return self._readings.counter_step

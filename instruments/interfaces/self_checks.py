@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
+from instruments.interfaces.gyro import Readings
+
 
 @runtime_checkable
 class SelfChecking(Protocol):
@@ -46,4 +48,16 @@ class LateTelling(Protocol):
     @property
     def is_late(self) -> bool:
         """Get whether the stream is too far behind the clock."""
+        ...
+
+
+@runtime_checkable
+class KeepingBack(Protocol):
+    """A gyro that keeps readings back while it is open whether readings before them are lost."""
+
+    def kept_back(self) -> Readings | None:
+        """Get the readings that are kept back, each once, at the times that they have if none is lost; None: none are.
+
+        For a stream that has ended: nothing will decide any more.
+        """
         ...

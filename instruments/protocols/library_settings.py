@@ -48,6 +48,7 @@ class LibraryOptions(BaseModel):
 class LibraryChamberSettings(LibraryOptions, ChamberSettings):
     """A chamber: names of the attributes or methods of its class."""
 
+    serial: str = ""  #: compared with what it says of itself, where that holds a serial number
     temperature: str = "temperature"
     setpoint: str = "setpoint"
     start: str = ""  #: called after each set point; empty: it needs no start

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from instruments.interfaces.gyro import Readings
-from instruments.transport.device_time import DeviceTime
+from instruments.transport.device_time import DeviceClock
 from instruments.transport.sample_timing import StreamTime
 
 Ticks = NDArray[np.int64]
@@ -24,13 +24,25 @@ class Undecided:
         """Forget what is kept."""
         self._kept.clear()
 
+    def take(self, device_time: DeviceClock | None = None) -> Readings | None:
+        """Return what is kept, n >= 1, at the times that hold if none is lost, and forget it; None where nothing is."""
+        found: Readings | None = None
+        parts: list[Ticks] = []
+        for readings, ticks in self._kept:
+            found = readings if found is None else readings.after(found)
+            parts += [] if ticks is None else [ticks]
+        self._kept.clear()
+        if found is None or device_time is None or not parts:
+            return found
+        return replace(found, device_s=device_time.of(np.concatenate(parts), found.t_s))
+
     def pass_on(
-        self, readings: Readings, time: StreamTime, device_time: DeviceTime | None = None, ticks: Ticks | None = None
+        self, readings: Readings, time: StreamTime, device_time: DeviceClock | None = None, ticks: Ticks | None = None
     ) -> Readings:
         """Return the readings whose times are decided: none, or `readings` after those that were kept.
 
-        `time` has just given the times of `readings`, n >= 1. `ticks` (n,) are their numbers by the device's own clock,
-        of which `device_time` makes times: a number that begins again needs to know how much time has passed.
+        `time` has just given the times of `readings`, n >= 1. `ticks` (n,) or (n, 2) are their numbers by the device's
+        own clock, of which `device_time` makes times: a number that begins again needs the time that has passed.
         """
         if time.is_late:
             self._kept.append((replace(readings, damaged=0), ticks))

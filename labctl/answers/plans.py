@@ -129,7 +129,11 @@ class PlanResponse(ResponseModel):
     datasets: DatasetCount
     expected_s: ExpectedDuration
     guessed: list[str] = Field(
-        default_factory=list, description="Figures of the expected time that the bench file does not state."
+        default_factory=list,
+        description="Figures of the expected time that neither the bench file nor an earlier campaign states.",
+    )
+    learned: list[str] = Field(
+        default_factory=list, description="Figures of the expected time that are from earlier campaigns on the bench."
     )
     verification_datasets: int = Field(description="Number of the data sets that verify and are never fitted.")
     verification_s: float = Field(description="Expected time of these, with their mountings and soaks, s.")

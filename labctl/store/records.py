@@ -122,6 +122,16 @@ class StepRow:
 
 
 @dataclass(frozen=True)
+class DoneStepRow:
+    """A step of a campaign that was done, and on what."""
+
+    campaign: int
+    bench: JsonObject  #: the bench file of the campaign
+    body: StepJson
+    took_s: float
+
+
+@dataclass(frozen=True)
 class EventRow:
     """Something that happened in a campaign."""
 

@@ -14,7 +14,14 @@ from procedures.contracts.steps import Acquire
 from procedures.execution import late_readings
 from procedures.execution.context import UNIT_FAULTS, ExecutionContext, raise_violation
 from procedures.execution.course import take_course
-from procedures.execution.gate_readings import count_missing, count_silence, demand_readings, read_late, read_round
+from procedures.execution.gate_readings import (
+    count_missing,
+    count_silence,
+    demand_readings,
+    learn_periods,
+    read_late,
+    read_round,
+)
 from procedures.execution.table_checks import follow_clock
 from procedures.execution.waiting import checkpoint, pass_time
 from procedures.monitoring.bench_snapshot import ReadingCounts
@@ -41,6 +48,7 @@ def acquire(context: ExecutionContext, step: Acquire) -> dict[str, float]:
         attempt += 1
         stalled_s = context.monitor.stalls.total_s()
         try:
+            learn_periods(context)
             return _take(context, step) if step.course is None else take_course(context, step)
         except (LinkError, BadData, GuardTripped) as error:
             unit = _unit_at_fault(context, error)

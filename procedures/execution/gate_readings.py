@@ -1,4 +1,4 @@
-"""The readings of a data set, during its gate and just after: cut to the gate, written down and counted."""
+"""The readings of a data set, just before its gate, during it and just after: cut to the gate, written, counted."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from instruments.errors import LinkError
 from instruments.interfaces.gyro import Gyro, Readings
+from instruments.interfaces.self_checks import KeepingBack, StreamingGyro
 from procedures.contracts.errors import BadData
 from procedures.execution import late_readings
 from procedures.execution.context import ExecutionContext, raise_violation
@@ -13,6 +14,31 @@ from procedures.execution.waiting import checkpoint
 from procedures.monitoring.bench_snapshot import ReadingCounts
 from procedures.monitoring.campaign_time import CampaignTime
 from procedures.monitoring.event_recorder import warning
+
+#: Before a data set a stream of unknown period is read for at most so long, s of the clock, in slices of so long: that
+#: is enough behind an adapter that holds bytes back for 16 ms.
+LEARN_S, SLICE_S = 4.0, 0.25
+
+
+def learn_periods(context: ExecutionContext) -> None:
+    """Read the units whose periods are not known until they are: the times of the first readings need them.
+
+    Raises InstrumentError, Aborted.
+    """
+    until_s = context.clock.now_s() + LEARN_S
+    while context.clock.now_s() < until_s:
+        unknown = {name: gyro for name, gyro in context.bench.gyros.items() if _is_period_unknown(gyro)}
+        if not unknown:
+            return
+        for name, gyro in unknown.items():
+            readings = gyro.read(max(SLICE_S / len(unknown), 1.5 / gyro.sample_rate_hz))
+            if len(readings):
+                context.monitor.add_readings(name, gyro, readings)
+        checkpoint(context)
+
+
+def _is_period_unknown(gyro: Gyro) -> bool:
+    return isinstance(gyro, StreamingGyro) and gyro.period.measured_s is None
 
 
 def read_late(
@@ -50,9 +76,15 @@ def count_silence(
     context: ExecutionContext, number: int, gate: tuple[float, float], counts: dict[str, ReadingCounts],
     error: BaseException,
 ) -> None:  # fmt: skip
-    """Count what a unit promised until now as lost, where its link failed: the data set ends without it."""
+    """Write down what the driver kept back, and count what a unit promised until now as lost, where its link failed.
+
+    The data set ends without it. Nothing will decide any more whether readings before those that were kept are lost:
+    they count as having arrived.
+    """
     if not isinstance(error, LinkError) or (gyro := context.bench.gyros.get(error.device)) is None:
         return
+    if isinstance(gyro, KeepingBack) and (kept := gyro.kept_back()) is not None:
+        _keep(context, number, error.device, kept, gate, counts[error.device])
     passed = gate[0], min(max(context.clock.now_s(), gate[0]), gate[1])
     if missing := missing_of(gyro, passed, counts[error.device]):
         _write_lost(context, number, error.device, passed, counts[error.device], missing)
@@ -77,18 +109,27 @@ def read_round(
     """Read every unit once and write down what falls into the gate."""
     for name, gyro in context.bench.gyros.items():
         readings = gyro.read(max(slice_s, 1.5 / gyro.sample_rate_hz))
-        kept = cut(readings, gate, context.recorder.time)
         if len(readings):
-            if counts[name].newest_s < gate[0] or readings.t_s[-1] >= gate[1]:  # some may be lost outside the gate
-                room = late_readings.room(gyro, readings, gate, counts[name])
-                kept = replace(kept, lost=min(kept.lost, max(room - len(kept), 0)))
             context.monitor.add_readings(name, gyro, readings)
-            counts[name].note(readings.t_s, gate[0])
-        if len(kept) or kept.lost or kept.damaged:
-            counts[name].add(kept)
-            context.response.add(name, kept)
-            beside = context.monitor.references.beside(kept)
-            context.recorder.journal.readings(number, name, beside, context.monitor.chamber_c)
+        _keep(context, number, name, readings, gate, counts[name])
+
+
+def _keep(
+    context: ExecutionContext, number: int, name: str, readings: Readings, gate: tuple[float, float],
+    count: ReadingCounts,
+) -> None:  # fmt: skip
+    """Write down and count what of some readings falls into the gate."""
+    gyro, kept = context.bench.gyros[name], cut(readings, gate, context.recorder.time)
+    if len(readings):
+        if count.newest_s < gate[0] or readings.t_s[-1] >= gate[1]:  # some may be lost outside the gate
+            room = late_readings.room(gyro, readings, gate, count)
+            kept = replace(kept, lost=min(kept.lost, max(room - len(kept), 0)))
+        count.note(readings.t_s, gate[0])
+    if len(kept) or kept.lost or kept.damaged:
+        count.add(kept)
+        context.response.add(name, kept)
+        beside = context.monitor.references.beside(kept)
+        context.recorder.journal.readings(number, name, beside, context.monitor.chamber_c)
 
 
 def cut(readings: Readings, gate: tuple[float, float], time: CampaignTime) -> Readings:

@@ -22,9 +22,8 @@ WAIT_S = 2.0
 STEADY_S = 0.4
 #: From one read to the next meanwhile, s.
 EVERY_S = 0.1
-#: The first and the last reading of a gate may fall outside it, and until the period of a stream is known, for half a
-#: second, its times are off by as much as the tolerance of its rate.
-EDGES = 3.0
+#: The first and the last reading of a gate may fall outside it.
+EDGES = 2.0
 #: A unit whose newest reading is further before the end of the gate than this, in periods, has more to send.
 PENDING = 1.5
 

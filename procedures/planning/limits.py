@@ -13,6 +13,7 @@ from instruments.interfaces.rate_course import RateCourse, course_complaint
 from instruments.interfaces.table import TableLimits
 from procedures.contracts.bench import Bench
 from procedures.contracts.errors import PlanRefused
+from procedures.planning.earlier_times import EarlierTimes
 from procedures.recipe.recipe import Recipe
 
 NEEDS = "Name a bench with both, or choose a recipe with [turns], such as by-hand, which needs neither."
@@ -35,16 +36,21 @@ class BenchLimits:
     #: whether the table moves in a campaign; in a simulation without bytes any table follows any course of the rate
     is_driven: bool = True
     air_tau_s: float | None = None  #: time constant of the chamber's air, for the forecast; None: a guess is used
+    earlier: EarlierTimes | None = None  #: what earlier campaigns of the bench took, for the forecast
 
     @classmethod
-    def of(cls, bench: Bench, *, needs_person: bool = True, air_tau_s: float | None = None) -> BenchLimits:
+    def of(
+        cls, bench: Bench, *, needs_person: bool = True, air_tau_s: float | None = None,
+        earlier: EarlierTimes | None = None,
+    ) -> BenchLimits:  # fmt: skip
         """Return the limits of an opened bench; `needs_person` and `air_tau_s` as its file says (`BenchFile`)."""
         units = {name: gyro.limits for name, gyro in bench.gyros.items()}
         chamber = None if bench.chamber is None else bench.chamber.limits
         if bench.table is None:
-            return cls(None, chamber, units, needs_person=needs_person, air_tau_s=air_tau_s)
+            return cls(None, chamber, units, needs_person=needs_person, air_tau_s=air_tau_s, earlier=earlier)
         achievable_dps = bench.table.achievable_dps
-        return cls(bench.table.limits, chamber, units, achievable_dps, needs_person, air_tau_s=air_tau_s)
+        limits = bench.table.limits
+        return cls(limits, chamber, units, achievable_dps, needs_person, air_tau_s=air_tau_s, earlier=earlier)
 
     @property
     def max_acceleration_dps2(self) -> float:

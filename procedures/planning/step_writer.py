@@ -60,7 +60,8 @@ class _StepWriter:
         self.not_counted_s = 0.0  #: by which moves of the chamber count as longer than they are expected to take
 
     def write(self) -> None:
-        self.steps.append(Home(expected_s=HOMING_S))
+        earlier = self.limits.earlier
+        self.steps.append(Home(expected_s=_known(None if earlier is None else earlier.home_s, HOMING_S)))
         self.measure_clock(FIRST_RUNS)
         for block in order_points(self.recipe):
             self.measure(block)
@@ -115,7 +116,10 @@ class _StepWriter:
         """Look for missed steps, where the table does that and turns at this level."""
         table = self.limits.table
         if table is not None and table.checks_home and any(level.rates_dps):
-            self.steps.append(CheckHome(temperature_c=level.temperature_c, expected_s=CHECK_S))
+            earlier = self.limits.earlier
+            expected_s = _known(None if earlier is None else earlier.check_home_s, CHECK_S)
+            self.not_counted_s += CHECK_S - expected_s
+            self.steps.append(CheckHome(temperature_c=level.temperature_c, expected_s=expected_s))
 
     def mount(self, block: MountingBlock) -> None:
         """Turn the units: chamber to where it can be opened, off if the recipe says so, turn, on."""
@@ -128,7 +132,9 @@ class _StepWriter:
         self.position = block.position
         self.mounting += 1
         next_run = self.run + 1 if repower else self.run
-        expected_s = MOUNTING_S if self.limits.needs_person else 0.0
+        earlier = self.limits.earlier
+        by_person_s = _known(None if earlier is None else earlier.mount_s, MOUNTING_S)
+        expected_s = by_person_s if self.limits.needs_person else 0.0
         mount = Mount(position=block.position, mounting=self.mounting, run=next_run, expected_s=expected_s)
         self.steps.append(mount)
         if repower:
@@ -143,7 +149,7 @@ class _StepWriter:
         rules = self.recipe.soak
         way_c = abs(temperature_c - self.air_c)
         ramp_c_per_min = self.limits.ramp_c_per_min
-        expected_s = move_s(way_c, ramp_c_per_min, rules.band_c, self.limits.air_tau_s or USUAL_AIR_TAU_S)
+        expected_s = self._move_s(temperature_c - self.air_c, rules.band_c)
         self.not_counted_s += counted_move_s(way_c, ramp_c_per_min, rules.band_c) - expected_s
         self.air_c = temperature_c
         self.steps.append(
@@ -154,6 +160,14 @@ class _StepWriter:
                 expected_s=expected_s,
             )
         )
+
+    def _move_s(self, way_c: float, band_c: float) -> float:
+        """Return how long a move of the chamber by `way_c` K is expected to take: as earlier ones, else computed."""
+        limits, earlier = self.limits, self.limits.earlier
+        known = None if earlier is None or abs(way_c) <= band_c else earlier.moves(way_c)
+        if known is not None:
+            return max(known.move_s(abs(way_c), limits.ramp_c_per_min), 0.0)
+        return move_s(abs(way_c), limits.ramp_c_per_min, band_c, limits.air_tau_s or USUAL_AIR_TAU_S)
 
     def soak(self, temperature_c: float, hold_s: float | None = None) -> None:
         rules = self.recipe.soak
@@ -221,6 +235,10 @@ class _StepWriter:
             self.power_on()
             self.soak(self.air_c)
             self.acquire(Level(self.air_c, rules.rates_dps))
+
+
+def _known(earlier_s: float | None, guess_s: float) -> float:
+    return guess_s if earlier_s is None else earlier_s
 
 
 def planned_duration_s(recipe: Recipe, rate_dps: float) -> float:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -45,6 +47,16 @@ def limits_of(settings: AnalogSettings) -> GyroLimits:
     return GyroLimits(settings.max_rate_dps, settings.min_c, settings.max_c)
 
 
+@dataclass(frozen=True)
+class Scans:
+    """n scans that were received together."""
+
+    numbers: Counts  #: (n,) rising
+    codes: Counts  #: (n, inputs)
+    good: NDArray[np.bool_]  #: (n,) whether no input is at the end of its range
+    arrival_s: NDArray[np.float64]  #: (n,) clock time at which each was there
+
+
 class AnalogReadings:
     """Turns numbered scans into readings. `channels` are set once the scaling of the inputs is known."""
 
@@ -72,24 +84,22 @@ class AnalogReadings:
         self._newest = None
         self._time.drop()
 
-    def add(
-        self, numbers: Counts, codes: Counts, good: NDArray[np.bool_], came_s: tuple[float, float | None, float | None],
-        damaged: int = 0,
-    ) -> Readings:  # fmt: skip
+    def add(self, scans: Scans, came_s: tuple[float, float | None, float | None], damaged: int = 0) -> Readings:
         """Return the readings that scans complete, with the count of those that are missing.
 
-        `numbers` (n,) of the scans, rising; `codes` (n, inputs), `good` (n,); `came_s` is a clock time at which the
-        newest scan was there and, where it is known better, the end and the width of the interval in which it arrived,
-        s. Raises WrongInstrument for another rate.
+        `came_s` is a clock time at which the newest scan was there and, where it is known better, the end and the width
+        of the interval in which it arrived, s. Raises WrongInstrument for another rate.
         """
-        groups, sums, valid = self._means.add(numbers, codes, good)
+        numbers = scans.numbers
+        groups, sums, valid = self._means.add(numbers, scans.codes, scans.good)
         if not len(groups):
             none = np.zeros(0, dtype=np.int64)
             no_time, no_flag = np.zeros(0), np.zeros(0, dtype=bool)
-            return Readings(no_time, dict.fromkeys(self._names, none), no_flag, 0, damaged, no_time)
+            return Readings(no_time, dict.fromkeys(self._names, none), no_flag, 0, damaged, no_time, no_time)
         advance = np.diff(groups, prepend=groups[0] - 1 if self._newest is None else self._newest)
         self._newest = int(groups[-1])
-        ahead_s = (int(numbers[-1]) - (self._newest + 1) * self._options.average + 1) / self._scans_per_s
+        last = (groups + 1) * self._options.average - 1  # number of the last scan of each reading
+        ahead_s = int(numbers[-1] - last[-1]) / self._scans_per_s
         now_s, newest_s, width_s = came_s
         now_s = now_s if newest_s is None else newest_s  # scans come in packets: the newest is older than now
         times, uncounted = self._time.times(
@@ -97,5 +107,6 @@ class AnalogReadings:
         )
         refuse_other_rate(self.name, self._address, self._time.line)
         raw = {name: sums[:, n] for n, name in enumerate(self._names)}
-        device_s = ((groups + 1) * self._options.average - 1) / self._scans_per_s  # of the last scan of each reading
-        return Readings(times, raw, valid, int(advance.sum() - len(advance)) + uncounted, damaged, device_s)
+        lost = int(advance.sum() - len(advance)) + uncounted
+        arrival_s = scans.arrival_s[np.searchsorted(numbers, last)]
+        return Readings(times, raw, valid, lost, damaged, last / self._scans_per_s, arrival_s)

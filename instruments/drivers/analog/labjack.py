@@ -8,7 +8,13 @@ import struct
 import numpy as np
 
 from instruments.clock import Clock
-from instruments.drivers.analog.analog_readings import AnalogReadings, analog_channels, analog_identity, limits_of
+from instruments.drivers.analog.analog_readings import (
+    AnalogReadings,
+    Scans,
+    analog_channels,
+    analog_identity,
+    limits_of,
+)
 from instruments.drivers.driver import GyroDriver, Trial
 from instruments.errors import InstrumentError, LimitError, LinkError, NoReply, WrongInstrument
 from instruments.interfaces.gyro import Channel, GyroIdentity, Readings
@@ -214,10 +220,11 @@ class LabJackGyro:
                     self.name,
                     f"the stream ended (status {packet.status}): {why}; check the device, then start the stream again",
                 )
-        numbers, codes = self._packets.add(packets)
+        numbers, codes, behind = self._packets.add(packets)
         good = np.all((codes > LOWEST_CODE) & (codes < HIGHEST_CODE), axis=1)
         came = self._stream.last
-        return self._readings.add(numbers, codes, good, (came.now_s, came.newest_s, came.width_s), damaged)
+        scans = Scans(numbers, codes, good, self._stream.arrival_s(behind))
+        return self._readings.add(scans, (came.now_s, came.newest_s, came.width_s), damaged)
 
 
 DRIVER = GyroDriver(

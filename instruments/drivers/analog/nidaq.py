@@ -16,7 +16,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from instruments.clock import Clock
-from instruments.drivers.analog.analog_readings import AnalogReadings, analog_channels, analog_identity, limits_of
+from instruments.drivers.analog.analog_readings import (
+    AnalogReadings,
+    Scans,
+    analog_channels,
+    analog_identity,
+    limits_of,
+)
 from instruments.drivers.driver import GyroDriver, Trial
 from instruments.errors import LinkError, NoReply, WrongInstrument, one_line
 from instruments.interfaces.gyro import Channel, GyroIdentity, Readings
@@ -286,7 +292,8 @@ class NidaqGyro:
         now_s = self._clock.now_s()
         good = np.all(np.abs(volts) < self.settings.options.range_v, axis=1)
         codes = np.rint(volts / STEP_V).astype(np.int64)
-        return self._readings.add(numbers, codes, good, (now_s, now_s, now_s - asked_s + TRANSFER_S))
+        scans = Scans(numbers, codes, good, np.full(len(volts), now_s))
+        return self._readings.add(scans, (now_s, now_s, now_s - asked_s + TRANSFER_S))
 
     def _discard(self) -> None:
         self._available()

@@ -6,6 +6,7 @@ from instruments.clock import Clock
 from instruments.drivers.chambers.setpoint_chamber import SetpointChamber
 from instruments.drivers.driver import ChamberDriver, Trial
 from instruments.drivers.library_instrument import LibraryInstrument
+from instruments.drivers.serial_numbers import refuse_other_serial
 from instruments.errors import RequestRejected
 from instruments.protocols.library_settings import LibraryChamberSettings
 from instruments.transport.factory import Ports
@@ -21,8 +22,12 @@ class LibraryChamber(SetpointChamber):
         self.switches_on = bool(settings.start)
 
     def identify(self) -> str:
-        """Get what the instrument says of itself, after its air temperature was read; raises InstrumentError."""
+        """Get what the instrument says of itself, after its air temperature was read.
+
+        Raises WrongInstrument for another serial number, InstrumentError.
+        """
         said = self._instrument.identity()
+        refuse_other_serial(self.name, said, self._names.serial, is_told=bool(self._names.identity))
         self._read_air()
         return f"{self._names.instrument} of {self._names.library} {said}".strip()
 

@@ -23,6 +23,7 @@ class DescribedChamber(TextChamber):
 
     def __init__(self, settings: DescribedChamberSettings, ports: Ports, clock: Clock) -> None:
         self._described = described = settings.format
+        self._serial = settings.serial
         super().__init__(settings, ports, clock, described.line.syntax, described.line.timeout_s)
         self.switches_on = bool(described.switch_on)
         names = parameters_of(described, settings.parameters)
@@ -33,7 +34,7 @@ class DescribedChamber(TextChamber):
 
         Raises WrongInstrument for another instrument, RequestRejected, MalformedReply, NoReply, LinkError.
         """
-        text = self.dialogue.identity(self._described.identity)
+        text = self.dialogue.identity(self._described.identity, self._serial)
         self._read_air()
         return text
 

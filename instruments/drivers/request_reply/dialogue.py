@@ -7,6 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 
+from instruments.drivers.serial_numbers import refuse_other_serial
 from instruments.errors import MalformedReply, RequestRejected, WrongInstrument
 from instruments.protocols.request_reply.parts import Ask, AskAlarms, AskNumber, AskState, AskText, LineDescription
 from instruments.protocols.request_reply.templates import filled
@@ -39,8 +40,11 @@ class Dialogue:
         """Note that what was sent over the link is undone: it has to be sent again before the next command."""
         self._started_at = 0
 
-    def identity(self, ask: AskText) -> str:
-        """Return what the instrument says it is; raises WrongInstrument for a reply that does not fit."""
+    def identity(self, ask: AskText, serial: str = "") -> str:
+        """Return what the instrument says it is.
+
+        Raises WrongInstrument for a reply that does not fit, and for one without the `serial` number of the bench file.
+        """
         said = self.link.ask(self.request(ask.send), r".*\S.*", "say what it is")[0]
         found = re.fullmatch(ask.pattern, said)
         if found is None:
@@ -49,6 +53,7 @@ class Dialogue:
                 f"{self.link.url} answered {said[:SHOWN]!r} to {self.request(ask.send)!r}, which does not fit the "
                 f"pattern {ask.pattern!r} of its description; check the address, or correct [identity]",
             )
+        refuse_other_serial(self.link.device, said, serial, is_told=True)
         return found["text"].strip()
 
     def text(self, ask: Ask, what: str) -> str:

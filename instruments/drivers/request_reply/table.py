@@ -51,7 +51,7 @@ class DescribedTable:
 
     def identify(self) -> str:
         """Get what the controller says it is; raises WrongInstrument, RequestRejected, MalformedReply, LinkError."""
-        return self.dialogue.identity(self._described.identity)
+        return self.dialogue.identity(self._described.identity, self.settings.serial)
 
     def achievable_dps(self, rate_dps: float) -> float:
         """Get the rate that the command carries for `rate_dps`, deg/s, rounded as it is written; raises LimitError."""

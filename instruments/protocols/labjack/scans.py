@@ -28,15 +28,20 @@ class PacketScans:
         self._number: int | None = None
         self._base = 0
 
-    def add(self, packets: Sequence[Packet]) -> tuple[Counts, Counts]:
-        """Return the numbers (n,) and the codes (n, inputs) of the scans that were taken, in order."""
+    def add(self, packets: Sequence[Packet]) -> tuple[Counts, Counts, Counts]:
+        """Return the numbers (n,) and the codes (n, inputs) of the scans that were taken, in order.
+
+        Third, (n,), how many bytes were received after the packet of each.
+        """
         numbers: list[Counts] = [np.zeros(0, dtype=np.int64)]
         codes: list[Counts] = [np.zeros((0, self._inputs), dtype=np.int64)]
+        behind: list[Counts] = [np.zeros(0, dtype=np.int64)]
         for packet in packets:
             taken, theirs = self._scans_of(packet)
             numbers.append(taken)
             codes.append(theirs)
-        return np.concatenate(numbers), np.concatenate(codes)
+            behind.append(np.full(len(taken), packet.behind, dtype=np.int64))
+        return np.concatenate(numbers), np.concatenate(codes), np.concatenate(behind)
 
     def _scans_of(self, packet: Packet) -> tuple[Counts, Counts]:
         scans = packet.codes[: len(packet.codes) // self._inputs * self._inputs].reshape(-1, self._inputs)

@@ -38,6 +38,7 @@ class Packet:
     status: int
     info: int  #: of status RECOVERED: scans that were skipped
     codes: NDArray[np.int64]  #: (n,) all inputs of a scan one after the other
+    behind: int = 0  #: bytes that were received after it, in the same data
 
 
 def split(data: bytes) -> tuple[list[Packet], bytes, int]:
@@ -55,7 +56,8 @@ def split(data: bytes) -> tuple[list[Packet], bytes, int]:
         if len(data) - at < size:
             break
         codes = np.frombuffer(data, dtype=">u2", count=(size - HEADER.size) // 2, offset=at + HEADER.size)
-        packets.append(Packet(number, backlog, status, info, codes.astype(np.int64)))
+        behind = len(data) - at - size
+        packets.append(Packet(number, backlog, status, info, codes.astype(np.int64), behind))
         in_damage, at = False, at + size
     return packets, data[at:], damaged
 

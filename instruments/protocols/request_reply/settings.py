@@ -76,6 +76,7 @@ class DescribedChamberSettings(LineChamberSettings):
     """A chamber and its description: the name of a shipped one, a file beside the bench file, or a table."""
 
     format: ChamberDescription
+    serial: str = ""  #: of the controller; compared with what it says of itself
     tcp_port: int = 0
     parameters: Parameters = Field(default_factory=dict)
 
@@ -103,6 +104,7 @@ class DescribedTableSettings(TableSettings):
     """A table and its description."""
 
     format: TableDescription
+    serial: str = ""  #: of the controller; compared with what it says of itself
     tcp_port: int = 0
     baudrate: int = Field(default=9600, gt=0)
     options: SerialOptions = Field(default_factory=SerialOptions)

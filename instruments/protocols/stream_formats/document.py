@@ -135,6 +135,31 @@ class TimeStamp(Strict):
     wrap: int | None = Field(default=None, gt=1)  #: the number begins again at 0 after this minus 1
 
 
+class Pulses(Strict):
+    """The field by which the device's time follows the pulses that it is given, one each second from a GNSS receiver.
+
+    Either the time since the last pulse, or a number that changes with each.
+    """
+
+    since: str | None = None
+    tick_s: float | None = Field(default=None, gt=0)  #: s of one unit of the number in `since`
+    count: str | None = None
+    interval_s: float = Field(default=1.0, gt=0)  #: from pulse to pulse
+
+    @model_validator(mode="after")
+    def _is_one(self) -> Pulses:
+        if (self.since is None) == (self.count is None):
+            raise ValueError("give exactly one of since (time since the last pulse) and count (number of pulses)")
+        if self.since is not None and self.tick_s is None:
+            raise ValueError("tick_s is missing; give the time in s of one unit of the number in since")
+        return self
+
+    @property
+    def field(self) -> str:
+        """The field that it names."""
+        return self.since or self.count or ""
+
+
 class LineLayout(Strict):
     """Lines of decimal numbers."""
 
@@ -209,6 +234,7 @@ class StreamFormat(Strict):
     frame: FrameLayout | None = None
     counter: Counter | None = None
     time: TimeStamp | None = None
+    pulses: Pulses | None = None
 
     @property
     def fields(self) -> tuple[StreamField, ...]:
@@ -240,7 +266,17 @@ class StreamFormat(Strict):
             raise ValueError(f"counter: no field is named {self.counter.field!r}; choose one of {', '.join(names)}")
         if self.time is not None and self.time.field not in names:
             raise ValueError(f"time: no field is named {self.time.field!r}; choose one of {', '.join(names)}")
+        if self.pulses is not None:
+            self._require_pulses(self.pulses, names)
         return self
+
+    def _require_pulses(self, pulses: Pulses, names: list[str]) -> None:
+        if pulses.field not in names:
+            raise ValueError(f"pulses: no field is named {pulses.field!r}; choose one of {', '.join(names)}")
+        if pulses.count is not None and self.time is None and self.counter is None:
+            raise ValueError(
+                "pulses: a number of pulses tells no time between them; add time or counter, or give since in its place"
+            )
 
 
 def shipped_formats() -> dict[str, Path]:

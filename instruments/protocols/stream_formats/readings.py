@@ -39,6 +39,14 @@ class StampTicks(NamedTuple):
     wrap: int | None
 
 
+class PulseTicks(NamedTuple):
+    """Where a format tells of pulses: time since the last as whole numbers of `tick_s` s, or a number (`tick_s` 0)."""
+
+    field: str
+    tick_s: float
+    interval_s: float
+
+
 @dataclass(frozen=True)
 class Decoded:
     """Messages of a stream, n readings: field name -> (n,) whole numbers; which are valid (n,); damaged messages.
@@ -88,6 +96,14 @@ def stamp_ticks(format_: StreamFormat) -> StampTicks | None:
         return None
     step = next(step_of(field) for field in format_.fields if field.name == told.field)
     return StampTicks(told.field, told.tick_s * step, None if told.wrap is None else round(told.wrap / step))
+
+
+def pulse_ticks(format_: StreamFormat) -> PulseTicks | None:
+    """Return what the whole numbers of a format tell of pulses; None for a format without."""
+    if (given := format_.pulses) is None:
+        return None
+    step = next(step_of(field) for field in format_.fields if field.name == given.field)
+    return PulseTicks(given.field, (given.tick_s or 0.0) * step, given.interval_s)
 
 
 def whole_numbers(values: NDArray[np.float64], step: float) -> tuple[Whole, NDArray[np.bool_]]:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from instruments.bench_config import part_of
 from instruments.protocols.stream_formats.document import StreamField
 from instruments.protocols.stream_formats.encoding import message
-from instruments.protocols.stream_formats.readings import scale_of, stamp_ticks
+from instruments.protocols.stream_formats.readings import pulse_ticks, scale_of, stamp_ticks
 from instruments.protocols.stream_formats.settings import StreamSettings
 from instruments.simulators.sampled_unit import SampledUnit
 from instruments.simulators.setup import InstrumentSetup
@@ -52,6 +52,9 @@ class SimulatedStream(SampledUnit):
         if (stamp := stamp_ticks(self._format)) is not None and stamp.field == field.name:
             ticks = np.rint(index / (self._rate_hz * stamp.tick_s)).astype(np.int64)
             return ticks if stamp.wrap is None else ticks % stamp.wrap
+        if (pulses := pulse_ticks(self._format)) is not None and pulses.field == field.name:
+            of_pulse, since_s = np.divmod(index / self._rate_hz, pulses.interval_s)
+            return (np.rint(since_s / pulses.tick_s) if pulses.tick_s else of_pulse).astype(np.int64)
         if field.unit is not None and field.name in values:
             scale = scale_of(field, self._nominal_hz)
             return np.rint((values[field.name] - scale.offset) / scale.scale).astype(np.int64)

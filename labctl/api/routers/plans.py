@@ -20,7 +20,7 @@ def recipes(service: ServiceDep) -> list[RecipeResponse]:
 
     A service without a bench answers for the simulated bench that suits the recipe best.
     """
-    return services.list_recipes(service.bench)
+    return services.list_recipes(service.store, service.bench)
 
 
 @router.post("/plans", summary="Plan a recipe")

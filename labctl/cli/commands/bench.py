@@ -30,18 +30,17 @@ def check(
 ) -> None:
     """Connect to every instrument of a bench and list what was found, each fault with what to do. Nothing moves.
 
-    What the bench file states of its standards is compared with the register of the database, where there is one.
+    What the bench file states of its standards is compared with the register of the database, where both are there; a
+    bench without standards needs no database.
     """
     from labctl.cli.printing.benches import print_check
     from labctl.services.benches.check import check_bench
     from labctl.services.commands.open import open_existing
     from labctl.services.planning.loading import load_bench
-    from labctl.services.standards.agreement import with_register
+    from labctl.services.standards.agreement import compared
 
     with one_clear_line():
-        answer = check_bench(bench, wire_log)
-        with open_existing(database) as store:
-            answer = answer if store is None else with_register(store, answer, load_bench(bench))
+        answer = compared(check_bench(bench, wire_log), load_bench(bench), lambda: open_existing(database))
     if as_json:
         print_json(answer)
     else:

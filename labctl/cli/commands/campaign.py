@@ -118,17 +118,20 @@ def plan(
         ),
     ] = False,
     as_json: Json = False,
-    database: Database = None,  # noqa: ARG001  every command takes it
+    database: Database = None,
 ) -> None:
-    """Show the steps of a campaign and how long it takes. Nothing moves."""
+    """Show the steps of a campaign and how long it takes, by earlier campaigns on the bench if any. Nothing moves."""
     from instruments.clock import SystemClock
+    from labctl.services.commands.open import open_readable
     from labctl.services.planning.plan_answer import describe_plan
     from labctl.services.schedule.planned_start import planned_start
     from labctl.services.simulation.visibility import visibility as look
 
     with one_clear_line():
         start = planned_start(None, None, None, SystemClock().utc())
-        answer = describe_plan(recipe, bench, clip=clip, look=look if visibility else None, start=start)
+        with open_readable(database) as store:
+            seen = look if visibility else None
+            answer = describe_plan(recipe, bench, clip=clip, look=seen, start=start, store=store)
     if as_json:
         print_json(answer)
     else:

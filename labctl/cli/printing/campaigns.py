@@ -19,7 +19,10 @@ if TYPE_CHECKING:
     from labctl.answers.schedule import ScheduledResponse
 
 
-def _print_guesses(guessed: Sequence[str]) -> None:
+def _print_sources(learned: Sequence[str], guessed: Sequence[str]) -> None:
+    """Print where the figures of the expected time are from, other than the bench file."""
+    for known in learned:
+        console.print(f"  {known}", soft_wrap=True, markup=False)
     for guess in guessed:
         console.print(f"  a guess: {guess}", soft_wrap=True, markup=False)
 
@@ -28,7 +31,7 @@ def print_plan(answer: PlanResponse) -> None:
     """Print a plan's figures for a person."""
     print_heading(answer.recipe, f" on {answer.bench}")
     console.print(f"  {answer.datasets} data sets in {answer.steps} steps, about {hours(answer.expected_s)}")
-    _print_guesses(answer.guessed)
+    _print_sources(answer.learned, answer.guessed)
     if answer.verification_datasets:
         share = 100.0 * answer.verification_s / max(answer.expected_s, 1e-9)
         console.print(

@@ -27,6 +27,7 @@ class TimeErrors:
     columns: NDArray[np.float64]  #: (m, 1 + j) change of the output, deg/s, by one standard uncertainty of each
     common_u_s: float
     own_u_s: float  #: root mean square over the data sets
+    is_common_stated: bool = True  #: also as 0, where the time of the reference is known
 
     def beside(self, known: Considered | None, rows: int) -> Considered:
         """Return these as considered columns behind those that are; a design has `rows`, priors below the data."""
@@ -41,7 +42,7 @@ class TimeErrors:
             ErrorPart(TIME_COMMON_U_S.removesuffix("_u_s"), self.common_u_s, "s", along[:, :1]),
             ErrorPart(TIME_U_S.removesuffix("_u_s"), self.own_u_s, "s", along[:, 1:]),
         )
-        return tuple(part for part in found if part.u > 0)
+        return tuple(part for part in found if part.u > 0 or (part is found[0] and self.is_common_stated))
 
 
 def time_errors(data: FitData, axis: str) -> TimeErrors | None:
@@ -57,7 +58,8 @@ def time_errors(data: FitData, axis: str) -> TimeErrors | None:
     sets = np.asarray(data.channels["dataset"], dtype=np.int64)
     here = [sets == number for number in np.unique(sets[own_s > 0])]
     columns = np.column_stack([slope * common_s, *(slope * own_s * rows for rows in here)])
-    return TimeErrors(columns, _rms(common_s[common_s > 0]), _rms(np.array([own_s[rows].mean() for rows in here])))
+    own_u_s = _rms(np.array([own_s[rows].mean() for rows in here]))
+    return TimeErrors(columns, _rms(common_s[common_s > 0]), own_u_s, TIME_COMMON_U_S in data.channels)
 
 
 def _stated(data: FitData, name: str) -> Array:

@@ -87,8 +87,8 @@ def _lines(part: ErrorPart, changes: Array) -> SourceLines:
     kind, covariance = KINDS[part.source], changes @ changes.T
     lines = tuple(
         BudgetLine(
-            part.source, kind.name, "B", kind.distribution, part.u, part.unit, float(size) / part.u, float(size),
-            is_common=kind.is_common, why=kind.why,
+            part.source, kind.name, "B", kind.distribution, part.u, part.unit,
+            float(size) / part.u if part.u else None, float(size), is_common=kind.is_common, why=kind.why,
         )
         for size in np.sqrt(np.diag(covariance))
     )  # fmt: skip

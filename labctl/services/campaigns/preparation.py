@@ -33,6 +33,7 @@ from labctl.services.benches.reference_columns import (
     temperature_instrument,
 )
 from labctl.services.benches.standards import standards_of
+from labctl.services.planning.earlier_campaigns import times_on_bench
 from labctl.services.planning.loading import load_recipe, with_drivers
 from labctl.services.planning.timeline import step_json
 from labctl.services.standards.agreement import as_used, refuse_bad
@@ -42,6 +43,7 @@ from procedures.contracts.operator import HumanOperator, Operator, UnitHandlerOp
 from procedures.execution.resume import Restart
 from procedures.execution.safe_state import stop_table
 from procedures.monitoring.campaign_time import CampaignTime
+from procedures.planning.earlier_times import EarlierTimes
 from procedures.planning.limits import BenchLimits
 from procedures.planning.plan import Plan, make_plan
 from procedures.recipe.recipe import Recipe
@@ -165,7 +167,7 @@ def prepare(
     try:
         with attending(clock):
             identities = _identities(bench, clock)
-        plan = make_plan(recipe, _limits(bench, bench_file), clip=clip)
+        plan = make_plan(recipe, _limits(bench, bench_file, times_on_bench(store, bench_file)), clip=clip)
         bench_file = _with_reported(store, bench_file, identities)
         standards = as_used(store, standards_of(bench_file), today)
         units = _units(bench, identities, bench_file, clock, recipe, standards)
@@ -189,8 +191,8 @@ def prepare(
         raise
 
 
-def _limits(bench: Bench, file: BenchFile) -> BenchLimits:
-    return BenchLimits.of(bench, needs_person=file.needs_person, air_tau_s=file.air_tau_s)
+def _limits(bench: Bench, file: BenchFile, earlier: EarlierTimes | None = None) -> BenchLimits:
+    return BenchLimits.of(bench, needs_person=file.needs_person, air_tau_s=file.air_tau_s, earlier=earlier)
 
 
 def _log_planned(number: int, bench: BenchFile, plan: Plan, units: tuple[NewUnit, ...]) -> None:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from instruments.clock import SystemClock
 from labctl.answers.campaigns import CampaignResponse
 from labctl.config import default_database
+from labctl.errors import StoreError
 from labctl.services.campaigns.resumability import with_resume
 from labctl.services.campaigns.status import campaign_status
 from labctl.services.commands.command import Command, CommandExecutor, LocalExecutor, RequestT, ResponseT
@@ -37,6 +38,16 @@ def open_existing(database: str | None) -> Iterator[Store | None]:
         yield None
         return
     with open_readonly(location) as store:
+        yield store
+
+
+@contextmanager
+def open_readable(database: str | None) -> Iterator[Store | None]:
+    """Open the store for reading, for a command that does without one; None: there is none, or it cannot be read."""
+    with ExitStack() as opened:
+        store = None
+        with suppress(StoreError):
+            store = opened.enter_context(open_existing(database))
         yield store
 
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import socket
-from contextlib import ExitStack, suppress
+from contextlib import ExitStack
 
 from websockets.exceptions import ConnectionClosed, InvalidURI, WebSocketException
 from websockets.sync.client import ClientConnection, connect
 
 from labctl.errors import BadInput
-from labctl.services.live.line_feed import MOST_BYTES, DescriptorFeed, LineFeed, TcpFeed
+from labctl.services.live.line_feed import MOST_BYTES, DescriptorFeed, LineFeed, SocketFeed, TcpFeed
 
 # Messages of a ROS topic by rosbridge: JSON over WebSocket (protocol v2), one line for each message.
 #
@@ -93,7 +93,7 @@ LOOPBACK = "127.0.0.1"
 LARGEST = 1 << 16
 
 
-class UdpFeed:
+class UdpFeed(SocketFeed):
     """A port at which one sender's datagrams arrive; those of a second sender are not taken."""
 
     may_lose = True
@@ -106,8 +106,8 @@ class UdpFeed:
                 f"{address}: no address of a stream; give udp://HOST:PORT, HOST being the address of this computer at "
                 f"which the datagrams arrive ({LOOPBACK}: from this computer alone; 0.0.0.0: from every network)"
             )
-        self.name, self._place = address, (host.strip("[]") or LOOPBACK, int(port))
-        self._socket: socket.socket | None = None
+        super().__init__(address)
+        self._place = host.strip("[]") or LOOPBACK, int(port)
         self._is_known = False  #: whether the sender is
 
     def open(self) -> None:
@@ -138,12 +138,6 @@ class UdpFeed:
                 continue
             found += data if data.endswith(b"\n") or not data else data + b"\n"
         return found
-
-    def close(self) -> None:
-        if self._socket is not None:
-            with suppress(OSError):
-                self._socket.close()
-            self._socket = None
 
 
 def feed_of(given: str, topic: str) -> LineFeed:

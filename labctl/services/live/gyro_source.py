@@ -21,7 +21,7 @@ from labctl.answers.wire_logs import RecordedSession
 from labctl.errors import BadInput
 from labctl.fitting.live import PoseRequest
 from labctl.recording import RecordingInfo
-from labctl.recording.columns import BY_NAME
+from labctl.recording.columns import ARRIVAL_S, BY_NAME, DEVICE_S
 from labctl.services.benches.standards import standards_of
 from labctl.services.benches.wire_log import recording
 from labctl.services.live.source import Block
@@ -90,7 +90,12 @@ class GyroSource:
         return Block(self._columns(readings), readings.lost, readings.damaged)
 
     def _columns(self, readings: Readings) -> dict[str, NDArray[np.generic]]:
-        found: dict[str, NDArray[np.generic]] = {"t_s": readings.t_s - (self._first_s or 0.0)}
+        begun_s = self._first_s or 0.0
+        found: dict[str, NDArray[np.generic]] = {"t_s": readings.t_s - begun_s}
+        if readings.device_s is not None:
+            found[DEVICE_S] = readings.device_s
+        if readings.arrival_s is not None:
+            found[ARRIVAL_S] = readings.arrival_s - begun_s
         for channel in self._gyro.channels:
             if channel.name in BY_NAME:
                 found[channel.name] = channel.value(readings.raw[channel.name])

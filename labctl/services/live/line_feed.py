@@ -64,7 +64,22 @@ class DescriptorFeed:
         """Leave it open: the process has it from its parent."""
 
 
-class TcpFeed:
+class SocketFeed:
+    """Part of the feeds that read a socket: its name and its end."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self._socket: socket.socket | None = None
+
+    def close(self) -> None:
+        """Close the socket; safe to call twice."""
+        if self._socket is not None:
+            with suppress(OSError):
+                self._socket.close()
+            self._socket = None
+
+
+class TcpFeed(SocketFeed):
     """A server that sends lines to every client."""
 
     may_lose = False
@@ -77,8 +92,8 @@ class TcpFeed:
                 f"{address}: no address of a stream; give tcp:// or udp://HOST:PORT, ws://HOST:PORT of a rosbridge "
                 "server, or, at the terminal, - for standard input"
             )
-        self.name, self._place = address, (host.strip("[]"), int(port))
-        self._socket: socket.socket | None = None
+        super().__init__(address)
+        self._place = host.strip("[]"), int(port)
 
     def open(self) -> None:
         try:
@@ -102,9 +117,3 @@ class TcpFeed:
                 return found or None
             found += data
         return found
-
-    def close(self) -> None:
-        if self._socket is not None:
-            with suppress(OSError):
-                self._socket.close()
-            self._socket = None

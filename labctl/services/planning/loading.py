@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import tomllib
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from pydantic import JsonValue, ValidationError
 
@@ -16,11 +17,16 @@ from instruments.interfaces.table import TableLimits
 from instruments.positions import Position
 from instruments.toml_documents import read_toml_text, shown
 from labctl.errors import BadBench
+from labctl.services.planning.earlier_campaigns import times_on_bench
 from labctl.services.planning.fit_rules import check_fit
 from procedures.contracts.errors import PlanRefused
+from procedures.planning.earlier_times import EarlierTimes
 from procedures.planning.limits import BenchLimits, missing_instruments
 from procedures.planning.plan import Plan, make_plan
 from procedures.recipe.recipe import Recipe, parse_recipe, read_recipe, shipped_recipes
+
+if TYPE_CHECKING:
+    from labctl.store import Store
 
 #: Of a chamber's set point, until its controller has been asked.
 USUAL_RESOLUTION_C = 0.1
@@ -86,10 +92,11 @@ def _first(error: ValidationError) -> str:
     return f"{place}: {first['msg']}{given}"
 
 
-def limits_of(bench: BenchFile, *, driven: bool = False) -> BenchLimits:
+def limits_of(bench: BenchFile, *, driven: bool = False, earlier: EarlierTimes | None = None) -> BenchLimits:
     """Return what a bench's instruments may be asked for, from its file alone.
 
-    `driven` is for a campaign, in which the table has to be able to follow the courses of a recipe.
+    `driven` is for a campaign, in which the table has to be able to follow the courses of a recipe. `earlier` is what
+    earlier campaigns took, for the forecast.
     """
     table, chamber = bench.table, bench.chamber
     return BenchLimits(
@@ -110,6 +117,7 @@ def limits_of(bench: BenchFile, *, driven: bool = False) -> BenchLimits:
         needs_person=bench.needs_person,
         is_driven=driven,
         air_tau_s=bench.air_tau_s,
+        earlier=earlier,
     )
 
 
@@ -148,9 +156,15 @@ def _can_do(recipe: Recipe, bench: BenchFile, *, driven: bool) -> bool:
     return True
 
 
-def plan_for(recipe_source: str, bench_source: str | None, *, clip: bool) -> tuple[Plan, BenchFile]:
-    """Return the plan of a recipe on a bench. Raises RecipeError, BadBench, PlanRefused."""
+def plan_for(
+    recipe_source: str, bench_source: str | None, *, clip: bool, store: Store | None = None
+) -> tuple[Plan, BenchFile, EarlierTimes | None]:
+    """Return the plan of a recipe on a bench, and what its forecast takes from the earlier campaigns of `store`.
+
+    Raises RecipeError, BadBench, PlanRefused.
+    """
     recipe = load_recipe(recipe_source)
     check_fit(recipe)
     bench = load_bench(bench_source or bench_for(recipe, driven=True))
-    return make_plan(recipe, limits_of(bench, driven=True), clip=clip), bench
+    earlier = times_on_bench(store, bench)
+    return make_plan(recipe, limits_of(bench, driven=True, earlier=earlier), clip=clip), bench, earlier

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from datetime import date, datetime
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from zoneinfo import ZoneInfo
 
 from instruments.bench_config import USUAL_AIR_TAU_S, BenchFile
@@ -16,13 +16,19 @@ from labctl.fitting.data.mounting_angles import ANGLE_QUANTITIES, angle_gains, s
 from labctl.fitting.uncertainty.conditions import BenchConditions
 from labctl.fitting.uncertainty.standard_lines import Sensitivities, standards_u
 from labctl.services.planning.attendance import attendance, visits_s
+from labctl.services.planning.earlier_campaigns import learned_texts
 from labctl.services.planning.loading import limits_of, plan_for
 from procedures.contracts.errors import PlanRefused
-from procedures.contracts.steps import Acquire, Mount, MoveChamber
+from procedures.contracts.steps import Acquire, CheckHome, Home, Mount, MoveChamber
+from procedures.planning.earlier_times import EarlierTimes
 from procedures.planning.limits import BenchLimits
 from procedures.planning.plan import Plan, make_plan
+from procedures.planning.step_writer import CHECK_S, HOMING_S
 from procedures.recipe.recipe import Recipe
 from procedures.recipe.rules import Indexing, Inverted
+
+if TYPE_CHECKING:
+    from labctl.store import Store
 
 #: Coverage factor of the figures.
 K = 2.0
@@ -134,43 +140,55 @@ LocalStart = tuple[datetime, ZoneInfo]
 
 
 def describe_plan(
-    recipe: str, bench: str | None, *, clip: bool, look: Look | None = None, start: LocalStart | None = None
-) -> PlanResponse:
-    """Say what a campaign would do and how long it takes, as `plan_answer` does."""
-    plan, bench_file = plan_for(recipe, bench, clip=clip)
-    return plan_answer(plan, bench_file, look, start)
+    recipe: str, bench: str | None, *, clip: bool, look: Look | None = None, start: LocalStart | None = None,
+    store: Store | None = None,
+) -> PlanResponse:  # fmt: skip
+    """Say what a campaign would do and how long it takes, by the earlier campaigns of `store`; see `plan_answer`."""
+    plan, bench_file, earlier = plan_for(recipe, bench, clip=clip, store=store)
+    return plan_answer(plan, bench_file, look, start, earlier)
 
 
 def plan_answer(
-    plan: Plan, bench_file: BenchFile, look: Look | None = None, start: LocalStart | None = None
-) -> PlanResponse:
-    """Return a plan's figures; `look` also says what it could find, `start` when it needs a person."""
+    plan: Plan, bench_file: BenchFile, look: Look | None = None, start: LocalStart | None = None,
+    earlier: EarlierTimes | None = None,
+) -> PlanResponse:  # fmt: skip
+    """Return a plan's figures; `look` also says what it could find, `start` when it needs a person.
+
+    `earlier` is what it takes from earlier campaigns on the bench.
+    """
     return PlanResponse(
         recipe=plan.recipe.name,
         bench=bench_file.name,
         steps=len(plan.steps),
         datasets=plan.datasets,
         expected_s=plan.expected_s,
-        guessed=_guessed(plan, bench_file),
+        guessed=_guessed(plan, bench_file, earlier),
+        learned=list(learned_texts(earlier, needs_person=bench_file.needs_person)),
         verification_datasets=sum(isinstance(step, Acquire) for step in plan.verification_steps),
         verification_s=math.fsum(step.expected_s for step in plan.verification_steps),
         clipped=list(plan.clipped),
         schedule_hash=plan.schedule_hash,
-        misalignment=misalignment_outlook(plan, bench_file, limits_of(bench_file)),
+        misalignment=misalignment_outlook(plan, bench_file, limits_of(bench_file, earlier=earlier)),
         visibility=look(plan, bench_file) if look else None,
         attendance=attendance(visits_s(plan, bench_file), *start) if start else None,
     )
 
 
-def _guessed(plan: Plan, bench: BenchFile) -> list[str]:
-    """Return the figures of the expected time that no file states, in words."""
+def _guessed(plan: Plan, bench: BenchFile, earlier: EarlierTimes | None) -> list[str]:
+    """Return the figures of the expected time that neither a file nor an earlier campaign states, in words."""
+    known = earlier or EarlierTimes(0)
+    taken = {type(step) for step in plan.steps if step.expected_s}
     found: list[str] = []
-    if bench.air_tau_s is None and any(isinstance(step, MoveChamber) and step.expected_s for step in plan.steps):
+    if Home in taken and known.home_s is None:
+        found.append(f"homing takes {HOMING_S:g} s")
+    if CheckHome in taken and known.check_home_s is None:
+        found.append(f"a check for missed steps takes {CHECK_S:g} s")
+    if MoveChamber in taken and bench.air_tau_s is None and known.heating is None and known.cooling is None:
         found.append(
             f"the air of the chamber follows a ramp with a time constant of {USUAL_AIR_TAU_S:g} s; state air_tau_s in "
             "[chamber] of the bench file"
         )
     mounts = [step.expected_s for step in plan.steps if isinstance(step, Mount) and step.expected_s]
-    if mounts:
+    if mounts and (known.mount_s is None or plan.recipe.turns is not None):
         found.append(f"a person takes {mounts[0] / 60:g} min to mount the units")
     return found

@@ -18,7 +18,7 @@ from instruments.protocols.arrick_c4_settings import StepperSettings
 from instruments.simulation import open_simulation
 from labctl.errors import BadInput
 from labctl.recording import Recording, RecordingInfo
-from labctl.recording.columns import VERIFICATION
+from labctl.recording.columns import RATE_TIME_U, VERIFICATION
 from labctl.services.benches.standards import standards_of
 from procedures.contracts.steps import Acquire, Mount, MoveChamber, PowerOff, PowerOn, Step
 from procedures.planning.chamber_time import counted_move_s
@@ -169,6 +169,8 @@ class _Walk:
             "supply_v": sample.supply_v,
             "humidity_pct": self._world.humidity_pct(times),
         }
+        if self._plan.recipe.profiles:  # there is no wire here, so the time of the reference is known
+            part |= {name: np.zeros(n) for name in sorted(RATE_TIME_U)}
         if self._plan.recipe.verification is not None:
             part[VERIFICATION] = np.full(n, int(step.verification), dtype=np.int64)
         part |= {f"gyro_{axis}": sample.rate_dps[:, i] for i, axis in enumerate(self._settings.axes)}

@@ -28,7 +28,7 @@ def visibility(plan: Plan, bench: BenchFile) -> list[Visibility]:
 
 
 def planned(
-    _: Store, request: PlanRequest, bench: BenchFile | None, start: LocalStart | None = None
+    store: Store, request: PlanRequest, bench: BenchFile | None, start: LocalStart | None = None
 ) -> PlannedResponse:
     """Plan a recipe on a bench, or on the simulated one that fits it best, and say what the plan could find.
 
@@ -41,4 +41,4 @@ def planned(
         compute(UNNAMED)
         return visibility(plan, on)
 
-    return plan_steps(request, bench, look, start)
+    return plan_steps(store, request, bench, look, start)

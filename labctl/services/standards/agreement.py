@@ -8,15 +8,16 @@ recording, which budget, certificate and exports read: there is one uncertainty 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager
 from datetime import date
 
 from instruments.bench_config import BenchFile
-from instruments.standards import Standard
+from instruments.standards import MEASURED_STEP_CLOCK, Standard
 from labctl.answers.benches import BenchCheckResponse, DeviceCheck, FindingResponse
-from labctl.errors import Conflict
+from labctl.errors import Conflict, StoreError
 from labctl.metrology.certificate_drift import Prediction
-from labctl.services.benches.standards import standards_of
+from labctl.services.benches.standards import CLOCK_SETTING, DEMANDED_RATE, standards_of
 from labctl.services.standards.checks import to_be_checked
 from labctl.services.standards.predictions import predictions_of
 from labctl.services.standards.register import due_of
@@ -34,6 +35,8 @@ from procedures.contracts.journal import Event
 #: Two statements of one uncertainty differ from this share of it on: certificates are rounded to two digits.
 ROUNDING = 0.01
 DEVICE = "standards"
+#: Names of the standards that settings of the table say: no register has them.
+OF_SETTINGS = frozenset({"", MEASURED_STEP_CLOCK, CLOCK_SETTING, DEMANDED_RATE})
 
 
 def matched(store: Store, standards: Sequence[Standard]) -> list[tuple[Standard, RegisteredStandard | None]]:
@@ -184,6 +187,30 @@ def register_events(store: Store, standards: Sequence[Standard], on: date) -> tu
         Event("standard_differs", text, level="warning", device=entry.quantity)
         for entry, text in differences(store, standards, on)
     )
+
+
+def compared(
+    answer: BenchCheckResponse, bench: BenchFile, opened: Callable[[], AbstractContextManager[Store | None]]
+) -> BenchCheckResponse:
+    """Return the check of a bench with what the register says of its standards, where there are both.
+
+    `opened` opens the database, or gives None where there is none. A bench that states no standard needs none, and one
+    that cannot be read is said: instruments answer without it.
+    """
+    if not any(each.certificate or each.name not in OF_SETTINGS for each in standards_of(bench)):
+        return answer
+    try:
+        with opened() as store:
+            return answer if store is None else with_register(store, answer, bench)
+    except StoreError as error:
+        return _without_register(answer, str(error))
+
+
+def _without_register(answer: BenchCheckResponse, why: str) -> BenchCheckResponse:
+    text = f"the register was not read, so the standards are not compared with it: {why}"
+    finding = FindingResponse(what="register", text=text, state="doubtful")
+    device = DeviceCheck(device=DEVICE, ok=True, text=text, state="doubtful", findings=[finding])
+    return answer.model_copy(update={"devices": [*answer.devices, device]})
 
 
 def with_register(store: Store, answer: BenchCheckResponse, bench: BenchFile) -> BenchCheckResponse:

@@ -16,7 +16,7 @@ from labctl.recording import RecordingInfo
 from labctl.store.connection.database import Database
 from labctl.store.connection.transactions import transaction
 from labctl.store.paging import Page, PageRequest, rows_to_read
-from labctl.store.records import CampaignRow, EventRow, NewUnit, StepRow
+from labctl.store.records import CampaignRow, DoneStepRow, EventRow, NewUnit, StepRow
 from labctl.store.repositories.audit import append
 from labctl.store.repositories.campaign_journal import StoreJournal
 from labctl.store.repositories.campaign_summaries import CampaignSummaries, CampaignSummary
@@ -236,6 +236,20 @@ class Campaigns:
         )
         with self._database.reading() as connection:
             return records_of(StepRow, connection.execute(query))
+
+    def done_steps(self, bench: str, kinds: Sequence[str], campaigns: int) -> list[DoneStepRow]:
+        """Return the steps of some kinds that were done in the newest `campaigns` of a bench, oldest first."""
+        c, s = tables.campaigns.c, tables.steps.c
+        newest = sa.select(c.id).where(c.bench_name == bench).order_by(c.id.desc()).limit(campaigns)
+        query = (
+            sa.select(s.campaign_id.label("campaign"), c.bench, s.body, (s.ended_s - s.started_s).label("took_s"))
+            .join(tables.campaigns, c.id == s.campaign_id)
+            .where(s.campaign_id.in_(newest.scalar_subquery()), s.kind.in_(kinds), s.state == "done")
+            .where(s.started_s.is_not(None), s.ended_s.is_not(None))
+            .order_by(s.campaign_id, s.number)
+        )
+        with self._database.reading() as connection:
+            return records_of(DoneStepRow, connection.execute(query))
 
     def events(self, campaign: int, after: int = 0, limit: int = 1000) -> list[EventRow]:
         """Return events in order, those with a number above `after`."""

@@ -10171,9 +10171,14 @@ export interface components {
             expected_s: number;
             /**
              * Guessed
-             * @description Figures of the expected time that the bench file does not state.
+             * @description Figures of the expected time that neither the bench file nor an earlier campaign states.
              */
             guessed: string[];
+            /**
+             * Learned
+             * @description Figures of the expected time that are from earlier campaigns on the bench.
+             */
+            learned: string[];
             /**
              * Verification Datasets
              * @description Number of the data sets that verify and are never fitted.

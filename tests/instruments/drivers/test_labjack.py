@@ -130,6 +130,28 @@ def test_the_rate_of_a_turning_table_in_volts(labjack: Callable[..., Any]) -> No
     assert (turning - rest) / 0.022 == pytest.approx(45.0, rel=0.005)
 
 
+def test_a_reading_arrives_with_the_packet_of_its_last_scan(labjack: Callable[..., Any]) -> None:
+    """Packets of 50 scans are on the wire every 50 ms; a reading of 20 scans may begin in the packet before."""
+    s = labjack(average=20)
+    s.gyro.start()
+    s.gyro.read_latest()
+    found = s.gyro.read(0.01)
+    for _ in range(400):
+        found = s.gyro.read(0.01).after(found)
+    assert found.arrival_s is not None
+    assert len(found) == pytest.approx(200, abs=3)
+    late_s = found.arrival_s - found.t_s
+    assert (late_s >= -1e-9).all()
+    assert late_s.max() < 0.06 + 0.02  # a packet, and a read that comes 10 ms later
+    assert np.diff(np.unique(found.arrival_s)).max() < 0.07
+
+
+def test_packets_know_how_many_bytes_came_after_them() -> None:
+    (first, second), _, _ = stream.split(GOLDEN + GOLDEN + GOLDEN[:9])
+    assert (first.behind, second.behind) == (len(GOLDEN) + 9, 9)
+    assert PacketScans(1, 2).add([first, second])[2].tolist() == [len(GOLDEN) + 9, 9]  # one of two is a dummy
+
+
 def test_packets_that_are_missing_are_counted(labjack: Callable[..., Any]) -> None:
     s = labjack(average=10)
     s.gyro.start()

@@ -14,6 +14,7 @@ from instruments.bench_config import BenchFile, read_bench
 from instruments.clock import VirtualClock
 from instruments.drivers.library_reference import LibraryReference
 from instruments.drivers.resolution import resolve
+from instruments.drivers.serial_numbers import refuse_other_serial
 from instruments.errors import LinkError, MalformedReply, NoReply, RequestRejected, WrongInstrument
 from instruments.transport.factory import Ports
 from tests.helpers.tap import Tap
@@ -186,6 +187,27 @@ def test_another_serial_number_in_the_usual_identity_is_refused() -> None:
     given = {"instrument": "pymeasure.instruments.hp:HP34401A", "port": "/dev/ttyUSB0", "serial": "X77"}
     with pytest.raises(WrongInstrument, match="34401A,X78,11-5-2', but the bench file gives serial number 'X77'"):
         reference(SimpleNamespace(serial=lambda *_, **__: port), **given).identify()
+
+
+@pytest.mark.parametrize(
+    ("said", "wanted", "is_told", "is_right"),
+    [
+        ("FLUKE,1529,B77,1.0", "B77", False, True),
+        ("FLUKE,1529,B779,1.0", "B77", False, False),  # the whole number, not a part of it
+        ("FLUKE,1529,0,1.0", "B77", False, True),  # it has none to tell
+        ("FLUKE,1529,0,1.0", "B77", True, False),
+        ("Thermotron 8800 S/N 4711", "4711", True, True),
+        ("Thermotron 8800 S/N 4711", "471", True, False),
+        ("Thermotron 8800", "4711", False, True),
+        ("FLUKE,1529,B78,1.0", "", True, True),
+    ],
+)
+def test_serial_numbers_are_compared_in_one_way(said: str, wanted: str, *, is_told: bool, is_right: bool) -> None:
+    if is_right:
+        refuse_other_serial("reference", said, wanted, is_told=is_told)
+        return
+    with pytest.raises(WrongInstrument, match=f"gives serial number '{wanted}'"):
+        refuse_other_serial("reference", said, wanted, is_told=is_told)
 
 
 def test_no_identity_is_asked_where_the_bench_file_says_so() -> None:

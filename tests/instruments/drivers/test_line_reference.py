@@ -88,7 +88,7 @@ def test_a_certificate_belongs_to_one_serial_number(reference: Callable[..., Any
     driver = reference(model="fluke-1529", serial="B77", certificate="NMI 4711, 2026-03-02")
     assert driver.identify() == "FLUKE,fluke-1529,B77,1.00; certificate NMI 4711, 2026-03-02"
     driver.simulated.identity = "FLUKE,1529,A08125,1.10"
-    with pytest.raises(WrongInstrument, match="the bench file gives serial number 'B77'; correct the port"):
+    with pytest.raises(WrongInstrument, match="the bench file gives serial number 'B77'; correct the address"):
         driver.identify()
 
 

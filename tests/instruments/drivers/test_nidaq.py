@@ -78,6 +78,9 @@ def test_every_scan_is_in_a_reading(daq: Callable[..., Any], version: tuple[int,
     s.gyro.read_latest()
     parts = [s.gyro.read(1.0) for _ in range(60)]
     times = np.concatenate([part.t_s for part in parts])
+    arrival_s = np.concatenate([part.arrival_s for part in parts if part.arrival_s is not None])
+    assert len(np.unique(arrival_s)) == 60  # with the buffer that they were in
+    assert (arrival_s >= times - 1e-9).all()
     assert sum(part.lost for part in parts) == 0
     assert len(times) == pytest.approx(6000, abs=3)
     assert np.diff(times) == pytest.approx(0.01, abs=0.0006)  # within one scan

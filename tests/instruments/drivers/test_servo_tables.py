@@ -260,6 +260,17 @@ def test_another_instrument_is_refused(rig: Callable[..., Rig]) -> None:
         s.table.identify()
 
 
+@pytest.mark.parametrize("name", NAMES)
+def test_a_controller_with_another_serial_number_is_refused(name: str, rig: Callable[..., Rig]) -> None:
+    said = rig(name).table.identify()
+    word = said.split()[-1]
+    assert rig(name, {"serial": word}).table.identify() == said
+    with pytest.raises(WrongInstrument, match=r"but the bench file gives serial number .*; correct the address"):
+        rig(name, {"serial": f"{word}9"}).table.identify()
+    with pytest.raises(WrongInstrument, match="leave serial out where the instrument does not report it"):
+        rig(name, {"serial": f"9{word}"}).table.identify()
+
+
 def test_a_group_or_an_axis_that_is_not_there_is_named(rig: Callable[..., Rig]) -> None:
     s = rig("newport-xps")
     s.device.controller.group = "OTHER"

@@ -50,6 +50,7 @@ class Heard:
     """What a driver makes of a unit."""
 
     stream: StreamTime
+    device_time: DeviceTime | None = None
     undecided: Undecided = field(default_factory=Undecided)
     parts: list[Readings] = field(default_factory=list)
     polled_s: list[float] = field(default_factory=list)  #: by how much the readings of a poll are after arrival
@@ -64,8 +65,8 @@ class Heard:
 
 def listen(unit: Unit, period_s: float, until_s: float, wrap: int = 0, further_s: int = 0) -> Heard:
     """Poll three times and read for six seconds, again and again, as a campaign does; read `further_s` at the end."""
-    heard = Heard(StreamTime(period_s, 0.0))
     device_time = DeviceTime(period_s, wrap) if wrap else None
+    heard = Heard(StreamTime(period_s, 0.0), device_time)
     position, now_s = 0, 0.0
 
     def take(keep: bool = True) -> None:
@@ -137,6 +138,23 @@ def test_what_never_comes_is_lost_and_the_times_after_it_are_right(missing: int,
         assert later.device_s is not None
         ticks = (later.device_s - later.device_s[0]) * 101.0
         assert ticks == pytest.approx(later.raw["n"] - later.raw["n"][0], abs=1e-6)
+
+
+def test_a_stream_that_ends_while_it_is_open_gives_what_was_kept_once_and_in_order() -> None:
+    unit = Unit.make(101.0, 60.0, lost=(44.8, 16))
+    heard = listen(unit, 1 / 101.0, 44.0, wrap=16)
+    assert heard.stream.is_late
+    before = heard.joined()
+    kept = heard.undecided.take(heard.device_time)
+    assert kept is not None
+    assert heard.undecided.take() is None
+    number = np.concatenate([before.raw["n"], kept.raw["n"]])
+    assert list(kept.raw["n"]) == [n for n in unit.number if before.raw["n"][-1] < n <= number[-1]]
+    assert kept.t_s[0] > before.t_s[-1]
+    assert (np.diff(kept.t_s) > 0).all()
+    assert before.device_s is not None
+    assert kept.device_s is not None
+    assert kept.device_s[0] > before.device_s[-1]
 
 
 def test_readings_are_kept_back_while_it_is_open_whether_some_are_lost_and_come_once_it_is_decided() -> None:

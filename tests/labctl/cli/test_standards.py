@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from instruments.bench_config import shipped_benches
 from labctl.store import open_store
 from tests.helpers import register
 from tests.helpers.lab import Lab
@@ -119,6 +120,23 @@ def test_the_check_of_a_bench_reads_the_register_and_makes_no_database(tmp_path:
     assert "agrees with the register: step clock" in lab.run("bench", "check", "single-axis-sim").stdout
     lab.run("standards", "bad", "step clock", "--from", "2026-01-01", "--reason", "stopped", "--by", "M")
     assert "step clock was found bad" in lab.run("bench", "check", "single-axis-sim", status=1).stdout
+
+
+def test_the_check_of_a_bench_needs_no_database_that_can_be_read(tmp_path: Path) -> None:
+    """A bench without standards asks for none; one with standards says that the register was not read, and why."""
+    lab = Lab(tmp_path)
+    lab.database.write_bytes(b"no database" * 1000)
+    found = lab.json("bench", "check", "single-axis-sim")
+    (register,) = [each for each in found["devices"] if each["device"] == "standards"]
+    assert (found["ok"], register["state"]) == (True, "doubtful")
+    assert "the register was not read" in register["text"]
+    assert str(lab.database) in register["text"]
+    text = (shipped_benches()["single-axis-sim"]).read_text(encoding="utf-8")
+    path = tmp_path / "plain.toml"
+    path.write_text(text[: text.index("[[standards]]")], encoding="utf-8")
+    plain = lab.json("bench", "check", str(path))
+    assert [each["device"] for each in plain["devices"]] == ["table", "chamber", "fog"]
+    assert lab.json("campaign", "plan", "short", "--bench", str(path))["learned"] == []  # a forecast does without, too
 
 
 def test_the_room_is_typed_and_shown(lab: Lab) -> None:

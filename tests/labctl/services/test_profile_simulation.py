@@ -10,7 +10,11 @@ from instruments.simulators.hidden import EFFECTS
 from instruments.simulators.physics.world import ProfileMotion
 from labctl.errors import BadInput
 from labctl.fitting import fit
+from labctl.fitting.models.fitted_model import FittedModel
+from labctl.fitting.uncertainty import response_budgets
+from labctl.fitting.uncertainty.conditions import conditions_of
 from labctl.recording import Recording
+from labctl.recording.columns import RATE_TIME_U
 from labctl.recording.sanity import inspect_recording
 from labctl.services.planning.loading import limits_of, load_bench
 from labctl.services.simulation.plan_simulation import simulate
@@ -73,6 +77,16 @@ def test_a_hidden_delay_is_found_and_the_recording_is_a_sound_profile() -> None:
     value, u = coefficient(recording, EFFECTS_FITTED, "delay")
     assert value == pytest.approx(0.005, abs=3 * u)
     assert u < 1e-5
+
+
+def test_a_simulated_profile_states_the_time_of_its_reference() -> None:
+    """Without wires it is known: the budget of a delay has a line of 0, and none of unknown size."""
+    recording = simulated(time_delay=0.005)
+    assert not any(np.any(recording.columns[name]) for name in RATE_TIME_U)
+    fitted = FittedModel.from_dict(fit(recording, None, EFFECTS_FITTED).fitted.to_dict())
+    budget = response_budgets(fitted, evidence={}, bench=conditions_of(recording.info, {}))["z"]["delay"]
+    assert budget.not_stated == ()
+    assert {line.source: line.contribution for line in budget.lines}["table_time_common"] == 0.0
 
 
 def test_a_hidden_bandwidth_is_found_beside_a_delay() -> None:

@@ -126,6 +126,39 @@ def test_what_a_unit_did_not_send_before_its_silence_ended_a_data_set_is_lost() 
     assert lost(rig, 2) == 0
 
 
+class EndsLate(Ends):
+    """A unit whose driver keeps its newest readings back, until the stream ends in the first data set."""
+
+    held: Readings | None = None
+
+    def _came(self, number: int) -> int:
+        return super()._came(number) + (0 if self.held is None else len(self.held))
+
+    def read(self, duration_s: float) -> Readings:
+        found = super().read(duration_s)
+        if len(self.bench.journal.headers) != 1 or not len(found) or self._came(1) < 15:
+            return found
+        self.held = found if self.held is None else found.after(self.held)
+        return replace(found.only(slice(0, 0)), lost=0)
+
+    def kept_back(self) -> Readings | None:
+        held, self.held = self.held, None
+        return held
+
+
+def test_what_was_kept_back_when_a_unit_fell_silent_is_in_the_data_set_and_not_lost() -> None:
+    rig = with_unit(EndsLate)
+    assert rig.run().state is CampaignState.DONE
+    assert rig.journal.closed[0][1] == "partial"
+    blocks = [readings.t_s for number, _, readings, _ in rig.journal.blocks if number == 1 and len(readings)]
+    t_s = np.concatenate(blocks)
+    assert 35 <= len(t_s) == came(rig, 1) <= 45  # as where nothing was kept back
+    assert 20 <= lost(rig, 1) <= 45
+    assert len(np.unique(t_s)) == len(t_s)
+    assert np.diff(t_s) == pytest.approx(0.1)
+    assert rig.imu.kept_back() is None
+
+
 class Gap(FakeGyro):
     """A unit that loses readings from the last second of the first data set to 2 s later, and counts them."""
 

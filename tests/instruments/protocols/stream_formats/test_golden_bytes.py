@@ -12,7 +12,7 @@ import pytest
 from instruments.protocols.stream_formats.document import StreamFormat, read_format
 from instruments.protocols.stream_formats.frames import FrameDecoder
 from instruments.protocols.stream_formats.lines import LineDecoder
-from instruments.protocols.stream_formats.readings import Decoded, scale_of
+from instruments.protocols.stream_formats.readings import Decoded, scale_of, stamp_ticks
 
 G = 9.80665
 DEG = 180.0 / math.pi
@@ -101,6 +101,17 @@ def test_xsens_packets_as_mt_manager_decodes_them() -> None:
     assert channels["temperature_c"] == [37.625, 37.625]  # sent more rarely: the last one stands
     assert channels["status"] == [0x00400003, 0x00481401]
     assert found.valid.tolist() == [True, False]  # bit 12: rate about Y out of range (MT0605P, page 48)
+
+
+def test_the_same_packets_have_the_time_of_the_unit() -> None:
+    """SampleTimeFine of the first is 0x01363FA6 ticks of 0.1 ms: 2033.2454 s after it was switched on."""
+    found, channels = framed("xsens-mti-timed", XSENS_4, xbus(XSENS_6), xbus(XSENS_5))
+    assert found.values["sample_time_fine"].tolist() == [0x01363FA6, 0x01A498DE]
+    ticks = stamp_ticks(read_format("xsens-mti-timed"))
+    assert ticks is not None
+    assert found.values["sample_time_fine"][0] * ticks.tick_s == pytest.approx(2033.2454)
+    assert ticks.wrap == 2**32
+    assert channels == framed("xsens-mti", XSENS_4, xbus(XSENS_6), xbus(XSENS_5))[1]
 
 
 def test_vectornav_lines_of_real_units() -> None:

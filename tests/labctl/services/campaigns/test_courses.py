@@ -204,7 +204,7 @@ def test_what_a_bench_cannot_follow_is_refused_when_planned(tmp_path: Path) -> N
         PlanRefused, match=r"profiles\[0\], .* needs 502.67 deg/s\^2, but the limit of the table is 100"
     ):
         plan_for(str(fast), "servo-sim", clip=False)
-    plan, _ = plan_for(str(fast), "servo-sim", clip=True)
+    plan, *_ = plan_for(str(fast), "servo-sim", clip=True)
     assert [step.course.kind for step in plan.steps if step.kind == "acquire" and step.course] == ["ramp"]
     assert plan_for(str(path), None, clip=False)[1].name == "servo-sim"  # a bench that can is chosen
     assert load_bench("servo-sim").table is not None

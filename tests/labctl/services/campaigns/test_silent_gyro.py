@@ -27,7 +27,7 @@ def test_a_table_that_still_turns_is_stopped_before_the_step_is_begun_again(stor
     bench, clock = load_bench("single-axis-sim"), VirtualClock()
     simulation = open_simulation(bench, clock)
     prepared = prepare(store, "short", bench, clock, clip=False, opened=open_bench(bench, clock, simulation))
-    simulation.faults("sim://kvh-rd2100/fog").arm("silence", from_s=720.0, until_s=720.0 + silent_s)
+    simulation.faults("sim://kvh-rd2100/fog").arm("silence", from_s=737.0, until_s=737.0 + silent_s)
     ended = run(store, prepared)
     assert ended.state == "done", ended.reason
     events = [event.kind for event in store.campaigns.events(prepared.id)]

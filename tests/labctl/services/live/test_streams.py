@@ -106,6 +106,9 @@ def test_a_simulated_gyro_by_driver_and_port() -> None:
     assert (info.serial, info.motion, info.kind, info.latitude_deg) == ("MTI-7", "poses", "samples", 48.0)
     assert 45 <= len(block) <= 55
     assert block.columns["t_s"][0] == 0
+    assert np.diff(block.columns["device_s"]) == pytest.approx(0.01, abs=1e-9)  # by the unit's own counter
+    assert (block.columns["arrival_s"] >= block.columns["t_s"]).all()
+    assert block.columns["arrival_s"][-1] < block.columns["t_s"][-1] + 0.5
     force = np.column_stack([block.columns[f"accel_{axis}_g"] for axis in "xyz"])
     assert np.linalg.norm(force, axis=1) == pytest.approx(np.ones(len(block)), abs=0.05)
     assert block.columns["valid"].all()
