@@ -276,8 +276,8 @@ class BenchFile(Strict):
     @property
     def instruments(self) -> dict[str, DeviceSettings]:
         """The table and the chamber, those that the bench has."""
-        found = {"table": self.table, "chamber": self.chamber}
-        return {name: section for name, section in found.items() if section is not None}
+        sections = {"table": self.table, "chamber": self.chamber}
+        return {name: section for name, section in sections.items() if section is not None}
 
 
 def shipped_benches() -> dict[str, Path]:

@@ -296,8 +296,8 @@ def _update(event: ServerSentEvent) -> EventResponse | CampaignResponse:
 
 def _warning(field: str) -> str:
     """Return the text of a `Warning` field as the service writes it (RFC 7234, 5.5): 299 agent "text"."""
-    found = re.fullmatch(r'299 \S+ "((?:[^"\\]|\\.)*)"', field)
-    return re.sub(r"\\(.)", r"\1", found[1]) if found else field
+    match = re.fullmatch(r'299 \S+ "((?:[^"\\]|\\.)*)"', field)
+    return re.sub(r"\\(.)", r"\1", match[1]) if match else field
 
 
 def _withdrawn(what: str, notice: Withdrawn, content: bytes | None = None) -> CalibrationWithdrawn:

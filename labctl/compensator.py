@@ -202,12 +202,14 @@ class Compensator:
             if self._memory is not None and history is not None:
                 remembered = self._memory.of_history(history, known)
                 beside = remembered if beside is None else remembered.with_bias(beside.bias_dps)
-            found = self._beside(beside, raw, warm, known, correct)
+            compensated = self._beside(beside, raw, warm, known, correct)
         else:
             running = self._running if continued and self._running is not None else RunningMemory(self._memory)
-            found = self._followed(running, beside, raw, warm, known, correct, len(raw) if cross_rates_dps else BLOCK)
+            compensated = self._followed(
+                running, beside, raw, warm, known, correct, len(raw) if cross_rates_dps else BLOCK
+            )
         left_out = self._left_out_dps if specific_force_g is None else None
-        return Compensated(found.rate_dps.reshape(given.shape), found.outside, left_out)
+        return Compensated(compensated.rate_dps.reshape(given.shape), compensated.outside, left_out)
 
     def _followed(
         self, running: RunningMemory, by_force: Remembered | None, raw: Array, warm: Array,
@@ -227,8 +229,8 @@ class Compensator:
             beside = running.errors(t_s[rows], one_c)
             if by_force is not None:
                 beside = beside.with_bias(by_force.bias_dps[rows])
-            found = self._beside(beside, raw[rows], warm_rows, of_rows, correct, first)
-            rate[rows], outside[rows] = found.rate_dps, found.outside
+            block = self._beside(beside, raw[rows], warm_rows, of_rows, correct, first)
+            rate[rows], outside[rows] = block.rate_dps, block.outside
         return Compensated(rate, outside)
 
     def _beside(
@@ -242,18 +244,18 @@ class Compensator:
         if beside is None:
             return self._held(raw, warm, known, correct, first)
         if self._is_direct:
-            found = self._held(np.where(np.isnan(beside.bias_dps), np.nan, raw), warm, known, correct, first)
-            rate = found.rate_dps - beside.bias_dps
+            compensated = self._held(np.where(np.isnan(beside.bias_dps), np.nan, raw), warm, known, correct, first)
+            rate = compensated.rate_dps - beside.bias_dps
             if beside.scale is not None:
                 rate = rate - beside.scale * np.clip(raw, self._slow, self._fast)
-            return Compensated(rate, found.outside)
+            return Compensated(rate, compensated.outside)
         less = raw - beside.bias_dps
-        found = self._held(less, warm, known, correct, first)
-        rate = found.rate_dps
+        compensated = self._held(less, warm, known, correct, first)
+        rate = compensated.rate_dps
         if beside.scale is not None:
             held = partial(self._at_edge, warm=warm, known=known, correct=correct)
             rate = with_scale(held, less, beside.scale, self._slow, self._fast)
-        return Compensated(rate, found.outside)
+        return Compensated(rate, compensated.outside)
 
     def _by_force(self, specific_force_g: ArrayLike | None, n: int) -> Remembered | None:
         """Return what specific force adds to the bias; it remembers nothing."""
@@ -348,8 +350,8 @@ class Compensator:
             self._has_warned = True
             warn(f"{self.calibration.serial}: {self.force_sensitivity.sentence()}", LeftOutWarning)
         if self._running is None:
-            found = self.compensate(raw, temperature_c, specific_force_g=specific_force_g)
-            return found.rate_dps[0], bool(found.outside[0])
+            compensated = self.compensate(raw, temperature_c, specific_force_g=specific_force_g)
+            return compensated.rate_dps[0], bool(compensated.outside[0])
         if t_s is None or temperature_c is None:
             raise BadInput(
                 f"{self.calibration.serial}: its model depends on earlier temperatures; give t_s and temperature_c"
@@ -361,8 +363,8 @@ class Compensator:
             )
         by_force = self._by_force(specific_force_g, 1)
         beside = self._running.errors(np.array([t_s]), np.array([temperature_c]))
-        found = self._beside(
+        compensated = self._beside(
             beside if by_force is None else beside.with_bias(by_force.bias_dps), raw, np.array([temperature_c]),
             {"t_s": np.array([t_s])}, self._correct,
         )  # fmt: skip
-        return found.rate_dps[0], bool(found.outside[0])
+        return compensated.rate_dps[0], bool(compensated.outside[0])

@@ -38,10 +38,10 @@ class DeviceReport:
     @property
     def state(self) -> State:
         """The worst state of a finding."""
-        found = {each.state for each in self.findings}
+        states = {each.state for each in self.findings}
         worst: State = "good"
         for state in STATES:
-            worst = state if state in found else worst
+            worst = state if state in states else worst
         return worst
 
     @property

@@ -44,19 +44,19 @@ class Tried(NamedTuple):
 
 def requests_of(description: Described) -> list[tuple[str, str]]:
     """Return the key and the text of every request that a description can send."""
-    found: list[tuple[str, str]] = []
+    requests: list[tuple[str, str]] = []
     for key in type(description).model_fields:
         given = getattr(description, key)
         if isinstance(given, Ask):
-            found.append((key, given.send))
+            requests.append((key, given.send))
         elif isinstance(given, tuple):
-            found += [(key, each) for each in given]
+            requests += [(key, each) for each in given]
     if isinstance(description, ReferenceDescription):
-        found += [("identity", description.identity)] if description.identity else []
-        found += [(f"quantities.{name}", each.ask) for name, each in description.quantities.items()]
+        requests += [("identity", description.identity)] if description.identity else []
+        requests += [(f"quantities.{name}", each.ask) for name, each in description.quantities.items()]
     if description.line.check is not None:
-        found.append(("line.check", description.line.check.send))
-    return found
+        requests.append(("line.check", description.line.check.send))
+    return requests
 
 
 def try_description(
@@ -115,14 +115,14 @@ def _steps(
 
 
 def _questions(description: Described, dialogue: Dialogue) -> list[Step]:
-    found: list[Step] = []
+    questions: list[Step] = []
     for key in type(description).model_fields:
         ask = getattr(description, key)
         if isinstance(ask, Ask):
-            found.append((key, _answer(dialogue, key, ask)))
+            questions.append((key, _answer(dialogue, key, ask)))
     if description.line.check is not None:
-        found.append(("line.check", _answer(dialogue, "line.check", description.line.check)))
-    return found
+        questions.append(("line.check", _answer(dialogue, "line.check", description.line.check)))
+    return questions
 
 
 def _answer(dialogue: Dialogue, key: str, ask: Ask) -> Callable[[], str]:

@@ -53,16 +53,16 @@ def sends_nothing_when_it_is_made(stand: Stand) -> None:
 
 def says_who_it_is(stand: Stand) -> None:
     """Check the identity."""
-    found = stand.driver.identify()
+    identity = stand.driver.identify()
     if stand.kind == "gyro":
         given = next(each.serial for each in stand.file.gyros if each.name == stand.driver.name)
         require(
-            found.serial == given,
-            f"identify() returns the serial number {found.serial!r}, but the bench file gives {given!r}",
+            identity.serial == given,
+            f"identify() returns the serial number {identity.serial!r}, but the bench file gives {given!r}",
         )
-        require(found.technology in ("fog", "mems", "piezo"), f"technology {found.technology!r} is not known")
+        require(identity.technology in ("fog", "mems", "piezo"), f"technology {identity.technology!r} is not known")
     else:
-        require(isinstance(found, str) and found, f"identify gives {found!r}; return a text")
+        require(isinstance(identity, str) and identity, f"identify gives {identity!r}; return a text")
 
 
 def reports_silence(stand: Stand) -> None:

@@ -106,10 +106,10 @@ def open_stand(name: str, file: BenchFile) -> Stand:
     Raises ValueError for a bench that does not have the driver, or has it on a real address, and what open_bench does.
     """
     kind = kind_of(name)
-    found = next(((key, each) for key, each in file.sections.items() if each.driver == name), None)
-    if found is None:
+    entry = next(((key, each) for key, each in file.sections.items() if each.driver == name), None)
+    if entry is None:
         raise ValueError(f"bench {file.name!r} has no {kind} with driver {name!r}; name a bench that has one")
-    url = found[1].port or found[1].host or ""
+    url = entry[1].port or entry[1].host or ""
     if not is_simulated_address(url):
         raise ValueError(
             f"driver {name!r} is at {url or 'no address'} on bench {file.name!r}, but a driver is checked on a "
@@ -118,4 +118,4 @@ def open_stand(name: str, file: BenchFile) -> Stand:
     clock = VirtualClock()
     bench = open_bench(file, clock)
     drivers: dict[str, Any] = {"table": bench.table, "chamber": bench.chamber, **bench.references, **bench.gyros}
-    return Stand(kind, file, clock, bench, drivers[found[0]], url)
+    return Stand(kind, file, clock, bench, drivers[entry[0]], url)

@@ -169,9 +169,9 @@ class ArrickC4:
         Raises WrongInstrument, RequestRejected, NoReply, LinkError.
         """
         move = plan_move(self.settings, rate_dps, steady_s)
-        found = self._timed_run(move, wait)
-        checks.require_plausible(self.name, found, move)
-        return found
+        run = self._timed_run(move, wait)
+        checks.require_plausible(self.name, run, move)
+        return run
 
     def use_step_clock(self, ratio: float) -> None:
         """Set the step clock that every later rate is computed by, as a share of the nominal one; nothing is sent."""
@@ -190,9 +190,9 @@ class ArrickC4:
         self._turn_by(round(self._steps / turn) * turn - round(self._steps), wait)
         took_s = self._timed_home()
         if self._homing is not None:
-            found = self._homing.check(took_s, self.settings)
-            if found.missed_steps >= -(found.limit_steps + COVERAGE * found.u_steps):
-                return found
+            home_check = self._homing.check(took_s, self.settings)
+            if home_check.missed_steps >= -(home_check.limit_steps + COVERAGE * home_check.u_steps):
+                return home_check
             self._homing = None  # it was learned while replies were late
         return self._learn_homing(took_s, wait)
 
@@ -202,11 +202,11 @@ class ArrickC4:
         Returns the check of a homing that took `took_s`, or that of the turns that it was learned from.
         """
         for _ in range(checks.LEARNING_ATTEMPTS):
-            found = self._learned(wait)
-            if found is None or isinstance(found, HomeCheck):
-                return found
-            if self._homing is None or found.u_steps < self._homing.u_steps:
-                self._homing = found
+            home_check = self._learned(wait)
+            if home_check is None or isinstance(home_check, HomeCheck):
+                return home_check
+            if self._homing is None or home_check.u_steps < self._homing.u_steps:
+                self._homing = home_check
             if self._homing.u_steps <= self.settings.home_limit_steps:
                 break
         return None if self._homing is None else self._homing.check(took_s, self.settings)
@@ -267,10 +267,10 @@ class ArrickC4:
         def await_end(within_s: float) -> None:
             self._link.expect(lines.FINISHED, "finish a move", within_s)
 
-        found = checks.timed(self._clock, move, await_end, wait, start_s)
+        run = checks.timed(self._clock, move, await_end, wait, start_s)
         self._active = None
         self._steps += move.steps
-        return found
+        return run
 
     def _turn_by(self, steps: int, wait: Wait) -> None:
         """Turn by whole steps, slowly."""

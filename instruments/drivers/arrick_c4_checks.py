@@ -90,8 +90,8 @@ class Homing:
     def check_learning(self, took_s: Sequence[float], settings: ArrickC4Settings) -> HomeCheck:
         """Return how many steps were missed in the turns, of equal spacing, that the homing was learned from."""
         beside = np.abs(np.diff(np.asarray(took_s) / self.step_s, 2))
-        found = self._check(float(beside.max()) / 2, settings)  # a place in the middle counts twice
-        return HomeCheck(found.missed_steps, found.u_steps, found.limit_steps, found.step_deg, found.step_s, True)
+        spread = self._check(float(beside.max()) / 2, settings)  # a place in the middle counts twice
+        return HomeCheck(spread.missed_steps, spread.u_steps, spread.limit_steps, spread.step_deg, spread.step_s, True)
 
     def _check(self, steps: float, settings: ArrickC4Settings) -> HomeCheck:
         return HomeCheck(

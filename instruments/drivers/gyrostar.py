@@ -80,10 +80,10 @@ class Gyrostar:
             )
             raise WrongInstrument(self.name, text)
         for channel, wanted in self.options.range_codes.items():
-            found = self._get(RANGE_CODE.nth(channel, 1, first=0))
-            if found != wanted:
+            range_code = self._get(RANGE_CODE.nth(channel, 1, first=0))
+            if range_code != wanted:
                 text = (
-                    f"input {channel} has range code 0x{found:04X}, but the bench file says 0x{wanted:04X}; "
+                    f"input {channel} has range code 0x{range_code:04X}, but the bench file says 0x{wanted:04X}; "
                     "change one of the two"
                 )
                 raise WrongInstrument(self.name, text)

@@ -29,14 +29,14 @@ def _stim300(data: bytes, baudrate: int) -> Recognised | None:
             continue
         for crlf in (False, True):
             options = DatagramOptions.model_validate({"datagram": datagram, "crlf": crlf, "baudrate": baudrate})
-            found = scan(data, layout_of(options))
-            score = len(found.frames) - found.damaged
-            if len(found.frames) >= LEAST_FRAMES and (best is None or score > best[0]):
-                best = score, found, options
+            frames = scan(data, layout_of(options))
+            score = len(frames.frames) - frames.damaged
+            if len(frames.frames) >= LEAST_FRAMES and (best is None or score > best[0]):
+                best = score, frames, options
     if best is None:
         return None
-    _, found, options = best
-    counter = found.frames[:, layout_of(options).counter].astype(np.int64)
+    _, frames, options = best
+    counter = frames.frames[:, layout_of(options).counter].astype(np.int64)
     step = int(np.median(np.diff(counter) % 256)) or 1
     rate_hz = COUNTS_PER_S / step
     settings: dict[str, object] = {"technology": "mems", "axes": ["x", "y", "z"], "max_rate_dps": 400.0}

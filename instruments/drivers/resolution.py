@@ -60,29 +60,29 @@ def _section(
     if type(section) is driver.settings:
         return section
     try:
-        found: DeviceSettings = driver.settings.model_validate(section.model_dump(exclude_unset=True))
+        settings: DeviceSettings = driver.settings.model_validate(section.model_dump(exclude_unset=True))
     except ValidationError as error:
         wrong += [_detail(each["type"], each["msg"], (*place, *each["loc"]), each["input"]) for each in error.errors()]
         return section
-    for name, value in (found.model_extra or {}).items():
+    for name, value in (settings.model_extra or {}).items():
         text = f"driver {section.driver} has no such setting; choose one of {_settings_of(driver)}"
         wrong.append(_detail("extra_forbidden", text, (*place, name), value))
-    return found
+    return settings
 
 
 def _driver(name: str, kind: type[Driver]) -> Driver:
     """Return an installed driver of one kind; raises PluginError saying what is installed and what to do."""
     what, _ = KINDS[kind]
     try:
-        found = DRIVERS.get(name)
+        driver = DRIVERS.get(name)
     except UnknownPlugin as error:
         raise UnknownPlugin(DRIVERS.unknown(name, names_of(kind))) from error
-    if not isinstance(found, kind):
-        drives, _ = KINDS[type(found)]
+    if not isinstance(driver, kind):
+        drives, _ = KINDS[type(driver)]
         known: Sequence[str] = names_of(kind)
         choice = f"choose {', '.join(known)}" if known else f"no driver of a {what} is installed"
         raise PluginError(f"driver {name!r} is for a {drives}, not for a {what}; {choice}")
-    return found
+    return driver
 
 
 def _settings_of(driver: Driver) -> str:

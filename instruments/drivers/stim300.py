@@ -213,15 +213,15 @@ class Stim300:
 
     def _hear(self, special: bytes) -> None:
         """Take in what the unit says of itself; raises WrongInstrument where its bench file says otherwise."""
-        if (found := parse_configuration(special)) is not None:
-            if said := differences(found, self.settings):
+        if (configuration := parse_configuration(special)) is not None:
+            if said := differences(configuration, self.settings):
                 raise WrongInstrument(
                     self.name,
                     f"the unit on {self.settings.port} is not configured as the bench file requires: "
                     f"{'; '.join(said)}; configure the unit in its service mode (commands u, m, d), or correct "
                     "the bench file",
                 )
-            self._set = found
+            self._set = configuration
         elif (serial := parse_serial_number(special)) is not None:
             self._refuse_other_unit(serial)
             self._serial = serial
@@ -260,13 +260,13 @@ class Stim300:
         return reported
 
     def _decode(self, data: bytes) -> Readings:
-        found = scan(self._unfinished + data, self.layout)
-        self._unfinished = found.rest
-        for special in found.specials:
+        scanned = scan(self._unfinished + data, self.layout)
+        self._unfinished = scanned.rest
+        for special in scanned.specials:
             self._stream.answered(SPECIALS[special[0]].stride)
             self._hear(special)
-        frames, layout, behind = found.frames, self.layout, found.behind
-        damaged = found.damaged
+        frames, layout, behind = scanned.frames, self.layout, scanned.behind
+        damaged = scanned.damaged
         if len(frames):
             new = self._counter.is_new(frames[:, layout.counter].astype(np.int64), frames)
             if not new.all():

@@ -73,10 +73,10 @@ class WiringOptions(Strict):
     @property
     def range_codes(self) -> dict[int, int]:
         """Input number -> range code of the inputs in use; the input of the rate comes first."""
-        found = {self.channel: self.range_code}
+        codes = {self.channel: self.range_code}
         if self.thermometer_channel is not None:
-            found[self.thermometer_channel] = self.thermometer_range_code
-        return found
+            codes[self.thermometer_channel] = self.thermometer_range_code
+        return codes
 
 
 class GyrostarSettings(GyroSettings):

@@ -58,10 +58,10 @@ class SampledUnit:
         force = self._world.gravity(index / self._rate_hz)
         if self._unit.truth.accel_noise_g > 0:
             force = force + self._unit.truth.accel_noise_g * self._rng.standard_normal(force.shape)
-        found = {"temperature_c": sample.temperature_c[:, 0], "supply_v": sample.supply_v}
+        values = {"temperature_c": sample.temperature_c[:, 0], "supply_v": sample.supply_v}
         for column, axis in enumerate(self._axes):
-            found[f"gyro_{axis}"] = sample.rate_dps[:, column]
-            found[f"temperature_{axis}_c"] = sample.temperature_c[:, column]
+            values[f"gyro_{axis}"] = sample.rate_dps[:, column]
+            values[f"temperature_{axis}_c"] = sample.temperature_c[:, column]
         for column, body_axis in enumerate("xyz"):
-            found[f"accel_{body_axis}_g"] = force[:, column]
-        return found
+            values[f"accel_{body_axis}_g"] = force[:, column]
+        return values

@@ -61,9 +61,9 @@ class LineLink:
             self._clock.sleep(pause_s)
             try:
                 self.awaits_slow = timeout_s is not None  # for good where what waits is ended
-                found = self._ask_once(request, reply, what, timeout_s or self._timeout_s)
+                match = self._ask_once(request, reply, what, timeout_s or self._timeout_s)
                 self.awaits_slow = False
-                return found
+                return match
             except RequestRejected:
                 self.awaits_slow = False
                 raise
@@ -116,19 +116,19 @@ class LineLink:
 
     def _ask_once(self, request: str, reply: str, what: str, timeout_s: float) -> re.Match[str]:
         try:
-            found = self._receive(self._send(request), what, timeout_s)
+            line = self._receive(self._send(request), what, timeout_s)
         except BROKEN as error:
             raise self._broken(what, error) from error
         finally:
             self._earliest_s = self._clock.now_s() + self._syntax.pause_s
-        if (match := re.fullmatch(reply, found)) is not None:
+        if (match := re.fullmatch(reply, line)) is not None:
             return match
-        if self._syntax.refusal and (refused := re.fullmatch(self._syntax.refusal, found)):
+        if self._syntax.refusal and (refused := re.fullmatch(self._syntax.refusal, line)):
             why = self._syntax.reason(refused["why"])
             raise RequestRejected(self.device, f"refused to {what}: {why}; check its mode at its panel")
         raise MalformedReply(
             self.device,
-            f"answered {found[:SHOWN_BYTES]!r} to the request to {what}; check driver, line settings and cable",
+            f"answered {line[:SHOWN_BYTES]!r} to the request to {what}; check driver, line settings and cable",
         )
 
     def _send(self, request: str) -> SerialPort:

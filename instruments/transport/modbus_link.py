@@ -71,8 +71,10 @@ def _is_frame(data: bytes) -> bool:
     return FramerRTU.check_CRC(data[:-2], int.from_bytes(data[-2:], "big"))
 
 
-def _other_unit(found: int, address: int) -> str:
-    return f"unit {found} answered instead of unit {address}; set address in the bench file, or find the second device"
+def _other_unit(answered: int, address: int) -> str:
+    return (
+        f"unit {answered} answered instead of unit {address}; set address in the bench file, or find the second device"
+    )
 
 
 def _bytes(received: bytes, advice: str) -> str:

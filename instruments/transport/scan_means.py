@@ -37,9 +37,9 @@ class ScanMeans:
         waits = (groups == last) & (numbers[-1:] != (last + 1) * self.average - 1)
         self._numbers, self._codes, self._good = numbers[waits], codes[waits], good[waits]
         groups, codes, good = groups[~waits], codes[~waits], good[~waits]
-        found, starts, counts = np.unique(groups, return_index=True, return_counts=True)
+        group_numbers, starts, counts = np.unique(groups, return_index=True, return_counts=True)
         whole = counts == self.average
         if not len(starts):
-            return found, codes, good
+            return group_numbers, codes, good
         sums = np.add.reduceat(codes, starts, axis=0)
-        return found[whole], sums[whole], np.logical_and.reduceat(good, starts)[whole]
+        return group_numbers[whole], sums[whole], np.logical_and.reduceat(good, starts)[whole]

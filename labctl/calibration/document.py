@@ -128,8 +128,8 @@ class Calibration:
 
         `reported` is what it says of itself, by the same names; what only one of the two has is not compared.
         """
-        if found := changed(self.configuration, reported):
-            said = ", ".join(f"{name} was {was} and is {now}" for name, (was, now) in found.items())
+        if changes := changed(self.configuration, reported):
+            said = ", ".join(f"{name} was {was} and is {now}" for name, (was, now) in changes.items())
             raise OtherConfiguration(
                 f"calibration of {self.serial} version {self.version}: the unit is set otherwise than when it was "
                 f"measured: {said}; set it as it was, or calibrate it as it is"
@@ -173,7 +173,7 @@ def read_calibration(source: Path | bytes) -> Calibration:
                 f"{name}: the file has schema {repr(schema)[:80]}, but this version of labctl reads {SCHEMA!r}; "
                 "use the version that wrote the file"
             )
-        whole, found = canonical_and_hash(document)
+        whole, digest = canonical_and_hash(document)
         if whole != content.strip():
             json.loads(content, object_pairs_hook=_object)
     except OSError as error:
@@ -187,9 +187,9 @@ def read_calibration(source: Path | bytes) -> Calibration:
             f"{name}: not JSON, or truncated ({error}); fetch it again with `labctl calibration`"
         ) from error
     written = document.get("hash")
-    if found != written:
+    if digest != written:
         raise BadCalibrationFile(
-            f"{name}: was edited or damaged: the hash of its content is {found[:16]}…, but the file gives "
+            f"{name}: was edited or damaged: the hash of its content is {digest[:16]}…, but the file gives "
             f"{str(written)[:16]}…; fetch it again with `labctl calibration`"
         )
     return Calibration(cast(CalibrationJson, document))

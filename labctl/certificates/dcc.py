@@ -138,20 +138,20 @@ def _statements(parent: ET.Element, given: Certificate) -> None:
         _conformity(parent, given.conformity, max(each.k for each in given.results))
 
 
-def _conformity(parent: ET.Element, found: Conformity, k: float) -> None:
-    made = _statement(parent, "Conformity", found.statement, norm=("ILAC-G8:09/2019",), reference=found.specification,
+def _conformity(parent: ET.Element, judged: Conformity, k: float) -> None:
+    made = _statement(parent, "Conformity", judged.statement, norm=("ILAC-G8:09/2019",), reference=judged.specification,
                       ref_type="basic_conformity")  # fmt: skip
-    child(made, "conformity", "pass" if found.passed else "fail")
+    child(made, "conformity", "pass" if judged.passed else "fail")
     data = child(made, "data")
     for name, limit, ref_type in (
-        ("Limit of the error", found.limit_dps, "basic_toleranceLimit"),
-        ("Acceptance limit of the error", found.acceptance_dps, "basic_acceptanceLimit"),
+        ("Limit of the error", judged.limit_dps, "basic_toleranceLimit"),
+        ("Acceptance limit of the error", judged.acceptance_dps, "basic_acceptanceLimit"),
     ):
         quantity(data, f"{name}, lower", [-limit], "deg/s", ref_type=f"{ref_type}Lower")
         quantity(data, f"{name}, upper", [limit], "deg/s", ref_type=f"{ref_type}Upper")
-    quantity(data, "Guard band", [found.guard_band_dps], "deg/s")
-    quantity(data, "Largest error of the corrected rate", [found.largest_error_dps], "deg/s",
-             expanded=[found.expanded_dps], k=[k], ref_type="basic_measurementError")  # fmt: skip
+    quantity(data, "Guard band", [judged.guard_band_dps], "deg/s")
+    quantity(data, "Largest error of the corrected rate", [judged.largest_error_dps], "deg/s",
+             expanded=[judged.expanded_dps], k=[k], ref_type="basic_measurementError")  # fmt: skip
 
 
 def _statement(
@@ -302,11 +302,11 @@ def _any_axis(parent: ET.Element, given: Certificate) -> None:
 
 
 def _budget(parent: ET.Element, given: Certificate) -> None:
-    found = given.uncertainty
-    warm = "" if found.temperature_c is None else f" and {found.temperature_c:g} °C"
-    where = f"Of axis {found.axis} at {found.rate_dps:g} °/s{warm}, where U is largest."
+    uncertainty = given.uncertainty
+    warm = "" if uncertainty.temperature_c is None else f" and {uncertainty.temperature_c:g} °C"
+    where = f"Of axis {uncertainty.axis} at {uncertainty.rate_dps:g} °/s{warm}, where U is largest."
     made = _result(parent, "Contributions to the standard uncertainty", where)
-    for each in found.budget:
+    for each in uncertainty.budget:
         quantity(made, f"{each.source}, type {each.type}", [each.contribution_dps], "deg/s")
 
 

@@ -148,7 +148,7 @@ def _address(given: Contact) -> list[str]:
 def _facts(given: Certificate) -> list[list[object]]:
     customer, item = given.customer, given.item
     first, last = given.performed_from.isoformat(), given.performed_until.isoformat()
-    found: list[list[object]] = [
+    rows: list[list[object]] = [
         ["Customer", [*_address(customer), f"Contact: {customer.contact}" if customer.contact else ""]],
         ["Order", [customer.order]],
         ["Item", [f"{item.description}, axes {', '.join(item.axes)}"]],
@@ -162,10 +162,10 @@ def _facts(given: Certificate) -> list[list[object]]:
         ["Date of issue", [given.issued_on.isoformat()]],
     ]
     if given.laboratory.accreditation:
-        found.insert(0, ["Accreditation", [given.laboratory.accreditation]])
+        rows.insert(0, ["Accreditation", [given.laboratory.accreditation]])
     if given.replaces is not None:
-        found.insert(0, ["Replaces", [f"certificate {given.replaces.number}. Reason: {given.replaces.reason}"]])
-    kept = [[name, [line for line in lines if line]] for name, lines in found if isinstance(lines, list)]
+        rows.insert(0, ["Replaces", [f"certificate {given.replaces.number}. Reason: {given.replaces.reason}"]])
+    kept = [[name, [line for line in lines if line]] for name, lines in rows if isinstance(lines, list)]
     return [[name, lines] for name, lines in kept if lines]
 
 
@@ -177,7 +177,7 @@ def _place(given: Certificate) -> str:
 def _method(given: Certificate) -> list[list[str]]:
     method = given.method
     several = "s" if len(method.recordings) > 1 else ""
-    found = [
+    rows = [
         ["Method", method.name],
         ["Procedure", method.procedure],
         ["Error model", f"{method.model}: {', '.join(method.effects)}"],
@@ -186,18 +186,18 @@ def _method(given: Certificate) -> list[list[str]]:
         ["Additions to, deviations or exclusions from the method", method.deviations],
         ["Results of external providers", given.external],
     ]
-    return [each for each in found if each[1]]
+    return [each for each in rows if each[1]]
 
 
 def uncertainty_text(given: Certificate) -> str:
     """Return how the expanded uncertainties are to be read."""
-    found = given.uncertainty
-    warm = "" if found.temperature_c is None else f" and {_number(found.temperature_c)} °C"
+    uncertainty = given.uncertainty
+    warm = "" if uncertainty.temperature_c is None else f" and {_number(uncertainty.temperature_c)} °C"
     return (
         "The expanded uncertainty U is that of a corrected rate: the standard uncertainty times the coverage factor k "
-        f"that is stated with each result, for a coverage of about {found.coverage_probability * 100:.0f} % "
+        f"that is stated with each result, for a coverage of about {uncertainty.coverage_probability * 100:.0f} % "
         "(JCGM 100:2008). The standard uncertainty is made of the contributions below, here at the place where U is "
-        f"largest: axis {found.axis}, {_number(found.rate_dps)} °/s{warm}."
+        f"largest: axis {uncertainty.axis}, {_number(uncertainty.rate_dps)} °/s{warm}."
     )
 
 
@@ -290,11 +290,11 @@ def _state(title: str, given: StateOfItem) -> Mapping[str, object]:
 
 
 def _conformity(given: Certificate) -> Mapping[str, object] | None:
-    found = given.conformity
-    if found is None:
+    judged = given.conformity
+    if judged is None:
         return None
-    return {"specification": found.specification, "statement": found.statement, "outcome": _outcome(found.passed),
-            "results": [_verified(each) for each in found.results]}  # fmt: skip
+    return {"specification": judged.specification, "statement": judged.statement, "outcome": _outcome(judged.passed),
+            "results": [_verified(each) for each in judged.results]}  # fmt: skip
 
 
 def percent(probability: float) -> str:

@@ -88,15 +88,15 @@ def simulated_start(given: str | None) -> datetime | None:
 
 def recording_numbers(given: str | None) -> list[int]:
     """Return the numbers of recordings in "3" or "1,2,3", none where nothing was given. Raises BadInput."""
-    found: list[int] = []
+    numbers: list[int] = []
     for text in (given or "").split(",") if given is not None else ():
         if not text.strip().isdecimal() or not text.isascii():
             raise BadInput(
                 f"--recording {given!r}: {text!r} is not a recording number; write one number such as 3, "
                 "or several as 1,2,3"
             )
-        found.append(int(text))
-    return found
+        numbers.append(int(text))
+    return numbers
 
 
 def day(given: str | None, option: str) -> date | None:

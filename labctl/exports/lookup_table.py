@@ -36,12 +36,12 @@ class Table:
 
     def error_dps(self, raw: Array, temperature_c: Array) -> Array:
         """Return the error, (n, axes), of outputs (n, axes) at temperatures (n,)."""
-        found = np.zeros_like(raw)
+        error = np.zeros_like(raw)
         for axis, by in np.ndindex(self.errors.shape[:2]):
-            found[:, axis] += _bilinear(
+            error[:, axis] += _bilinear(
                 self.errors[axis, by], self.outputs, self.temperatures_c, raw[:, by], temperature_c
             )
-        return found
+        return error
 
 
 def table_of(part: StaticPart, outputs: Array, temperatures_c: Array) -> Table:
@@ -69,10 +69,10 @@ def largest_difference(part: StaticPart, table: Table) -> float:
     for axis, by in np.ndindex(axes, axes):
         seen = _bilinear(table.errors[axis, by], table.outputs, table.temperatures_c, raw, warm)
         apart[axis, by] = np.abs(seen - exact.errors[axis, by].ravel()).max()
-    found = apart.sum(axis=1)
+    difference = apart.sum(axis=1)
     raw_all, warm_all = all_turning(part)
     together = np.abs(raw_all - table.error_dps(raw_all, warm_all) - part.rate(raw_all, warm_all)).max(axis=0)
-    return float((found + (together if axes > 1 else 0.0)).max())
+    return float((difference + (together if axes > 1 else 0.0)).max())
 
 
 def write(calibration: Calibration, options: Mapping[str, str]) -> Written:

@@ -42,9 +42,9 @@ def written_calibration(document: bytes, format_name: str, options: Mapping[str,
         raise BadInput(f"format {format_name}: option {unknown[0]!r} is not known; options of this format: {known}")
     calibration = read_calibration(document)
     try:
-        found = chosen.write(calibration, given) if chosen.options else chosen.write(calibration)
+        file_bytes = chosen.write(calibration, given) if chosen.options else chosen.write(calibration)
     except LabctlError:
         raise
     except Exception as error:
         raise BadInput(failure(FORMATS.plugin(format_name), "write this calibration", error)) from error
-    return found if isinstance(found, Written) else Written(found)
+    return file_bytes if isinstance(file_bytes, Written) else Written(file_bytes)

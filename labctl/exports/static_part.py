@@ -61,16 +61,16 @@ class StaticPart:
     def bias_dps(self, temperature_c: Array) -> Array:
         """Return the output at true rate 0, (n, axes) deg/s, by Newton's method on the correction."""
         n, axes = len(temperature_c), len(self.axes)
-        found = np.zeros((n, axes))
+        bias = np.zeros((n, axes))
         for _ in range(NEWTON_STEPS):
-            left = self.rate(found, temperature_c)
+            left = self.rate(bias, temperature_c)
             slope = np.empty((n, axes, axes))
             for column in range(axes):
-                moved = found.copy()
+                moved = bias.copy()
                 moved[:, column] += SLOPE_STEP_DPS
                 slope[:, :, column] = (self.rate(moved, temperature_c) - left) / SLOPE_STEP_DPS
-            found = found - np.linalg.solve(slope, left[:, :, None])[:, :, 0]
-        return found
+            bias = bias - np.linalg.solve(slope, left[:, :, None])[:, :, 0]
+        return bias
 
     def memory_losses(self) -> tuple[Loss, ...]:
         """Return what is lost where a format carries neither lag nor hysteresis."""
@@ -86,7 +86,7 @@ def follower_losses(memory: Memory | None, fastest_dps: float) -> tuple[Loss, ..
 
     That of a lag of the scale factor is stated at the fastest calibrated rate.
     """
-    found: dict[str, float] = {}
+    losses: dict[str, float] = {}
     for each in memory.followers if memory is not None else ():
         of, size = "bias", float(np.abs(each.size).max())
         if each.scale is not None:
@@ -100,8 +100,8 @@ def follower_losses(memory: Memory | None, fastest_dps: float) -> tuple[Loss, ..
         else:
             what = f"thermal lag of the {of}, at {WARMING_K_MIN:g} K/min"
             size *= max(each.parameter, each.cooling_s or 0.0) / 60 * WARMING_K_MIN
-        found[what] = found.get(what, 0.0) + size
-    return tuple(Loss(what, size) for what, size in found.items())
+        losses[what] = losses.get(what, 0.0) + size
+    return tuple(Loss(what, size) for what, size in losses.items())
 
 
 def static_part(calibration: Calibration, format_name: str, *, carries: str) -> StaticPart:

@@ -14,8 +14,8 @@ def bounds_dps(calibration: Calibration) -> dict[str, float | None]:
 
     It is that of a rotation about the axis itself, the others at rest.
     """
-    found = _of(calibration)
-    return {axis: None if found is None else found["axes"][axis]["bound_dps"] for axis in calibration.axes}
+    use_bounds = _of(calibration)
+    return {axis: None if use_bounds is None else use_bounds["axes"][axis]["bound_dps"] for axis in calibration.axes}
 
 
 def any_axis_bounds_dps(calibration: Calibration) -> dict[str, float | None]:
@@ -27,13 +27,13 @@ def any_axis_bounds_dps(calibration: Calibration) -> dict[str, float | None]:
 
 
 def _vectors(calibration: Calibration) -> dict[str, VectorBoundJson | None]:
-    found = _of(calibration)
-    return {axis: None if found is None else found["axes"][axis].get("vector") for axis in calibration.axes}
+    use_bounds = _of(calibration)
+    return {axis: None if use_bounds is None else use_bounds["axes"][axis].get("vector") for axis in calibration.axes}
 
 
 def bound_lines(calibration: Calibration) -> list[str]:
     """Return the lines of a comment: U of each axis, alone and turned about any axis, and standards not in it."""
-    found, bounds = _of(calibration), bounds_dps(calibration)
+    use_bounds, bounds = _of(calibration), bounds_dps(calibration)
     known = _listed(bounds)
     lines = []
     if known:
@@ -44,10 +44,10 @@ def bound_lines(calibration: Calibration) -> list[str]:
     if unknown := [axis for axis, bound in bounds.items() if bound is None]:
         lines.append(f"Uncertainty of a corrected rate: unknown for {', '.join(unknown)}.")
     lines += _any_axis_lines(calibration)
-    if known and found is not None and found["not_stated"]:
+    if known and use_bounds is not None and use_bounds["not_stated"]:
         lines.append(
             f"Uncertainties that the bench does not state, and that U does not contain: "
-            f"{', '.join(found['not_stated'])}."
+            f"{', '.join(use_bounds['not_stated'])}."
         )
     return lines
 
@@ -65,8 +65,8 @@ def _any_axis_lines(calibration: Calibration) -> list[str]:
     if unknown := [axis for axis, bound in bounds.items() if bound is None]:
         lines.append(f"U turned about any axis: unknown for {', '.join(unknown)}.")
     for axis in calibration.axes:
-        found = _of(calibration)
-        cross = None if found is None else found["axes"][axis].get("cross_rates")
+        use_bounds = _of(calibration)
+        cross = None if use_bounds is None else use_bounds["axes"][axis].get("cross_rates")
         if cross is not None and cross["per_dps"] is not None:
             about = " and ".join(cross["about"])
             lines.append(f"A rate about {about} adds up to {_at_least(cross['per_dps']):g} of it to {axis}.")

@@ -30,14 +30,14 @@ _IN_TEXT = (
 
 def secrets_of(environment: Mapping[str, str] = os.environ, locations: Iterable[str] = ()) -> frozenset[str]:
     """Return the secrets that this process was given: its key, and the passwords in addresses of databases."""
-    found = {environment.get(KEY_VARIABLE, ""), environment.get("PGPASSWORD", "")}
+    secrets = {environment.get(KEY_VARIABLE, ""), environment.get("PGPASSWORD", "")}
     for location in (*locations, environment.get(DATABASE_VARIABLE, "")):
         try:
             password = urlsplit(location).password or ""
         except ValueError:  # a path that looks like an address
             continue
-        found |= {password, unquote(password)}
-    return frozenset(each for each in found if len(each) >= SHORTEST_SECRET)
+        secrets |= {password, unquote(password)}
+    return frozenset(each for each in secrets if len(each) >= SHORTEST_SECRET)
 
 
 class Redaction:

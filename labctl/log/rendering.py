@@ -116,12 +116,12 @@ class Rendering:
             structlog.contextvars.merge_contextvars, structlog.processors.add_log_level, self._time,
             structlog.processors.format_exc_info,
         )  # fmt: skip
-        found: Any = {**self._process, **fields}
+        line: Any = {**self._process, **fields}
         for each in chain:
-            found = each(logger, method, found)
-        if found["level"] == "warn":
-            found["level"] = "warning"
-        clean = self._redaction.fields(found)
+            line = each(logger, method, line)
+        if line["level"] == "warn":
+            line["level"] = "warning"
+        clean = self._redaction.fields(line)
         ordered = {name: clean.pop(name) for name in FIRST if name in clean} | clean
         if not self._for_a_person:
             return str(self._last(logger, method, ordered))

@@ -76,10 +76,10 @@ class Judged:
     @property
     def state(self) -> State:
         """The worst state by any of the limits."""
-        found = {limits.state_of(self.point.value) for limits in self.limits}
+        states = {limits.state_of(self.point.value) for limits in self.limits}
         order: tuple[State, ...] = ("out", "warning", "in")
         for state in order:
-            if state in found:
+            if state in states:
                 return state
         return "unknown"
 
@@ -94,14 +94,14 @@ def limits_from_history(values: Sequence[float]) -> Limits:
 
 def judged(points: Sequence[ChartPoint]) -> list[Judged]:
     """Return each value of a chart, in order of time, with its limits from those before it and from what is stated."""
-    found: list[Judged] = []
+    judged_points: list[Judged] = []
     history: list[ChartPoint] = []
     for point in points:
         one = Judged(point, tuple(_limits(point, history)))
-        found.append(one)
+        judged_points.append(one)
         if one.state != "out":
             history.append(point)
-    return found
+    return judged_points
 
 
 def _limits(point: ChartPoint, history: Sequence[ChartPoint]) -> Iterator[Limits]:

@@ -156,11 +156,11 @@ def pictures_of(
 
     All three as JSON.
     """
-    found = [_picture(kind, criticism, _effects(kind.id, criticism)) for kind in KINDS]
-    found += [_picture(kind, comparison, ()) for kind in COMPARED if comparison is not None]
+    drawn_plots = [_picture(kind, criticism, _effects(kind.id, criticism)) for kind in KINDS]
+    drawn_plots += [_picture(kind, comparison, ()) for kind in COMPARED if comparison is not None]
     if ladder is not None:
-        found.append(_picture(LADDER, ladder, ()))
-    return [picture for picture in found if picture is not None]
+        drawn_plots.append(_picture(LADDER, ladder, ()))
+    return [picture for picture in drawn_plots if picture is not None]
 
 
 def _picture(kind: _Kind[AnswerT], answer: AnswerT, effects: tuple[str, ...]) -> Picture | None:

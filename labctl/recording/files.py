@@ -68,14 +68,14 @@ def read_head(path: Path) -> RecordingInfo:
 
 
 def _data_file(folder: Path, kind: str) -> Path:
-    found = [folder / f"{kind}.{suffix}" for suffix in FORMATS if (folder / f"{kind}.{suffix}").exists()]
-    if not found:
+    candidates = [folder / f"{kind}.{suffix}" for suffix in FORMATS if (folder / f"{kind}.{suffix}").exists()]
+    if not candidates:
         raise BadRecording(
             f"{folder}: kind = {kind!r} needs a file {kind}.parquet or {kind}.csv; there is none; add it"
         )
-    if len(found) > 1:
-        raise BadRecording(f"{folder}: both {found[0].name} and {found[1].name} exist; remove one of them")
-    return found[0]
+    if len(candidates) > 1:
+        raise BadRecording(f"{folder}: both {candidates[0].name} and {candidates[1].name} exist; remove one of them")
+    return candidates[0]
 
 
 def write_recording(recording: Recording, folder: Path, file_format: FileFormat = "parquet") -> list[str]:
@@ -130,7 +130,7 @@ def recording_parts(opened: ExitStack, folder: Path) -> list[tuple[str, tuple[st
 
     Raises BadRecording for a folder without any.
     """
-    found = [path for path in sorted(folder.glob("*")) if path.name in FILE_NAMES]
-    if not found:
+    part_paths = [path for path in sorted(folder.glob("*")) if path.name in FILE_NAMES]
+    if not part_paths:
         raise BadRecording(f"{folder}: no recording there (expected {HEAD} and a data file)")
-    return [("files", (path.name, opened.enter_context(path.open("rb")))) for path in found]
+    return [("files", (path.name, opened.enter_context(path.open("rb")))) for path in part_paths]

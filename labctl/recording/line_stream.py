@@ -62,15 +62,15 @@ def layout_of(names: Sequence[str]) -> LineLayout:
     """
     fields: dict[str, LineField] = {}
     for name in names:
-        found = _field(name)
-        if found is None:
+        field = _field(name)
+        if field is None:
             continue
-        if found.target in fields:
+        if field.target in fields:
             raise BadInput(
-                f"two values of a line are {found.target}: {fields[found.target].name!r} and {name!r}; name the "
+                f"two values of a line are {field.target}: {fields[field.target].name!r} and {name!r}; name the "
                 "columns with --columns, and the one to leave out '-'"
             )
-        fields[found.target] = found
+        fields[field.target] = field
     if absent := [target for target in (*_GYROS, *_FORCES) if target not in fields]:
         raise BadInput(
             f"the lines have no {', '.join(absent)} (their values: {', '.join(names)[:200] or 'none'}); name the "

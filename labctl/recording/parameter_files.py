@@ -52,15 +52,15 @@ def probe(path: Path) -> float:
 def read(path: Path, options: ParameterOptions) -> Recording:
     """Return the table of the first gyro with a thermal calibration. Raises BadRecording naming file and parameter."""
     text = _text(path)
-    found = _kind(text)
-    if found is None:
+    kind = _kind(text)
+    if kind is None:
         raise BadRecording(
             f"{path}: no parameter TC_G*_X3_0 (PX4) or INS_TCAL*_GYR1_X (ArduPilot), so it has no thermal calibration "
             "of a gyro; run the thermal calibration on the flight controller, then save its parameters again"
         )
     try:
         values = {name: float(number) for name, number in _LINE.findall(text)}
-        warm, bias_rad_s = _px4(values, found[1]) if found[0] == "PX4" else _ardupilot(values, found[1])
+        warm, bias_rad_s = _px4(values, kind[1]) if kind[0] == "PX4" else _ardupilot(values, kind[1])
     except KeyError as error:
         raise BadRecording(
             f"{path}: parameter {error.args[0]} is missing; export the complete set of parameters"
@@ -68,7 +68,7 @@ def read(path: Path, options: ParameterOptions) -> Recording:
     except ValueError as error:
         raise BadRecording(f"{path}: {error}; correct the file") from error
     _refuse_cut(path, text)
-    notes = f"bias over temperature of {found[0]}, gyro {found[1]}; scale factor and misalignment are not in its file"
+    notes = f"bias over temperature of {kind[0]}, gyro {kind[1]}; scale factor and misalignment are not in its file"
     info = RecordingInfo(
         serial=options.serial, axes=AXES, kind="coefficients", started_at=options.started_at,
         max_rate_dps=options.max_rate_dps, notes=notes,
@@ -96,10 +96,10 @@ def _text(path: Path) -> str:
 
 def _kind(text: str) -> tuple[str, int] | None:
     """Return the firmware and the number of its gyro."""
-    if found := _PX4.search(text):
-        return "PX4", int(found[1])
-    if found := _ARDUPILOT.search(text):
-        return "ArduPilot", int(found[1] or found[2])
+    if match := _PX4.search(text):
+        return "PX4", int(match[1])
+    if match := _ARDUPILOT.search(text):
+        return "ArduPilot", int(match[1] or match[2])
     return None
 
 
@@ -131,8 +131,8 @@ def _ardupilot(values: Mapping[str, float], imu: int) -> tuple[Array, Array]:
         d = temperature_c - REFERENCE_C
         return np.sum([values[f"{prefix}GYR{power}_{axis}"] * SCALE * d**power for power in (1, 2, 3)], axis=0)
 
-    found = [cubic(warm, axis) - cubic(np.array([at]), axis) + values[f"{offset}{axis}"] for axis in "XYZ"]
-    return warm, np.column_stack(found)
+    bias = [cubic(warm, axis) - cubic(np.array([at]), axis) + values[f"{offset}{axis}"] for axis in "XYZ"]
+    return warm, np.column_stack(bias)
 
 
 IMPORTER = Importer("parameters of PX4 or ArduPilot with a gyro's thermal calibration", probe, read, ParameterOptions)

@@ -112,9 +112,12 @@ def with_pieces(points: Recording, readings_of: Callable[[int], Columns]) -> Rec
         kept = {name: values[row : row + 1] for name, values in columns.items()}
         if kept["duration_s"][0] > longest_s:
             info = points.info.model_copy(update={"kind": "samples"})
-            found = to_points(Recording(info, readings_of(int(kept["dataset"][0]))))
-            if len(found) > 1:
-                kept = {n: found.columns[n] if n in found.columns else v.repeat(len(found)) for n, v in kept.items()}
+            as_points = to_points(Recording(info, readings_of(int(kept["dataset"][0]))))
+            if len(as_points) > 1:
+                kept = {
+                    n: as_points.columns[n] if n in as_points.columns else v.repeat(len(as_points))
+                    for n, v in kept.items()
+                }
         rows.append(kept)
     joined = {name: np.concatenate([kept[name] for kept in rows]) for name in columns} if rows else columns
     return Recording(points.info, joined, points.environment)

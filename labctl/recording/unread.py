@@ -47,8 +47,8 @@ def refuse_unread(path: Path, unread: Unread | None, advice: str = TAKE_AGAIN) -
 
 def of_several(parts: Sequence[Unread | None]) -> Unread | None:
     """Return what could not be read of several files together, its share that of the worst."""
-    found = [part for part in parts if part is not None]
-    if not found:
+    present = [part for part in parts if part is not None]
+    if not present:
         return None
-    places = tuple(place for part in found for place in part.places)
-    return Unread(max(part.share for part in found), places, any(part.is_cut for part in found))
+    places = tuple(place for part in present for place in part.places)
+    return Unread(max(part.share for part in present), places, any(part.is_cut for part in present))

@@ -130,8 +130,8 @@ def accelerometer_of_files(
             raise BadInput("--temperature with --earlier: coefficients of temperature need all poses; leave one out")
         return temperature_response(calibrate_over_temperature(readings, rests), rests)
     if earlier is None:
-        found = calibrate_accelerometer(readings, rests)
-        return with_alignment(_response(found, rests, adequacy_of(found, rests)), readings)
+        result = calibrate_accelerometer(readings, rests)
+        return with_alignment(_response(result, rests, adequacy_of(result, rests)), readings)
     known = earlier.known()
     fewer = by_fewer_poses(readings, rests, known)
     worth = adequacy_of(fewer.found, rests, known.whitened)
@@ -204,16 +204,16 @@ def with_alignment(answer: AccelerometerResponse, readings: PoseReadings) -> Acc
     if not readings.gyro_dps.any():
         return answer
     try:
-        found = alignment_json(solve(readings).alignment)
+        alignment = alignment_json(solve(readings).alignment)
     except NotEnoughData as error:
         return answer.model_copy(update={"text": [*answer.text, f"Alignment of the gyro triad: unknown: {error}"]})
-    return answer.model_copy(update={"alignment": found, "text": [*answer.text, alignment_text(found)]})
+    return answer.model_copy(update={"alignment": alignment, "text": [*answer.text, alignment_text(alignment)]})
 
 
-def temperature_response(found: OverTemperature, rests: Rests) -> AccelerometerResponse:
+def temperature_response(fitted: OverTemperature, rests: Rests) -> AccelerometerResponse:
     """Return a calibration over temperature as a response."""
-    u = np.sqrt(np.diag(found.covariance))
-    begin = len(found.reference.covariance)
+    u = np.sqrt(np.diag(fitted.covariance))
+    begin = len(fitted.reference.covariance)
 
     def terms(values: NDArray[np.float64], first: int) -> dict[str, list[Estimate]]:
         of = u[first : first + values.size].reshape(values.shape)
@@ -222,55 +222,57 @@ def temperature_response(found: OverTemperature, rests: Rests) -> AccelerometerR
             for i, a in enumerate(AXES)
         }
 
-    low, high = found.range_c
-    answer = _response(found.reference, rests, found.adequacy)
+    low, high = fitted.range_c
+    answer = _response(fitted.reference, rests, fitted.adequacy)
     said = (
-        f"Over {low:.1f} to {high:.1f} deg C ({found.temperatures} temperatures), about {found.reference_c:g} deg C: "
-        f"bias to the power {len(found.bias_g)}, scale factors to the power {len(found.scale_factor)}; constants would "
-        f"leave {found.constant_g:.2g} g."
+        f"Over {low:.1f} to {high:.1f} deg C ({fitted.temperatures} temperatures), about "
+        f"{fitted.reference_c:g} deg C: "
+        f"bias to the power {len(fitted.bias_g)}, scale factors to the power "
+        f"{len(fitted.scale_factor)}; constants would "
+        f"leave {fitted.constant_g:.2g} g."
     )
     return answer.model_copy(update={
         "text": [*answer.text, said],
         "temperature": AccelerometerTemperature(
-            reference_c=found.reference_c, range_c=found.range_c, temperatures=found.temperatures,
-            bias_g=terms(found.bias_g, begin), scale_factor=terms(found.scale_factor, begin + found.bias_g.size),
-            covariance=found.covariance.tolist(), constant_g=found.constant_g,
+            reference_c=fitted.reference_c, range_c=fitted.range_c, temperatures=fitted.temperatures,
+            bias_g=terms(fitted.bias_g, begin), scale_factor=terms(fitted.scale_factor, begin + fitted.bias_g.size),
+            covariance=fitted.covariance.tolist(), constant_g=fitted.constant_g,
         ),
     })  # fmt: skip
 
 
-def _response(found: Accelerometer, rests: Rests, worth: Adequacy) -> AccelerometerResponse:
-    u = np.sqrt(np.diag(found.covariance))
+def _response(sensor: Accelerometer, rests: Rests, worth: Adequacy) -> AccelerometerResponse:
+    u = np.sqrt(np.diag(sensor.covariance))
     errors = {
-        f"{AXES[i]}{AXES[j]}": Estimate(value=float(found.errors[i, j]), u=float(u[3 + k]))
+        f"{AXES[i]}{AXES[j]}": Estimate(value=float(sensor.errors[i, j]), u=float(u[3 + k]))
         for k, (i, j) in enumerate(UPPER)
     }
     return AccelerometerResponse(
         verdict=worth.verdict,
-        bias_g={a: Estimate(value=float(found.bias_g[i]), u=float(u[i])) for i, a in enumerate(AXES)},
+        bias_g={a: Estimate(value=float(sensor.bias_g[i]), u=float(u[i])) for i, a in enumerate(AXES)},
         scale_factor={a: errors[a + a] for a in AXES},
         misalignment={name: each for name, each in errors.items() if name[0] != name[1]},
-        covariance=found.covariance.tolist(), gravity_g=found.gravity_g,
-        rests=len(rests), left_out=int((~found.used).sum()), poses=different_poses(found.up),
-        before_g=worth.before_g, residual_g=found.residual_g, heldout_g=worth.heldout_g, expected_g=worth.expected_g,
+        covariance=sensor.covariance.tolist(), gravity_g=sensor.gravity_g,
+        rests=len(rests), left_out=int((~sensor.used).sum()), poses=different_poses(sensor.up),
+        before_g=worth.before_g, residual_g=sensor.residual_g, heldout_g=worth.heldout_g, expected_g=worth.expected_g,
         noise_density_m_s2={
             a: float(STANDARD_GRAVITY * np.sqrt(rests.density[i])) for i, a in enumerate(AXES)
         },
-        text=list(_text(found, worth)),
+        text=list(_text(sensor, worth)),
     )  # fmt: skip
 
 
-def _size_text(found: Accelerometer, worth: Adequacy) -> Iterator[str]:
-    worst = float(np.sqrt(np.diag(found.covariance)[:3]).max())
-    yield f"Accelerometer: bias with u up to {worst:.2g} g; local gravity {found.gravity_g:.6g} g."
+def _size_text(accelerometer: Accelerometer, worth: Adequacy) -> Iterator[str]:
+    worst = float(np.sqrt(np.diag(accelerometer.covariance)[:3]).max())
+    yield f"Accelerometer: bias with u up to {worst:.2g} g; local gravity {accelerometer.gravity_g:.6g} g."
     yield (
         f"Size of gravity: off by {worth.before_g:.2g} g before, {worth.heldout_g:.2g} g after, in held-out rests; "
         f"the noise of their means lets expect {worth.expected_g:.2g} g."
     )
 
 
-def _text(found: Accelerometer, worth: Adequacy) -> Iterator[str]:
-    yield from _size_text(found, worth)
+def _text(accelerometer: Accelerometer, worth: Adequacy) -> Iterator[str]:
+    yield from _size_text(accelerometer, worth)
     if worth.verdict == "unexplained":
         yield (
             f"that is {worth.heldout_g / worth.expected_g:.1f} times as much: the bias drifted, the unit moved in its "

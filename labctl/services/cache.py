@@ -82,9 +82,9 @@ class FileCache:
     def load(self, file: Path, decode: Callable[[bytes], ResultT]) -> ResultT | None:
         """Return what a file holds; None where it is missing or damaged."""
         with suppress(*DAMAGED):
-            found = decode(file.read_bytes())
+            decoded = decode(file.read_bytes())
             file.touch()
-            return found
+            return decoded
         return None
 
     def save(self, file: Path, content: bytes) -> None:
@@ -104,12 +104,12 @@ class FileCache:
     ) -> ResultT:
         """Return the result of a question, made only when it is not cached yet; other threads wait for it."""
         file = self.file(question)
-        if (found := self.load(file, decode)) is not None:
-            return found
+        if (stored := self.load(file, decode)) is not None:
+            return stored
         compute(str(file))
         with single_flight(str(file)):
-            if (found := self.load(file, decode)) is not None:
-                return found
+            if (stored := self.load(file, decode)) is not None:
+                return stored
             content = make()
             self.save(file, content)
         return decode(content)
@@ -161,14 +161,14 @@ class RecentResults(Generic[ResultT]):
         """Return the result of a question, computed once also when several threads ask at the same time."""
         with single_flight(f"{id(self)} {question}"):  # a cached response may be computed from it: another flight
             with self._guard:
-                found = self._found.pop(question, None)
-            if found is None:
-                found = work()
+                result = self._found.pop(question, None)
+            if result is None:
+                result = work()
             with self._guard:
-                self._found[question] = found
+                self._found[question] = result
                 for old in list(self._found)[: -self._most]:
                     del self._found[old]
-        return found
+        return result
 
 
 @lru_cache(maxsize=1)

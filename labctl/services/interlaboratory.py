@@ -115,7 +115,7 @@ def _results(
 ) -> tuple[list[ComparedResult], dict[str, str]]:
     """Return what is compared, and why other results are not."""
     budgets = [coefficients_at(side.calibration, at_c) for side in sides]
-    found, left_out = list[ComparedResult](), dict[str, str]()
+    results, left_out = list[ComparedResult](), dict[str, str]()
     keys = dict.fromkeys((own, name) for each in budgets for own, named in each.items() for name in named)
     for axis, name in keys:
         pair = [each.get(axis, {}).get(name) for each in budgets]
@@ -126,8 +126,8 @@ def _results(
             side = sides[pair[0].combined is not None].row
             left_out[f"{name} of axis {axis}"] = f"its uncertainty in version {side.version} is not known"
         else:
-            found.append(_compared(axis, name, pair[0], pair[1], shared))
-    return found, left_out
+            results.append(_compared(axis, name, pair[0], pair[1], shared))
+    return results, left_out
 
 
 def _compared(axis: str, name: str, first: Budget, second: Budget, shared: Sequence[Standard]) -> ComparedResult:

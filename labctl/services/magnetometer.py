@@ -93,15 +93,15 @@ def _of_recording(path: Path, field_ut: float | None, serial: str | None) -> Mag
         raise BadRecording(
             f"{path}: the field at t_s = {readings.t_s[row]:.6g} is not a number; mark such readings with valid = 0"
         )
-    found = calibrate_magnetometer(recording.info.serial, field, field_ut)
-    return _with_alignment(_response(found, given=field_ut is not None), readings, field, found)
+    calibration = calibrate_magnetometer(recording.info.serial, field, field_ut)
+    return _with_alignment(_response(calibration, given=field_ut is not None), readings, field, calibration)
 
 
 def _with_alignment(
-    answer: MagnetometerResponse, readings: PoseReadings, field: NDArray[np.float64], found: Magnetometer
+    answer: MagnetometerResponse, readings: PoseReadings, field: NDArray[np.float64], magnetometer: Magnetometer
 ) -> MagnetometerResponse:
     try:
-        aligned = align_field(readings, solve(readings), field, found)
+        aligned = align_field(readings, solve(readings), field, magnetometer)
     except NotEnoughData as error:
         said = f"Alignment of the magnetometer: unknown: {error}"
         return answer.model_copy(update={"text": [said, *answer.text]})
@@ -117,14 +117,14 @@ def _with_alignment(
     return answer.model_copy(update={"alignment": _alignment(aligned), "text": [said, *answer.text]})
 
 
-def _alignment(found: FieldAlignment) -> FieldAlignmentJson:
-    angles: Array = np.degrees(found.angles_rad)
-    u = np.degrees(found.u_rad)
+def _alignment(field: FieldAlignment) -> FieldAlignmentJson:
+    angles: Array = np.degrees(field.angles_rad)
+    u = np.degrees(field.u_rad)
     return {
         "axes": {axis: {"value": float(angles[i]), "u": float(u[i]), "unit": "deg"} for i, axis in enumerate(AXES)},
-        "dip": {"value": float(np.degrees(found.dip_rad)), "u": float(u[3]), "unit": "deg"},
-        "covariance_deg2": (found.covariance * np.degrees(1.0) ** 2).tolist(),
-        "place_deg": float(np.degrees(found.place_rad)), "rests": found.rests, "moves": found.moves,
+        "dip": {"value": float(np.degrees(field.dip_rad)), "u": float(u[3]), "unit": "deg"},
+        "covariance_deg2": (field.covariance * np.degrees(1.0) ** 2).tolist(),
+        "place_deg": float(np.degrees(field.place_rad)), "rests": field.rests, "moves": field.moves,
         "definition": ALIGNMENT,
     }  # fmt: skip
 

@@ -20,20 +20,22 @@ def list_units(store: Store, now: datetime, due_within: timedelta | None = None)
     """
     in_force = store.certifications.in_force()
     if due_within is None:
-        return [_answer(store, found, in_force.get(found.serial), now) for found in store.units.all()]
+        return [
+            _answer(store, unit_answers, in_force.get(unit_answers.serial), now) for unit_answers in store.units.all()
+        ]
     near = {
         serial: act for serial, act in in_force.items() if act.due_at is not None and act.due_at <= now + due_within
     }
-    found = [
+    unit_answers = [
         _answer(store, each, near[each.serial], now, whole=True) for each in store.units.all() if each.serial in near
     ]
-    return sorted(found, key=lambda unit: (unit.due or now, unit.serial))
+    return sorted(unit_answers, key=lambda unit: (unit.due or now, unit.serial))
 
 
 def unit(store: Store, serial: str, now: datetime) -> UnitResponse:
     """Return one unit; raises NotFound."""
-    found = store.units.get(serial)
-    return _answer(store, found, store.certifications.in_force().get(found.serial), now, whole=True)
+    row = store.units.get(serial)
+    return _answer(store, row, store.certifications.in_force().get(row.serial), now, whole=True)
 
 
 def count_due(store: Store, now: datetime, within: timedelta) -> tuple[int, int]:
@@ -43,20 +45,20 @@ def count_due(store: Store, now: datetime, within: timedelta) -> tuple[int, int]
 
 
 def _answer(
-    store: Store, found: Unit, act: CertificationRow | None, now: datetime, *, whole: bool = False
+    store: Store, unit_row: Unit, act: CertificationRow | None, now: datetime, *, whole: bool = False
 ) -> UnitResponse:
     return UnitResponse(
-        serial=found.serial,
-        model=found.model,
-        technology=found.technology,
-        recordings=[row.id for row in store.recordings.of_unit(found.serial)],
-        calibrations=store.calibrations.versions(found.serial),
+        serial=unit_row.serial,
+        model=unit_row.model,
+        technology=unit_row.technology,
+        recordings=[row.id for row in store.recordings.of_unit(unit_row.serial)],
+        calibrations=store.calibrations.versions(unit_row.serial),
         certified_version=act.version if act else None,
         due=act.due_at if act else None,
         overdue=bool(act and act.due_at and act.due_at <= now),
         notices=_notices(store, act),
         recalibration=_recalibration(store, act) if act and whole else None,
-        draft=newest_draft(store, found.serial) if whole else None,
+        draft=newest_draft(store, unit_row.serial) if whole else None,
         formats=[
             ExportFormatResponse(id=name, title=each.title, suffix=each.suffix, options=dict(each.options))
             for name, each in export_formats().items()

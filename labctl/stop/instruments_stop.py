@@ -35,8 +35,8 @@ def stop_instruments(
     table is at rest.
     """
     try:
-        found = BenchFile.model_validate(document)
-        return _stopped(found.model_copy(update={"gyros": (), "references": ()}), say, stands)
+        bench_file = BenchFile.model_validate(document)
+        return _stopped(bench_file.model_copy(update={"gyros": (), "references": ()}), say, stands)
     except Exception as error:  # noqa: BLE001  whatever it is, the answer is that the bench is not known to stand
         return InstrumentsLeft(stands=False, safe=False, text=f"the instruments cannot be reached: {error}")
 

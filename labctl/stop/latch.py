@@ -82,10 +82,10 @@ class StopLatch:
     def stamp(self) -> tuple[int, int]:
         """What changes when a line is added: size and time of the file; zeros while there is none."""
         try:
-            found = self._path.stat()
+            status = self._path.stat()
         except OSError:
             return 0, 0
-        return found.st_size, found.st_mtime_ns
+        return status.st_size, status.st_mtime_ns
 
     def prepare(self) -> None:
         """Make the folder and the file, so that a full disk later leaves room for the mark. Raises OSError."""

@@ -189,12 +189,12 @@ def _peeked(caller: socket.socket) -> bytes:
     clock = SystemClock()
     until_s = clock.now_s() + PATIENCE_S
     while True:
-        found = caller.recv(BODY_BYTES, socket.MSG_PEEK)
-        head, end, body = found.partition(b"\r\n\r\n")
+        content = caller.recv(BODY_BYTES, socket.MSG_PEEK)
+        head, end, body = content.partition(b"\r\n\r\n")
         length = re.search(rb"\r\ncontent-length: *(\d+)", head, re.IGNORECASE)
         wanted = int(length[1]) if length else 0
-        if not found or len(found) >= BODY_BYTES or (end and len(body) >= min(wanted, BODY_BYTES)):
-            return found
+        if not content or len(content) >= BODY_BYTES or (end and len(body) >= min(wanted, BODY_BYTES)):
+            return content
         if clock.now_s() > until_s:
             raise TimeoutError("the request does not come to its end")
         clock.sleep(0.01)
@@ -257,8 +257,8 @@ class _Handler(BaseHTTPRequestHandler):
     def do_POST(self) -> None:
         """Stop what runs, or one campaign."""
         body = self.rfile.read(min(int(self.headers.get("Content-Length") or 0), BODY_BYTES))
-        found = STOP_PATH.fullmatch(self.path.partition("?")[0])
-        if found is None:
+        match = STOP_PATH.fullmatch(self.path.partition("?")[0])
+        if match is None:
             self._problem(503, "no-web-process", f"{NO_WEB}. {self.describe().text}")
             return
         given = _fields(body, self.headers.get("Content-Type", ""))
@@ -266,7 +266,7 @@ class _Handler(BaseHTTPRequestHandler):
         if caller is None:
             return
         by = str(given.get("by") or caller)
-        campaign = int(found[1]) if found[1] else None
+        campaign = int(match[1]) if match[1] else None
         reason = f"{given.get('reason') or 'stopped on the page'} ({by})"
         stop = StopRequest.new(by, "stop page", reason, campaign)
         last = _followed(self.respond(stop))
@@ -351,19 +351,19 @@ class _Handler(BaseHTTPRequestHandler):
 def _followed(stopping: Stopping) -> Word:
     """Follow a stop for as long as a caller waits; returns the last that is known."""
     last = Word("asked", stopping.text, stopping.campaign)
-    found: list[Word] = []
+    words: list[Word] = []
     over = threading.Event()
 
     def follow() -> None:
         for word in phases(stopping):
-            found.append(word)
+            words.append(word)
             if word.phase in LAST:
                 break
         over.set()
 
     threading.Thread(target=follow, name="stop-follow", daemon=True).start()
     over.wait(ANSWER_S)
-    return found[-1] if found else last
+    return words[-1] if words else last
 
 
 def _fields(body: bytes, kind: str) -> dict[str, Any]:

@@ -127,16 +127,16 @@ def places_of(location: str) -> list[BenchPlace]:
 
 def known_places() -> list[BenchPlace]:
     """Return the folders of every bench that this user has driven and whose folder is still there."""
-    found = []
+    places = []
     with contextlib.suppress(OSError, RuntimeError):
         for pointer in sorted((state_folder() / POINTERS).glob("*.json")):
             with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
                 folder = Path(json.loads(pointer.read_bytes())["folder"])
                 if folder.is_dir():
-                    found.append(BenchPlace(folder))
+                    places.append(BenchPlace(folder))
                 else:
                     pointer.unlink()  # the database was removed, and its benches' folders with it
-    return found
+    return places
 
 
 def state_folder() -> Path:

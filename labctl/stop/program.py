@@ -97,17 +97,17 @@ def stop_all(asked: Asked) -> list[StopResult]:
     stop = StopRequest.new(by, "command line", f"{asked.reason} ({by})")
     if document is not None and not places:
         return [_unknown(asked, document, stop)]
-    found: dict[int, StopResult] = {}
+    results: dict[int, StopResult] = {}
 
     def one(number: int, place: BenchPlace) -> None:
-        found[number] = _stop(place, stop)
+        results[number] = _stop(place, stop)
 
     threads = [threading.Thread(target=one, args=each, daemon=True) for each in enumerate(places)]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
-    return [found[number] for number in sorted(found)]
+    return [results[number] for number in sorted(results)]
 
 
 def _stop(place: BenchPlace, stop: StopRequest) -> StopResult:

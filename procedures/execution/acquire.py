@@ -134,15 +134,15 @@ def _note_angles(
     context: ExecutionContext, encoder: EncoderLog, spin: Spin, gate: tuple[float, float], number: int
 ) -> dict[str, float]:
     """Record what the table's encoder said, and warn once where the table does not turn as commanded."""
-    found = encoder.result(spin, gate[0], context.recorder.time)
-    if found is None:
+    angles = encoder.result(spin, gate[0], context.recorder.time)
+    if angles is None:
         return {}
-    context.recorder.journal.table_angles(number, found)
-    event = rate_event(context.bench.table, found)
+    context.recorder.journal.table_angles(number, angles)
+    event = rate_event(context.bench.table, angles)
     if event is not None and not context.warned_of_rate:
         context.warned_of_rate = True
         context.recorder.event(event)
-    return {"encoder_dps": found.rate_dps, "encoder_u_dps": found.rate_u_dps}
+    return {"encoder_dps": angles.rate_dps, "encoder_u_dps": angles.rate_u_dps}
 
 
 def _steady_s(context: ExecutionContext, step: Acquire) -> float:

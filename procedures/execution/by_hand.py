@@ -119,15 +119,15 @@ class TurnReadings:
     def _read(self) -> Round:
         """Read every unit once; the bench is polled when that is due."""
         context = self._context
-        gyros, found = list(context.bench.gyros.items()), {}
+        gyros, samples = list(context.bench.gyros.items()), {}
         for name, gyro in gyros:
-            found[name] = gyro.read(max(BLOCK_S / len(gyros), 1.5 / gyro.sample_rate_hz))
-            if len(found[name]):
-                context.monitor.add_readings(name, gyro, found[name])
+            samples[name] = gyro.read(max(BLOCK_S / len(gyros), 1.5 / gyro.sample_rate_hz))
+            if len(samples[name]):
+                context.monitor.add_readings(name, gyro, samples[name])
         if context.monitor.is_due(within_s=BLOCK_S):
             context.poll(read_latest=False)
         checkpoint(context)
-        return found
+        return samples
 
     def _keep(self, part: Part, *rounds: Round) -> None:
         """Take readings in as part of the attempt, and write them down."""
@@ -177,10 +177,10 @@ def turn(context: ExecutionContext, step: Turn) -> dict[str, float]:
         for attempt in range(1, rules.attempts + 1):
             shown = TurnProgress(step.position, step.turn_deg, "rest", attempt, refused=refused)
             context.recorder.tracker.update(turn=shown)
-            found = _attempt(context, step, rules, shown)
-            if not found.refused:
-                return {"attempts": float(attempt), **found.figures}
-            refused = found.refused
+            turned = _attempt(context, step, rules, shown)
+            if not turned.refused:
+                return {"attempts": float(attempt), **turned.figures}
+            refused = turned.refused
     finally:
         context.recorder.tracker.update(turn=None)
     raise StepFailed(

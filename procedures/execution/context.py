@@ -84,8 +84,8 @@ class ExecutionContext:
     def require_same_settings(self, gyro: str, reported: Mapping[str, str]) -> None:
         """Raise WrongInstrument where a unit is set otherwise than in the campaign so far, or than it is to be."""
         before = self._set.get(gyro) or self.full_bench.configurations.get(gyro, {})
-        if found := changed(before, reported):
-            said = ", ".join(f"{name} was {was} and is {now}" for name, (was, now) in found.items())
+        if changes := changed(before, reported):
+            said = ", ".join(f"{name} was {was} and is {now}" for name, (was, now) in changes.items())
             raise WrongInstrument(
                 gyro,
                 f"the unit is set otherwise than before: {said}. What was not saved in the unit is lost when it is "

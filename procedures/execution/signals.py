@@ -73,8 +73,8 @@ def shutdown_hook(hook: Callable[[], None]) -> Iterator[None]:
 
         return handle
 
-    found = {number: signal.getsignal(number) for number in ENDING}
-    with signal_handlers({number: before_the(handler) for number, handler in found.items() if callable(handler)}):
+    handlers = {number: signal.getsignal(number) for number in ENDING}
+    with signal_handlers({number: before_the(handler) for number, handler in handlers.items() if callable(handler)}):
         yield
 
 

@@ -142,16 +142,16 @@ def _time_u_s(run: CourseRun, covariance: Array) -> float:
     return math.sqrt(max(float(along @ covariance @ along), 0.0))
 
 
-def course_event(table: RateTable, found: TableAngles, course: MeasuredCourse, duration_s: float) -> Event | None:
+def course_event(table: RateTable, angles: TableAngles, course: MeasuredCourse, duration_s: float) -> Event | None:
     """Return a warning where the measured rate differs from the commanded one by more than a share of the largest."""
     at = course.began_s + np.linspace(RATE_OVER_S, duration_s, POINTS)
     measured, commanded = course.rates_dps(at, RATE_OVER_S)
     off_dps, limit_dps = float(np.abs(measured - commanded).max()), NEWS_SHARE * course.course.largest_dps
     if off_dps <= limit_dps:
         return None
-    used = "the encoder is the reference" if found.is_reference else "the commanded rate is the reference"
+    used = "the encoder is the reference" if angles.is_reference else "the commanded rate is the reference"
     text = (
         f"{table.name}: during a {course.course.text} its encoder measures up to {off_dps:.3g} deg/s more or less than "
-        f"was commanded (limit of this message {limit_dps:.3g} deg/s, u {found.rate_u_dps:.2g} deg/s); {used}"
+        f"was commanded (limit of this message {limit_dps:.3g} deg/s, u {angles.rate_u_dps:.2g} deg/s); {used}"
     )
     return Event("table_course", text, level="warning", device=table.name, value=off_dps, limit=limit_dps, unit="deg/s")

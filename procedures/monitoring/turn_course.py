@@ -36,7 +36,7 @@ def nominal_outputs(
     channels: tuple[Channel, ...], output: Mapping[str, Mapping[str, float | str]]
 ) -> dict[str, Nominal]:
     """Return axis -> nominal law of each gyro channel, by the unit's own statement where it makes one."""
-    found = {}
+    by_axis = {}
     for channel in channels:
         if not channel.name.startswith(PREFIX):
             continue
@@ -44,8 +44,8 @@ def nominal_outputs(
         said = output.get(axis, {})
         usual = RATE_UNITS.get(str(said.get("unit", channel.unit)), 1.0)
         unit, scale = str(said.get("unit", channel.unit)), float(said.get("scale", usual))
-        found[axis] = Nominal(channel, float(said.get("offset", 0.0)), scale, unit in RATE_UNITS or "scale" in said)
-    return found
+        by_axis[axis] = Nominal(channel, float(said.get("offset", 0.0)), scale, unit in RATE_UNITS or "scale" in said)
+    return by_axis
 
 
 @dataclass

@@ -104,15 +104,15 @@ def _turned(recipe: Recipe, position: str, visited: tuple[float, ...]) -> list[M
         tables.append((rules, [*of_unit, *(replace(straight, fixture_deg=angle) for angle in rules.fixture_deg)]))
     if recipe.inverted is not None:
         tables.append((recipe.inverted, [straight.upside_down]))
-    found = []
+    blocks = []
     for table, positions in tables:
         wanted = table.temperatures_c
         if recipe.order == "temperature-major":
             wanted = tuple(each for each in wanted if each in visited)
         levels = tuple(Level(each, table.rates_dps) for each in wanted)
         hold_s = table.hold_s if isinstance(table, Indexing) else None
-        found += [MountingBlock(str(each), levels, same_session=True, hold_s=hold_s) for each in positions if levels]
-    return found
+        blocks += [MountingBlock(str(each), levels, same_session=True, hold_s=hold_s) for each in positions if levels]
+    return blocks
 
 
 def _merged(blocks: list[MountingBlock]) -> list[MountingBlock]:

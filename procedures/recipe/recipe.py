@@ -142,9 +142,9 @@ def parse_recipe(text: str, *, where: str = "recipe") -> Recipe:
 
 def _complaints(error: ValidationError) -> str:
     """Return everything that is wrong in one line; a list that is empty only because of its items is not said twice."""
-    found: list[dict[str, Any]] = [dict(each) for each in error.errors()]
-    blamed = [each["loc"][:-1] for each in found]
-    return listed(_complaint(each) for each in found if not (each["type"] == "too_short" and each["loc"] in blamed))
+    details: list[dict[str, Any]] = [dict(each) for each in error.errors()]
+    blamed = [each["loc"][:-1] for each in details]
+    return listed(_complaint(each) for each in details if not (each["type"] == "too_short" and each["loc"] in blamed))
 
 
 def _complaint(error: dict[str, Any]) -> str:

@@ -105,8 +105,8 @@ class Acutrol3000:
             ramp_s = self._ramp_s(demand_dps)
             sleep_until(self._clock, self._clock.now_s() + ramp_s)
             self._await_rate(demand_dps, self._clock.now_s() + self._tolerated_s(ramp_s))
-        found = self.read_angle()
-        return Spin(rate_dps, demand_dps, found.t_s, self._clock.now_s() + steady_s + SPARE_S, found.angle_deg)
+        angle_deg = self.read_angle()
+        return Spin(rate_dps, demand_dps, angle_deg.t_s, self._clock.now_s() + steady_s + SPARE_S, angle_deg.angle_deg)
 
     def settle(self, spin: Spin) -> None:
         """Control the end of a run: stop the table, and return when it is at rest.
@@ -229,11 +229,11 @@ class Acutrol3000:
         self._link.ask(acl.limit_rate(acl.POSITION, self._axis, self._home_dps))
         self._link.ask(acl.limit_rate(acl.RATE, self._axis, self.settings.max_rate_dps))
         for name, wanted in (("Rate", self.settings.max_rate_dps), ("Acceleration", acceleration)):
-            (found,) = self._numbers(f":Limit:{name}? {acl.RATE},{self._axis}", 1)
-            if not math.isclose(found, wanted, rel_tol=1e-4):
+            (limit,) = self._numbers(f":Limit:{name}? {acl.RATE},{self._axis}", 1)
+            if not math.isclose(limit, wanted, rel_tol=1e-4):
                 raise RequestRejected(
                     self.name,
-                    f"limits the {name.lower()} to {found:g}, but labctl set {wanted:g}; query :Limit:Absolute? "
+                    f"limits the {name.lower()} to {limit:g}, but labctl set {wanted:g}; query :Limit:Absolute? "
                     "of the controller, then correct max_rate_dps and acceleration_dps2 in the bench file",
                 )
 

@@ -82,13 +82,13 @@ class LabJackGyro:
         self._stream.open()
         self._readings.start(self._clock.now_s())
         self._registers.put(lj.ENABLE, 1)
-        found = self._registers.get(lj.SCAN_RATE)
-        if abs(found / self.scans_per_s - 1.0) > RATE_TOLERANCE:
+        scan_rate_hz = self._registers.get(lj.SCAN_RATE)
+        if abs(scan_rate_hz / self.scans_per_s - 1.0) > RATE_TOLERANCE:
             self.stop()
             raise WrongInstrument(
                 self.name,
-                f"scans {found:g} times per second, but the bench file states {self.scans_per_s:g}; set "
-                f"sample_rate_hz = {found:g}",
+                f"scans {scan_rate_hz:g} times per second, but the bench file states {self.scans_per_s:g}; set "
+                f"sample_rate_hz = {scan_rate_hz:g}",
             )
         self._discard()
         self._last_s = self._clock.now_s()
@@ -143,25 +143,25 @@ class LabJackGyro:
         if product == lj.T4:
             return lj.t4_scaling(constants, number)
         try:
-            found = lj.t7_scaling(constants, lj.gain_index(self.settings.options.range_v))
+            scaling = lj.t7_scaling(constants, lj.gain_index(self.settings.options.range_v))
         except ValueError as error:
             raise LimitError(self.name, f"{error}; correct options.range_v in the bench file") from error
-        if found.kink > lj.LARGEST_KINK:
+        if scaling.kink > lj.LARGEST_KINK:
             raise WrongInstrument(
                 self.name,
-                f"the slopes of its input below and above mid-range differ by {1e6 * found.kink:.0f} ppm, limit "
+                f"the slopes of its input below and above mid-range differ by {1e6 * scaling.kink:.0f} ppm, limit "
                 f"{1e6 * lj.LARGEST_KINK:.0f} ppm; check the calibration of the device",
             )
-        return found
+        return scaling
 
     def _constants(self) -> list[float]:
         """Return the calibration constants from the device's flash."""
-        found: list[float] = []
+        constants: list[float] = []
         for frame in range(2):
             self._registers.put(lj.FLASH_POINTER, lj.CONSTANTS_AT + 4 * lj.FRAME * frame)
             words = self._registers.words(lj.FLASH, 2 * lj.FRAME)
-            found += struct.unpack(f">{lj.FRAME}f", struct.pack(f">{len(words)}H", *words))
-        return found
+            constants += struct.unpack(f">{lj.FRAME}f", struct.pack(f">{len(words)}H", *words))
+        return constants
 
     def _configure(self) -> None:
         """End a stream that runs, and set up inputs and stream."""

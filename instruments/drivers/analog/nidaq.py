@@ -84,10 +84,10 @@ class NidaqmxTask:
         if self._task is None:
             raise LinkError(self.name, f"the scans of {self._settings.address} were not started; start them first")
         try:
-            found = self._task.read(number_of_samples_per_channel=-1, timeout=0.0)
+            samples = self._task.read(number_of_samples_per_channel=-1, timeout=0.0)
         except Exception as error:
             raise self._failed("read the scans", error) from error
-        return np.asarray(found, dtype=np.float64).reshape(len(self._settings.options.all_inputs), -1)
+        return np.asarray(samples, dtype=np.float64).reshape(len(self._settings.options.all_inputs), -1)
 
     def close(self) -> None:
         """End the scans; safe to call twice. Raises LinkError."""
@@ -239,13 +239,13 @@ class NidaqGyro:
         if self._task.is_open:
             self._discard()
             return
-        found, wanted = self._task.open(), self.settings.scans_per_s
-        if abs(found / wanted - 1.0) > RATE_TOLERANCE:
+        scan_rate_hz, wanted = self._task.open(), self.settings.scans_per_s
+        if abs(scan_rate_hz / wanted - 1.0) > RATE_TOLERANCE:
             self.stop()
             raise WrongInstrument(
                 self.name,
-                f"scans {found:g} times per second, but the bench file states {wanted:g}; set "
-                f"sample_rate_hz = {found:g}",
+                f"scans {scan_rate_hz:g} times per second, but the bench file states {wanted:g}; set "
+                f"sample_rate_hz = {scan_rate_hz:g}",
             )
         self._taken = 0
         self._last_s = self._clock.now_s()

@@ -47,11 +47,11 @@ class TextChamber(SetpointChamber):
 
         Raises as `set_temperature_c` does.
         """
-        found = super().make_safe()
+        setpoint_c = super().make_safe()
         if self._ends_off:
             self._switch_off()
             self._has_controlled = False  # that the chamber is off is no fault from now on
-        return found
+        return setpoint_c
 
     @abstractmethod
     def _switch_off(self) -> None:
@@ -92,13 +92,13 @@ class LineChamber(TextChamber):
             return super().set_temperature_c(temperature_c)
         self._checked(temperature_c)
         self._unlock(lock)  # a protected controller may refuse a set point
-        found = super().set_temperature_c(temperature_c)
+        setpoint_c = super().set_temperature_c(temperature_c)
         self._command(lock.lock, "lock its panel")
         if not lock.is_locked(self._ask(lock.question)):
             raise RequestRejected(
                 self.name, "the panel is not locked after the command; leave lock_panel out of the bench file"
             )
-        return found
+        return setpoint_c
 
     def make_safe(self) -> float:
         """Control the panel, which is unlocked first, and the chamber to its safe state; returns the value read back.
@@ -111,10 +111,10 @@ class LineChamber(TextChamber):
                 self._unlock(self._panel_lock)
             except InstrumentError as error:
                 failure = error
-        found = super().make_safe()
+        setpoint_c = super().make_safe()
         if failure is not None:
             raise failure
-        return found
+        return setpoint_c
 
     def _unlock(self, lock: PanelLock) -> None:
         if lock.is_locked(self._ask(lock.question)):

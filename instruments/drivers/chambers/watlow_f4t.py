@@ -129,9 +129,11 @@ class WatlowF4T(Watlow):
 
     def _read_alarms(self) -> tuple[str, ...]:
         alarms = f4t.alarms_of(self._part_number())
-        found = [f"alarm {number}" for number in range(1, alarms + 1) if not self._is_quiet(number)]
-        found += [f"limit module {number}" for number in self._present_limit_modules() if self._has_tripped(number)]
-        return tuple(found)
+        active_alarms = [f"alarm {number}" for number in range(1, alarms + 1) if not self._is_quiet(number)]
+        active_alarms += [
+            f"limit module {number}" for number in self._present_limit_modules() if self._has_tripped(number)
+        ]
+        return tuple(active_alarms)
 
     def _is_quiet(self, number: int) -> bool:
         return self._registers.get_int(f4t.ALARM.nth(number, f4t.ALARM_STRIDE)) in f4t.ALARM_QUIET

@@ -42,14 +42,14 @@ class Dialogue:
     def identity(self, ask: AskText) -> str:
         """Return what the instrument says it is; raises WrongInstrument for a reply that does not fit."""
         said = self.link.ask(self.request(ask.send), r".*\S.*", "say what it is")[0]
-        found = re.fullmatch(ask.pattern, said)
-        if found is None:
+        match = re.fullmatch(ask.pattern, said)
+        if match is None:
             raise WrongInstrument(
                 self.link.device,
                 f"{self.link.url} answered {said[:SHOWN]!r} to {self.request(ask.send)!r}, which does not fit the "
                 f"pattern {ask.pattern!r} of its description; check the address, or correct [identity]",
             )
-        return found["text"].strip()
+        return match["text"].strip()
 
     def text(self, ask: Ask, what: str) -> str:
         """Return a text."""
@@ -69,11 +69,11 @@ class Dialogue:
     def holds(self, ask: AskState, what: str) -> bool:
         """Return whether a state holds; raises MalformedReply where the answer is neither yes nor no."""
         said = self._answer(ask, what).strip()
-        found = ask.holds(said)
-        if found is None:
+        is_held = ask.holds(said)
+        if is_held is None:
             rule = f"yes = {ask.yes!r} or no = {ask.no!r}" if ask.yes is not None else "a number as its rule needs"
             raise self._malformed(said, what, rule)
-        return found
+        return is_held
 
     def alarms(self, ask: AskAlarms) -> tuple[str, ...]:
         """Return the active alarms."""
@@ -113,8 +113,8 @@ class Dialogue:
         return filled(template, {**self._names, **values})
 
     def _answer(self, ask: Ask, what: str) -> str:
-        found = self.link.ask(self.request(ask.send), ask.pattern, what)
-        return str(next(value for value in found.groupdict().values() if value is not None))
+        match = self.link.ask(self.request(ask.send), ask.pattern, what)
+        return str(next(value for value in match.groupdict().values() if value is not None))
 
     def _check(self, request: str, what: str) -> None:
         """Raise RequestRejected where the instrument says that a command was an error."""

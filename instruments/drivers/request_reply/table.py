@@ -110,8 +110,8 @@ class DescribedTable:
             except InstrumentError:
                 self.stop()
                 raise
-        found = self.read_angle()
-        return Spin(rate_dps, demand_dps, found.t_s, self._clock.now_s() + steady_s + SPARE_S, found.angle_deg)
+        angle_deg = self.read_angle()
+        return Spin(rate_dps, demand_dps, angle_deg.t_s, self._clock.now_s() + steady_s + SPARE_S, angle_deg.angle_deg)
 
     def settle(self, spin: Spin) -> None:
         """Control the end of a run: stop the table, and return when it is at rest.
@@ -228,8 +228,8 @@ class DescribedTable:
         """Return the rate, deg/s, by the controller or by two positions, and the share by which it may be off."""
         described = self._described
         if described.rate is not None:
-            found = described.turning.read(self.dialogue.number(described.rate, "read its rate"))
-            return self.settings.direction * found, described.rate_within
+            rate_dps = described.turning.read(self.dialogue.number(described.rate, "read its rate"))
+            return self.settings.direction * rate_dps, described.rate_within
         first = self.read_angle()
         self._clock.sleep(min(MEASURED_OVER_S, MEASURED_OVER_DEG / abs(demand_dps)))
         last = self.read_angle()

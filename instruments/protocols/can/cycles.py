@@ -87,8 +87,8 @@ class CycleDecoder:
             self._damaged += not self._layout.database.is_multiplexed(frame.id)
             return None
         self.seen.add(frame.id)
-        found = {name: raw[each.name] for name, each in self._layout.parts[frame.id] if each.name in raw}
-        numbers = {name: self._whole(value) for name, value in found.items()}
+        raw_values = {name: raw[each.name] for name, each in self._layout.parts[frame.id] if each.name in raw}
+        numbers = {name: self._whole(value) for name, value in raw_values.items()}
         self._held |= {name: numbers.pop(name) for name in self._layout.held & set(numbers)}
         if not numbers or not self._continues(frame.id, raw, numbers):
             return None

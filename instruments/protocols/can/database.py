@@ -79,10 +79,10 @@ class CanDatabase:
         from cantools.database import DecodeError
 
         try:
-            found = self._by_id[frame_id].decode_simple(data, decode_choices=False, scaling=False)
+            signals = self._by_id[frame_id].decode_simple(data, decode_choices=False, scaling=False)
         except DecodeError:
             return None
-        return {name: value for name, value in found.items() if isinstance(value, int | float)}
+        return {name: value for name, value in signals.items() if isinstance(value, int | float)}
 
 
 def frame_id_of(message: Message) -> int:
@@ -120,9 +120,9 @@ def _parsed(text: str) -> Database:
             "a DBC file is read by cantools, which is not installed; run `pip install labctl[can]`"
         ) from None
     try:
-        found = database.load_string(text, database_format="dbc")
+        parsed = database.load_string(text, database_format="dbc")
     except (Error, ValueError, KeyError) as error:
         raise ValueError(f"the DBC text cannot be read ({one_line(error)}); correct the file") from None
-    if isinstance(found, database.can.Database):
-        return found
+    if isinstance(parsed, database.can.Database):
+        return parsed
     raise ValueError("the DBC text describes no CAN messages; give the DBC file of the unit")

@@ -97,7 +97,9 @@ def _require_channels(
 def _scale(name: str, signal: CanSignal, stated: str | None) -> Scale:
     text = signal.unit if stated is None else stated
     unit, wanted = unit_of_text(text), unit_of_channel(name)
-    fitting = [each for each, found in UNITS.items() if wanted in (None, found.unit) and not found.is_per_sample]
+    fitting = [
+        each for each, unit_scale in UNITS.items() if wanted in (None, unit_scale.unit) and not unit_scale.is_per_sample
+    ]
     if unit is None or unit not in fitting:
         whose = f"signal {signal.path} has the unit {text!r}" if stated is None else f"units gives {text!r}"
         raise ValueError(

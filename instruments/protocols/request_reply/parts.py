@@ -21,11 +21,11 @@ Title = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, ma
 def require_pattern(pattern: str, *groups: str) -> str:
     """Return a regular expression that has the groups; raises ValueError."""
     try:
-        found = re.compile(pattern).groupindex
+        named_groups = re.compile(pattern).groupindex
     except re.error as error:
         raise ValueError(f"pattern {pattern!r} is not a regular expression ({error}); correct it") from None
     for group in groups:
-        if group not in found:
+        if group not in named_groups:
             raise ValueError(f"pattern {pattern!r} has no group (?P<{group}>...); put it around the {group}")
     return pattern
 

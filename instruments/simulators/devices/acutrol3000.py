@@ -265,12 +265,12 @@ class SimulatedAcutrol3000(TimedReplies):
         return acl.number(self._sign * self.motion.rate_dps(t_s) + RATE_NOISE_DPS * self._rng.standard_normal())
 
     def _register(self, command: Command, t_s: float) -> str:
-        found = re.fullmatch(rf"a{self._number}(dyn|intlk|swflt|state)", command.arguments[0].lower())
-        if found is None:
+        match = re.fullmatch(rf"a{self._number}(dyn|intlk|swflt|state)", command.arguments[0].lower())
+        if match is None:
             raise Refused(OUT_OF_RANGE)
         done = t_s >= self.axis.done_s
         values = {
             "dyn": done << (acl.POSITION_COMPLETE if self.axis.mode == acl.POSITION else acl.RATE_COMPLETE),
             "intlk": self.axis.hardware, "swflt": self.axis.software, "state": (self.axis.interlock == acl.CLOSED) << 4,
         }  # fmt: skip
-        return str(values[found[1]])
+        return str(values[match[1]])

@@ -149,10 +149,10 @@ class SimulatedT7Stream:
         self.stream.sent = max(newest, self.stream.sent)
         if newest <= first:
             return b""
-        found = self._packets(first, newest)
+        packets = self._packets(first, newest)
         if (gap := self._faults.trigger(["counter_gap"], t_s)) is not None:
-            found = found[gap.value :]
-        return b"".join(found)
+            packets = packets[gap.value :]
+        return b"".join(packets)
 
     def skip(self, t_s: float) -> None:
         """Lose the packets up to `t_s`."""
@@ -173,14 +173,14 @@ class SimulatedT7Stream:
         assert s.started_s is not None
         index = np.arange(first * s.per_packet, end * s.per_packet) + s.skipped + 1
         codes = self._codes(s.started_s + index / s.rate_hz).reshape(end - first, s.per_packet, -1)
-        found = []
+        packets = []
         for number, scans in zip(range(first, end), codes, strict=True):
             status, info, self.status = self.status, 0, 0
             if self._recovered:
                 status, info, self._recovered = stream.RECOVERED, self._recovered, 0
                 scans[0] = stream.DUMMY
-            found.append(stream.build(stream.Packet(number, 0, status, info, scans.ravel())))
-        return found
+            packets.append(stream.build(stream.Packet(number, 0, status, info, scans.ravel())))
+        return packets
 
     def _codes(self, t_s: NDArray[np.float64]) -> NDArray[np.int64]:
         options, sample = self.stream.settings.options, self.stream.unit.sample(t_s)

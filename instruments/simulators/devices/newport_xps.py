@@ -139,9 +139,9 @@ class SimulatedXps(TimedReplies):
     def receive(self, data: bytes, t_s: float) -> None:
         """Take bytes; a function is run once its bracket closes."""
         self._data = self._data[-LONGEST:] + data
-        while (found := CALL.match(self._data)) is not None:
-            self._data = self._data[found.end() :]
-            self._run(found[1].decode(), [each.strip() for each in found[2].decode("latin-1").split(",")], t_s)
+        while (call := CALL.match(self._data)) is not None:
+            self._data = self._data[call.end() :]
+            self._run(call[1].decode(), [each.strip() for each in call[2].decode("latin-1").split(",")], t_s)
 
     def end_waiting(self, t_s: float) -> None:
         """End the function that is under way: it answers that it was aborted."""

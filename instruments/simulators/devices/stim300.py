@@ -84,12 +84,12 @@ def _serial_of(gyro: GyroSettings) -> str:
 
 def _constant_part(layout: Layout) -> Bytes:
     """Return a datagram, (stride,), with what is the same in each: identifier, latency and line end; the rest is 0."""
-    found = np.zeros(layout.stride, dtype=np.uint8)
-    found[0] = layout.id
-    found[layout.counter + 1 : layout.counter + 3] = np.array([LATENCY_US], dtype=">u2").view(np.uint8)
+    frame = np.zeros(layout.stride, dtype=np.uint8)
+    frame[0] = layout.id
+    frame[layout.counter + 1 : layout.counter + 3] = np.array([LATENCY_US], dtype=">u2").view(np.uint8)
     if layout.crlf:
-        found[layout.length :] = (0x0D, 0x0A)
-    return found
+        frame[layout.length :] = (0x0D, 0x0A)
+    return frame
 
 
 class SimulatedStim300:
@@ -200,9 +200,9 @@ class SimulatedStim300:
         """Return values of the unit's axes, (n, axes), as those of x, y and z, (n, 3), with 0 for one that it lacks."""
         if self._columns == [0, 1, 2]:
             return values
-        found = np.zeros((len(values), 3))
-        found[:, self._columns] = values
-        return found
+        by_axis = np.zeros((len(values), 3))
+        by_axis[:, self._columns] = values
+        return by_axis
 
     def _encode(self, index: NDArray[np.int64], t_s: float) -> Bytes:
         layout, n = self._layout, len(index)

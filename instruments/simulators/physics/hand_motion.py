@@ -108,13 +108,13 @@ class HandMotion:
         return np.asarray(below + self._by_hand(t_s))
 
     def _by_hand(self, t_s: Array) -> Array:
-        found = np.zeros(len(t_s))
+        rates = np.zeros(len(t_s))
         if not len(t_s):
-            return found
+            return rates
         first_s, last_s = float(np.min(t_s)), float(np.max(t_s))
         for swing in self._swings:
             if swing.end_s <= first_s:
-                found += swing.angle_deg
+                rates += swing.angle_deg
             elif swing.start_s < last_s:
-                found += swing.at(t_s)
-        return found
+                rates += swing.at(t_s)
+        return rates

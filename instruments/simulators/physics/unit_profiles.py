@@ -55,8 +55,8 @@ def _matrices(matrix: Array, diagonal: Array, rows: list[int]) -> Array:
     flat = np.empty((len(diagonal), 9))
     flat[:] = matrix.ravel()
     flat[:, ::4] += diagonal
-    found = flat.reshape(-1, 3, 3)
-    return found if rows == [0, 1, 2] else found[:, rows]
+    matrices = flat.reshape(-1, 3, 3)
+    return matrices if rows == [0, 1, 2] else matrices[:, rows]
 
 
 def mems_triaxial(axes: tuple[str, ...], rng: np.random.Generator) -> UnitTruth:

@@ -97,8 +97,8 @@ class WireRecord:
 
     def _first(self) -> dict[str, object]:
         header = next(self._documents, {})
-        if (found := header.get("format")) != FORMAT:
-            raise self._error(f"its format is {found!r}; this release reads {FORMAT!r}")
+        if (named_format := header.get("format")) != FORMAT:
+            raise self._error(f"its format is {named_format!r}; this release reads {FORMAT!r}")
         return header
 
     def _read(self) -> Iterator[dict[str, object]]:

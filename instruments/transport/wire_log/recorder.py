@@ -74,9 +74,9 @@ class RecordedPort:
             data = noted(self._note, "received", lambda: self.raw.read(missing))
             self._note("received", data, **({} if len(data) == missing else {"timed_out": True}))
             self._kept += data
-        found = bytes(self._kept[:size])
+        chunk = bytes(self._kept[:size])
         del self._kept[:size]
-        return found
+        return chunk
 
     def write(self, data: bytes, /) -> int | None:
         """Send bytes."""
@@ -110,11 +110,11 @@ class RecordedReader:
 
     def take(self) -> Received:
         """Return everything that has come since the last call."""
-        found: Received = noted(self._note, "arrived", self._reader.take)
+        received: Received = noted(self._note, "arrived", self._reader.take)
         arrived: Kind = "arrived"
-        known = {"now_s": found.now_s, "newest_s": found.newest_s, "width_s": found.width_s}
-        self._note(arrived, found.data, **{key: value for key, value in known.items() if value is not None})
-        return found
+        known = {"now_s": received.now_s, "newest_s": received.newest_s, "width_s": received.width_s}
+        self._note(arrived, received.data, **{key: value for key, value in known.items() if value is not None})
+        return received
 
     def discard(self) -> None:
         """Drop everything that was not taken yet."""

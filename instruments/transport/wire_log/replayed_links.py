@@ -107,9 +107,9 @@ class ReplayedPort:
                 break
             if self._take(event).more.get("timed_out") and len(self._unread) < size:
                 break
-        found = bytes(self._unread[:size])
+        data = bytes(self._unread[:size])
         del self._unread[:size]
-        return found
+        return data
 
     def write(self, data: bytes, /) -> int:
         """Send bytes; raises ReplayOver where the session sent others."""
@@ -152,8 +152,8 @@ class ReplayedReader:
         """Return what the next reading of the session returned, and what came since where that is past."""
         replay, data, event = self._replay, b"", None
         replay.refuse_over(self._port)
-        while (found := replay.record.next(self._port)) is not None and _arrives(found):
-            if event is not None and found.t_s > replay.clock.now_s():
+        while (next_event := replay.record.next(self._port)) is not None and _arrives(next_event):
+            if event is not None and next_event.t_s > replay.clock.now_s():
                 break
             event = replay.take(self._port)
             if event.kind == "failed":

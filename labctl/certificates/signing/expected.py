@@ -43,8 +43,8 @@ def _is(signer: Signatory, expected: str) -> bool:
 
 def _wanted(expected: str) -> Attributes:
     try:
-        if found := _attributes(expected):
-            return found
+        if attributes := _attributes(expected):
+            return attributes
         why = "it is empty"
     except ValueError as error:
         why = str(error)

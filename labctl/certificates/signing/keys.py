@@ -175,8 +175,8 @@ def _of_token(uri: TokenUri, settings: SigningSettings) -> SigningKey:
     try:
         session = open_session(uri)
         key = session.get_key(object_class=ObjectClass.PRIVATE_KEY, label=uri.object)
-        found = session.get_objects({Attribute.CLASS: ObjectClass.CERTIFICATE, Attribute.LABEL: uri.object})
-        kept = [x509.load_der_x509_certificate(each[Attribute.VALUE]) for each in found]
+        certificates = session.get_objects({Attribute.CLASS: ObjectClass.CERTIFICATE, Attribute.LABEL: uri.object})
+        kept = [x509.load_der_x509_certificate(each[Attribute.VALUE]) for each in certificates]
     except (PKCS11Error, RuntimeError, KeyError, OSError, ValueError) as error:
         said = " ".join(str(error).split()) or type(error).__name__
         raise BadInput(f"{where}: {said}; check token, object, module and PIN") from error

@@ -55,15 +55,15 @@ def ports(as_json: Json = False, database: Database = None) -> None:  # noqa: AR
     """List the serial ports of this computer: name for a bench file, USB adapter, and what prevents its use."""
     from labctl.services.benches.ports import list_ports
 
-    found = list_ports()
+    port_listing = list_ports()
     if as_json:
-        print_json(found)
+        print_json(port_listing)
         return
-    for port in found:
+    for port in port_listing:
         adapter = f"USB adapter {port.adapter or 'without a serial number'} ({port.product})" if port.product else ""
         said = [f"now {port.device}" if port.device != port.path else "", adapter, port.trouble]
         console.print(f"{port.path}  {'; '.join(filter(None, said))}", soft_wrap=True)
-    if not found:
+    if not port_listing:
         console.print("this computer has no serial port: plug in the USB adapters")
 
 

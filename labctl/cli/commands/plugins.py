@@ -30,18 +30,18 @@ def plugins(as_json: Json = False, database: Database = None) -> None:  # noqa: 
     from labctl.services.plugins import list_plugins
 
     with one_clear_line():
-        found = list_plugins()
+        listing = list_plugins()
     if as_json:
-        print_json(found)
+        print_json(listing)
     else:
         rows = table("plug-ins", "group", "name", "package", "state")
-        for each in found:
+        for each in listing:
             state = "cannot be used" if each.problem else "ready"
             rows.add_row(each.group, each.name, f"{each.distribution} {each.version}", state)
         console.print(rows)
-        for line in dict.fromkeys(each.problem for each in found if each.problem):
+        for line in dict.fromkeys(each.problem for each in listing if each.problem):
             stderr.print(line, soft_wrap=True)
-    if any(each.problem for each in found):
+    if any(each.problem for each in listing):
         raise typer.Exit(1)
 
 

@@ -32,15 +32,15 @@ def units(
     with one_clear_line():
         within = None if due_within is None else span(due_within)
         with open_readonly(database) as store:
-            found = list_units(store, SystemClock().utc(), within)
+            listing = list_units(store, SystemClock().utc(), within)
     if as_json:
-        print_json(found)
+        print_json(listing)
         return
-    if not found:
+    if not listing:
         console.print("no unit is due" if due_within else "no unit has been measured or imported yet")
         return
     rows = table("", "unit", "model", "in force", "due", "")
-    for each in found:
+    for each in listing:
         version = "none" if each.certified_version is None else f"version {each.certified_version}"
         due = "–" if each.due is None else f"{each.due:%Y-%m-%d}"
         rows.add_row(each.serial, each.model or "–", version, due, Text("overdue" if each.overdue else "", "bold red"))

@@ -26,8 +26,14 @@ def print_verification(answer: VerificationResponse) -> None:
 
     console.print(verification_sentence(answer), soft_wrap=not console.is_terminal)
     rows = table("", "axis", "RMS deg/s", "expected", "limit", "largest", "mean", numbers=5)
-    for axis, found in answer.axes.items():
-        figures = (found.rms_dps, found.expected_dps, found.limit_dps, found.max_dps, found.bias_dps)
+    for axis, axis_answer in answer.axes.items():
+        figures = (
+            axis_answer.rms_dps,
+            axis_answer.expected_dps,
+            axis_answer.limit_dps,
+            axis_answer.max_dps,
+            axis_answer.bias_dps,
+        )
         rows.add_row(axis, *map(format_number, figures))
     console.print(rows)
     off = f" on axis {', '.join(answer.axes_off)}" if answer.axes_off and len(answer.axes) > 1 else ""

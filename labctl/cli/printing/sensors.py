@@ -48,15 +48,15 @@ def _print_accelerometer(answer: AccelerometerResponse) -> None:
         ("scale factor", "1", answer.scale_factor),
         ("misalignment", "1", answer.misalignment),
     ):
-        for place, found in values.items():
-            rows.add_row(f"{name} {place}", unit, format_number(found.value, 5), format_number(found.u, 2))
+        for place, value in values.items():
+            rows.add_row(f"{name} {place}", unit, format_number(value.value, 5), format_number(value.u, 2))
     if answer.temperature is not None:
         for name, unit, terms in (("bias", "g", answer.temperature.bias_g),
                                   ("scale factor", "1", answer.temperature.scale_factor)):  # fmt: skip
             for axis, found_terms in terms.items():
-                for power, found in enumerate(found_terms, start=1):
+                for power, value in enumerate(found_terms, start=1):
                     per = f"{unit}/K" + (f"^{power}" if power > 1 else "")
-                    rows.add_row(f"{name} {axis}", per, format_number(found.value, 3), format_number(found.u, 2))
+                    rows.add_row(f"{name} {axis}", per, format_number(value.value, 3), format_number(value.u, 2))
     console.print(rows)
     _print_verdict(answer)
     density = max(answer.noise_density_m_s2.values())
@@ -69,10 +69,10 @@ def _print_accelerometer(answer: AccelerometerResponse) -> None:
 
 def _print_magnetometer(answer: MagnetometerResponse) -> None:
     rows = table("magnetometer", "coefficient", "unit", "value", "u", numbers=2)
-    for axis, found in answer.hard_iron_ut.items():
-        rows.add_row(f"hard iron {axis}", "uT", format_number(found.value), format_number(found.u, 2))
-    for place, found in answer.soft_iron.items():
-        rows.add_row(f"soft iron {place}", "1", format_number(found.value, 5), format_number(found.u, 2))
+    for axis, value in answer.hard_iron_ut.items():
+        rows.add_row(f"hard iron {axis}", "uT", format_number(value.value), format_number(value.u, 2))
+    for place, value in answer.soft_iron.items():
+        rows.add_row(f"soft iron {place}", "1", format_number(value.value, 5), format_number(value.u, 2))
     rows.add_row("field", "uT", format_number(answer.field_ut.value), format_number(answer.field_ut.u, 2))
     console.print(rows)
     _print_verdict(answer)

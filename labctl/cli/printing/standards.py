@@ -42,12 +42,12 @@ def print_standard(answer: StandardResponse) -> None:
                     format_number(point.nominal), format_number(point.value), format_number(point.u, 3),
                 )  # fmt: skip
         console.print(rows)
-    for found in answer.predictions:
-        where = "" if found.nominal is None else f" at {found.nominal:g}"
-        drift = _drift(found) if found.per_year is None else f"drift per year {_drift(found)}"
-        value = "not stated" if found.value is None else f"{found.value:.4g}"
+    for prediction in answer.predictions:
+        where = "" if prediction.nominal is None else f" at {prediction.nominal:g}"
+        drift = _drift(prediction) if prediction.per_year is None else f"drift per year {_drift(prediction)}"
+        value = "not stated" if prediction.value is None else f"{prediction.value:.4g}"
         console.print(
-            f"on {found.on}{where}: error {value}, u = {found.u:.3g} {answer.unit}; {drift}",
+            f"on {prediction.on}{where}: error {value}, u = {prediction.u:.3g} {answer.unit}; {drift}",
             markup=False,
             soft_wrap=True,
         )
@@ -67,10 +67,10 @@ def print_standard(answer: StandardResponse) -> None:
     _print_text(answer.text)
 
 
-def _drift(found: DriftPrediction) -> str:
-    if found.per_year is None or found.u_per_year is None:
-        return found.why or "unknown"
-    return f"{found.per_year:.3g} (u {found.u_per_year:.2g})"
+def _drift(prediction: DriftPrediction) -> str:
+    if prediction.per_year is None or prediction.u_per_year is None:
+        return prediction.why or "unknown"
+    return f"{prediction.per_year:.3g} (u {prediction.u_per_year:.2g})"
 
 
 def _limits(limits: Sequence[ChartLimits]) -> str:

@@ -115,9 +115,9 @@ def largest_difference(part: StaticPart, fixed: FixedPoint) -> float:
         raw = np.zeros((len(outputs) * len(warm), axes))
         raw[:, by] = np.repeat(outputs, len(warm))
         apart[:, by] = np.abs(_apart(part, fixed, raw, np.tile(warm, len(outputs)))).max(axis=0)
-    found = float((apart.sum(axis=1) + at_zero * (axes > 1)).max())
-    found = max(found, float(np.abs(_apart(part, fixed, *all_turning(part))).max()))
-    return found + fixed.rounding_dps()
+    largest = float((apart.sum(axis=1) + at_zero * (axes > 1)).max())
+    largest = max(largest, float(np.abs(_apart(part, fixed, *all_turning(part))).max()))
+    return largest + fixed.rounding_dps()
 
 
 def _apart(part: StaticPart, fixed: FixedPoint, raw: Array, warm: Array) -> Array:

@@ -87,8 +87,8 @@ class FixedForce:
         beyond = np.any(held != force_q16, axis=1) | np.any(left != rate - error, axis=1)
         if outside is not None:
             return left, outside | beyond
-        found, outside = self.fixed.corrected(left, temperature_q16)
-        return found, outside | beyond
+        turning_q31, outside = self.fixed.corrected(left, temperature_q16)
+        return turning_q31, outside | beyond
 
     def rounding_dps(self) -> float:
         """Return what rounding can add, deg/s, at forces up to `MOST_G`: of forces, squares, coefficients and sums.

@@ -57,7 +57,7 @@ class FixedPoint:
         position = (above * self.reciprocal) >> RECIPROCAL_BITS
         node = np.minimum(position >> POSITION_BITS, self.tables.shape[-1] - 2)
         part = position - (node << POSITION_BITS)
-        found = np.empty_like(raw_q31)
+        rate_q31 = np.empty_like(raw_q31)
         for axis in range(raw_q31.shape[1]):
             error = np.zeros(len(raw_q31), dtype=np.int64)
             for by in range(raw_q31.shape[1]):
@@ -67,13 +67,13 @@ class FixedPoint:
                     total += row[node] + product(row[node + 1] - row[node], part, POSITION_BITS)
                 error += total
             scaled = error if self.shift == 0 else (error + (1 << (self.shift - 1))) >> self.shift
-            found[:, axis] = np.clip(raw_q31[:, axis] - scaled, -MOST_Q31 - 1, MOST_Q31)
-        return found, outside
+            rate_q31[:, axis] = np.clip(raw_q31[:, axis] - scaled, -MOST_Q31 - 1, MOST_Q31)
+        return rate_q31, outside
 
     def rate_dps(self, raw_dps: Array, temperature_c: Array) -> Array:
         """Return corrected rates, deg/s, through the whole numbers."""
-        found, _ = self.corrected(self.as_q31(raw_dps), np.rint(temperature_c * 2.0**Q16).astype(np.int64))
-        return np.asarray(found * (self.full_scale_dps / 2.0**Q31), dtype=np.float64)
+        rate_q31, _ = self.corrected(self.as_q31(raw_dps), np.rint(temperature_c * 2.0**Q16).astype(np.int64))
+        return np.asarray(rate_q31 * (self.full_scale_dps / 2.0**Q31), dtype=np.float64)
 
     def rounding_dps(self) -> float:
         """Return what rounding can add, deg/s: of outputs and rates to Q31, and of temperatures to 1/65536 K."""
@@ -154,7 +154,7 @@ def _polynomials(
     m = max(2 * order, 1) + 4
     at = np.cos(np.pi * (np.arange(m) + 0.5) / m) if part.has_rates else np.zeros(1)
     still = -part.rate(np.zeros((nodes, axes)), warm)
-    found = np.zeros((axes, axes, order + 1, nodes))
+    polynomials = np.zeros((axes, axes, order + 1, nodes))
     off = 0.0
     scale = full_scale / half if part.has_rates else 1.0
     for by in range(axes):
@@ -168,5 +168,5 @@ def _polynomials(
             for node in range(nodes):
                 powers = np.polynomial.Polynomial(chebyshev.cheb2poly(series[:, node]))
                 moved = powers(np.polynomial.Polynomial([-middle / half, scale]))
-                found[axis, by, : len(moved.coef), node] = moved.coef
-    return found, off
+                polynomials[axis, by, : len(moved.coef), node] = moved.coef
+    return polynomials, off

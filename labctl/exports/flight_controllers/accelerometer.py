@@ -39,28 +39,28 @@ ARDUPILOT_NOTE = (
 LARGEST_OFFSET_M_S2, SCALES = 3.5, (0.8, 1.2)
 
 
-def misalignment_loss_g(found: ForceParameters) -> float:
+def misalignment_loss_g(parameters: ForceParameters) -> float:
     """Return the largest error, over all directions, of gravity's size that is left without the misalignments, g."""
-    inverse = np.linalg.inv(np.eye(3) + found.errors)
-    left = inverse @ np.diag(1 + np.diag(found.errors)) - np.eye(3)
-    return found.gravity_g * float(np.abs(np.linalg.eigvalsh((left + left.T) / 2)).max())
+    inverse = np.linalg.inv(np.eye(3) + parameters.errors)
+    left = inverse @ np.diag(1 + np.diag(parameters.errors)) - np.eye(3)
+    return parameters.gravity_g * float(np.abs(np.linalg.eigvalsh((left + left.T) / 2)).max())
 
 
-def px4(found: ForceParameters, head: Sequence[str], instance: int, device_id: int | None) -> str:
+def px4(parameters: ForceParameters, head: Sequence[str], instance: int, device_id: int | None) -> str:
     """Return a file of parameters that QGroundControl loads; raises BadInput for an instance that PX4 has not."""
     check_instance("px4", instance, 0, 3)
     name = f"CAL_ACC{instance}_"
-    offset, scale = _offset_and_scale(found)
+    offset, scale = _offset_and_scale(parameters)
     rows = [] if device_id is None else [(f"{name}ID", str(device_id), INTEGER)]
     rows.append((f"{name}PRIO", str(PRIORITY), INTEGER))
     rows += [(f"{name}{axis.upper()}OFF", f"{value:.9g}", FLOAT) for axis, value in zip(AXES, offset, strict=True)]
     rows += [(f"{name}{axis.upper()}SCALE", f"{value:.9g}", FLOAT) for axis, value in zip(AXES, scale, strict=True)]
-    warm = found.temperature
+    warm = parameters.temperature
     if warm is not None:
         rows += _px4_temperature(warm, instance, device_id)
     notes = [
-        *([] if warm is None else [warm.lost(found.gravity_g, bias=False), *PX4_NOTES]),
-        _lost(found, "PX4"),
+        *([] if warm is None else [warm.lost(parameters.gravity_g, bias=False), *PX4_NOTES]),
+        _lost(parameters, "PX4"),
         "Axes are the sensor's own, as in its raw output, before the rotations of sensor and board.",
         "Vehicle, component, parameter, value, type (6: integer, 9: float):",
     ]
@@ -70,16 +70,19 @@ def px4(found: ForceParameters, head: Sequence[str], instance: int, device_id: i
     return commented([*map(plain, head), *notes]) + body
 
 
-def ardupilot(found: ForceParameters, head: Sequence[str], instance: int, device_id: int | None) -> str:
+def ardupilot(parameters: ForceParameters, head: Sequence[str], instance: int, device_id: int | None) -> str:
     """Return a file of parameters that Mission Planner loads.
 
     Raises BadInput for an instance that ArduPilot has not, and for values outside the ranges that it documents.
     """
     check_instance("ardupilot", instance, 1, 3)
     number = "" if instance == 1 else str(instance)
-    offset, scale = _offset_and_scale(found)
-    if found.temperature is not None:  # the constant is that at ACC_CALTEMP, by the parameters as they are written
-        offset = offset + found.temperature.bias_change_g(np.array([_cal_c(found.temperature)]))[0] * STANDARD_GRAVITY
+    offset, scale = _offset_and_scale(parameters)
+    if parameters.temperature is not None:  # the constant is that at ACC_CALTEMP, by the parameters as they are written
+        offset = (
+            offset
+            + parameters.temperature.bias_change_g(np.array([_cal_c(parameters.temperature)]))[0] * STANDARD_GRAVITY
+        )
     for axis, value, factor in zip(AXES, offset, scale, strict=True):
         if abs(value) > LARGEST_OFFSET_M_S2 or not SCALES[0] <= factor <= SCALES[1]:
             raise BadInput(
@@ -91,12 +94,12 @@ def ardupilot(found: ForceParameters, head: Sequence[str], instance: int, device
     for kind, values in (("OFFS", offset), ("SCAL", scale)):
         rows += [(f"INS_ACC{number}{kind}_{axis.upper()}", f"{value:.9g}")
                  for axis, value in zip(AXES, values, strict=True)]  # fmt: skip
-    warm = found.temperature
+    warm = parameters.temperature
     if warm is not None:
         rows += _ardupilot_temperature(warm, instance)
     notes = [
-        *([] if warm is None else [warm.lost(found.gravity_g, bias=False), ARDUPILOT_NOTE]),
-        _lost(found, "ArduPilot"),
+        *([] if warm is None else [warm.lost(parameters.gravity_g, bias=False), ARDUPILOT_NOTE]),
+        _lost(parameters, "ArduPilot"),
         "Axes are the sensor's own after the rotation by its driver, before that of the board.",
     ]
     return commented([*map(plain, head), *notes]) + "".join(f"{row},{value}\n" for row, value in rows)
@@ -147,9 +150,11 @@ def _about(warm: TemperatureParameters, about_c: float) -> NDArray[np.float64]:
     return terms
 
 
-def _offset_and_scale(found: ForceParameters) -> tuple[Array, Array]:
-    return found.bias_g * STANDARD_GRAVITY, 1 / (1 + np.diag(found.errors))
+def _offset_and_scale(parameters: ForceParameters) -> tuple[Array, Array]:
+    return parameters.bias_g * STANDARD_GRAVITY, 1 / (1 + np.diag(parameters.errors))
 
 
-def _lost(found: ForceParameters, consumer: str) -> str:
-    return f"LOST misalignments ({consumer} has no place for them): up to {misalignment_loss_g(found):.2g} g of 1 g."
+def _lost(parameters: ForceParameters, consumer: str) -> str:
+    return (
+        f"LOST misalignments ({consumer} has no place for them): up to {misalignment_loss_g(parameters):.2g} g of 1 g."
+    )

@@ -74,7 +74,7 @@ def write(calibration: Calibration, options: Mapping[str, str]) -> Written:
 
 def _notes(prefix: str, *, has_id: bool) -> list[str]:
     """Return what a person has to know who loads the file."""
-    found = [
+    notes = [
         "Axes are the sensor's own, as in its raw output, before the rotations of sensor and board.",
         (
             "This file contains the whole bias: set CAL_GYROn_XOFF, _YOFF and _ZOFF of this sensor to 0, or "
@@ -83,9 +83,9 @@ def _notes(prefix: str, *, has_id: bool) -> list[str]:
         "Vehicle, component, parameter, value, type (6: integer, 9: float):",
     ]
     if not has_id:
-        found.insert(0, f"{prefix}ID is not in this file and must be the sensor's device id (option device_id): "
+        notes.insert(0, f"{prefix}ID is not in this file and must be the sensor's device id (option device_id): "
                         "PX4 uses the set only then.")  # fmt: skip
-    return found
+    return notes
 
 
 FORMAT = Format(

@@ -56,8 +56,8 @@ def alignment_of(k: Matrix, u: Matrix | None) -> Alignment:
                 moved[i, j] += STEP
                 variance += ((_angles_deg(moved) - values) / STEP * u[i, j]) ** 2
         spread = np.sqrt(variance).tolist()
-    found = [Estimate(float(value), each) for value, each in zip(values, spread, strict=True)]
-    return Alignment((found[0], found[1], found[2]), (found[3], found[4], found[5]))
+    estimates = [Estimate(float(value), each) for value, each in zip(values, spread, strict=True)]
+    return Alignment((estimates[0], estimates[1], estimates[2]), (estimates[3], estimates[4], estimates[5]))
 
 
 def _angles_deg(k: Matrix) -> NDArray[np.float64]:

@@ -87,11 +87,11 @@ def different_rates(rate_dps: Array) -> int:
 
 def _solved(columns: Array, values: Array) -> tuple[list[float], list[float | None], Array]:
     """Return coefficients, their standard uncertainties by the scatter about the fit, and what is left."""
-    found, *_ = np.linalg.lstsq(columns, values, rcond=None)
-    left = values - columns @ found
+    solution, *_ = np.linalg.lstsq(columns, values, rcond=None)
+    left = values - columns @ solution
     freedom = len(values) - columns.shape[1]
     if freedom < 1:
-        return found.tolist(), [None] * columns.shape[1], left
+        return solution.tolist(), [None] * columns.shape[1], left
     variance = float(left @ left) / freedom
     u = np.sqrt(np.diag(np.linalg.inv(columns.T @ columns)) * variance)
-    return found.tolist(), u.tolist(), left
+    return solution.tolist(), u.tolist(), left

@@ -66,17 +66,17 @@ def advice_for(
 
     The terms `beside` are in the model already.
     """
-    found: list[Advice] = []
+    advice: list[Advice] = []
     beside = list(beside)
     for term in terms:
         report_stage(f"checking what a calibration with {term.effect} would do")
         checked = exported_errors(data, model, tuple(beside), term)
         why = _why_not_carried(term) or _why_not_better(checked)
-        found.append(
+        advice.append(
             Advice(effect=term.effect, add=not why, why=why, before_dps=checked.before_dps, after_dps=checked.after_dps)
         )
         beside += [] if why else [term]
-    return tuple(found)
+    return tuple(advice)
 
 
 def is_carried(term: Term) -> bool:
@@ -93,15 +93,15 @@ def _why_not_carried(term: Term) -> str:
     return f"a calibration does not carry it: it belongs to the {kind.origin}, and not to the unit"
 
 
-def _why_not_better(found: Exported) -> str:
-    if found.is_better:
+def _why_not_better(exported: Exported) -> str:
+    if exported.is_better:
         return ""
-    if found.before_dps is None or found.after_dps is None:
+    if exported.before_dps is None or exported.after_dps is None:
         return "no part of these data can be left out to check it"
-    scatter = ", and from part to part the difference scatters by more" if found.is_chance else ""
+    scatter = ", and from part to part the difference scatters by more" if exported.is_chance else ""
     return (
-        f"what would be exported does not become clearly better on parts left out of the fit: {found.after_dps:.3g} "
-        f"deg/s in place of {found.before_dps:.3g} deg/s{scatter}"
+        f"what would be exported does not become clearly better on parts left out of the fit: {exported.after_dps:.3g} "
+        f"deg/s in place of {exported.before_dps:.3g} deg/s{scatter}"
     )
 
 
@@ -120,7 +120,7 @@ def exported_errors(data: FitData, model: ErrorModel, beside: tuple[Term, ...], 
     errors: tuple[list[dict[str, Array]], list[dict[str, Array]]] = ([], [])
     for seen, left_out in parts_of(data, inner_only=presets[0].inner_only):
         try:
-            both = [_left(seen, left_out, p, found) for p, found in zip(presets, whole, strict=True)]
+            both = [_left(seen, left_out, p, axis_errors) for p, axis_errors in zip(presets, whole, strict=True)]
         except LabctlError:  # a part that the others do not determine says nothing
             continue
         for parts, values in zip(errors, both, strict=True):
@@ -159,11 +159,11 @@ def _left(seen: FitData, left_out: FitData, preset: Preset, whole: Mapping[str, 
     model, rows = preset.build(seen)
     used = seen.take(rows)
     require_enough_data(used, model)
-    found = solve_axes(used, model, whole)
-    fitted = FittedModel(model, found.fits)
+    solutions = solve_axes(used, model, whole)
+    fitted = FittedModel(model, solutions.fits)
     for term in model.terms:
         fitted = fitted if is_carried(term) else without(fitted, term.effect)
-    return dict(residuals(fitted, left_out, found.nuisance))
+    return dict(residuals(fitted, left_out, solutions.nuisance))
 
 
 def parts_of(data: FitData, *, inner_only: bool) -> Iterator[tuple[FitData, FitData]]:

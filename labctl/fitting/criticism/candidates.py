@@ -55,14 +55,14 @@ def untestable_channels(data: ReducedRecording, catalogue: Mapping[str, Effect] 
 
     In a recording of turns the rate at each instant is not known: an effect that is not linear in the rate lacks it.
     """
-    found: dict[str, list[str]] = {}
+    needs_by_effect: dict[str, list[str]] = {}
     for kind in catalogue.values():
         absent = [name for name in data.nodes.missing(kind.channels) if name != "run"]
         if not absent and data.info.motion == "turns" and not _takes_mean_rate(data, kind):
             absent = [RATE]
         if absent:
-            found[kind.id] = absent
-    return found
+            needs_by_effect[kind.id] = absent
+    return needs_by_effect
 
 
 def _takes_mean_rate(data: ReducedRecording, kind: Effect) -> bool:
@@ -141,15 +141,15 @@ def options_of(
     """Return every shape of every testable effect on one axis, and a smooth function of every channel."""
     span, absent = span_of(data), untestable_channels(data, catalogue)
     turning = bool(np.any(data.nodes.table_rate_dps()))
-    found = []
+    shaped_options = []
     for kind in catalogue.values():
         if not turning and not kind.shows_at_rest:
             continue
         if kind.id in absent or kind.id in ONLY_BASE or _is_known(data, kind.id):
             continue
         options = (option_of(data, axis, reference, kind, term) for term in kind.options(span))
-        found += [option for option in options if option is not None]
-    return found + channel_options(data, axis)
+        shaped_options += [option for option in options if option is not None]
+    return shaped_options + channel_options(data, axis)
 
 
 def option_of(

@@ -178,21 +178,21 @@ def criticise(
     family, hint = family_or_hint(fit_data, forward, verdict)
     verdict = with_family(verdict, family)
     named = Criticism(verdict, data, fit_data, base, None, comparison, final, family=family, hint=hint)
-    found = _checked(named, forward, full=full)
-    if not full or found.beside_missing is None:
-        return found
+    criticism = _checked(named, forward, full=full)
+    if not full or criticism.beside_missing is None:
+        return criticism
     report_stage("listing suspects and residuals")
-    suspects = tuple(suspects_of(comparison, found.beside_missing, fit_data, forward, refined_term, base))
-    suspected = {*found.verdict.named, *(s.candidate.id for s in suspects if s.candidate.log_bf > 0)}
+    suspects = tuple(suspects_of(comparison, criticism.beside_missing, fit_data, forward, refined_term, base))
+    suspected = {*criticism.verdict.named, *(s.candidate.id for s in suspects if s.candidate.log_bf > 0)}
     return replace(
-        found,
-        family=_with_time_constants(found.family, fit_data, forward),
-        hint=_with_time_constants(found.hint, fit_data, forward),
+        criticism,
+        family=_with_time_constants(criticism.family, fit_data, forward),
+        hint=_with_time_constants(criticism.hint, fit_data, forward),
         direct_rms_dps=_direct_rms_dps(fit_data, model),
         suspects=suspects,
         not_testable=tuple(line for line in not_testable(comparison, catalogue) if line["effect"] not in suspected),
         explained=_explained(initial, seen),
-        views=views_of(found.beside_missing, found.residuals, recording, catalogue),
+        views=views_of(criticism.beside_missing, criticism.residuals, recording, catalogue),
     )
 
 
@@ -220,23 +220,23 @@ def best_shapes(
     return {c.id: refined_term(comparison, c) for c in comparison.candidates if not c.smooth and c.term is not None}
 
 
-def _checked(found: Criticism, forward: ErrorModel, *, full: bool) -> Criticism:
+def _checked(criticism: Criticism, forward: ErrorModel, *, full: bool) -> Criticism:
     """Return a criticism with advice on what it names, and at rest without names that this refutes."""
-    comparison, verdict = found.comparison, found.verdict
+    comparison, verdict = criticism.comparison, criticism.verdict
     if comparison is None:
-        return found
-    verdict = with_quantization(verdict, found.data, found.residuals)
-    slow = slow_process(comparison, found.residuals)
-    family = found.family
+        return criticism
+    verdict = with_quantization(verdict, criticism.data, criticism.residuals)
+    slow = slow_process(comparison, criticism.residuals)
+    family = criticism.family
     others = [group for group in verdict.groups if family is None or group[0] != LAG]
     leaders = [term for group in others if (term := _to_check(comparison, verdict, group)) is not None]
     beside = () if family is None else (family.response.term,)
-    advice = advice_for(found.fit_data, forward, leaders, beside) if full or slow is not None else ()
+    advice = advice_for(criticism.fit_data, forward, leaders, beside) if full or slow is not None else ()
     advice = advice if family is None else (family.advice, *advice)
     verdict = with_hypothesis(without_harm(verdict, advice, slow, comparison), comparison, slow)
     advice = (*advice, NO_CORRECTION) if verdict.named == (QUANTIZATION,) else advice
     kept = tuple(each for each in advice if each["effect"] in verdict.named)
-    return replace(found, verdict=verdict, advice=kept, slow=slow, family=family if LAG in verdict.named else None)
+    return replace(criticism, verdict=verdict, advice=kept, slow=slow, family=family if LAG in verdict.named else None)
 
 
 def _reduced(recording: Recording, static: StaticRecord | None, *, is_decimated: bool, full: bool) -> ReducedRecording:
@@ -307,7 +307,7 @@ def _leaning(data: ReducedRecording, fit_data: FitData, forward: ErrorModel) -> 
     """
     if not any(len(fit_data.angle_columns(axis)) for axis in fit_data.outputs):
         return data
-    angles = {axis: found.angles_rad for axis, found in solve_axes(fit_data, forward).nuisance.items()}
+    angles = {axis: axis_nuisance.angles_rad for axis, axis_nuisance in solve_axes(fit_data, forward).nuisance.items()}
     return replace(data, nodes=data.nodes.with_rates(leaning_rates(data.nodes, angles)))
 
 
@@ -333,8 +333,10 @@ def _too_little(data: ReducedRecording, model: ErrorModel) -> str | None:
 def _explained(first: Comparison, data: ReducedRecording) -> float:
     """Return the share of the excess chi2 of the raw `data` that the base explains, 0 to 1."""
     excess = raw = 0.0
-    for axis, found in first.axes.items():
-        freedom = found.rows - found.base_columns
-        excess += max(found.best.chi2 - freedom, 0.0)
-        raw += float(np.sum(data.error_dps(axis)[0] ** 2 / (first.white_var[axis] + found.best.noise.size_dps**2)))
+    for axis, axis_comparison in first.axes.items():
+        freedom = axis_comparison.rows - axis_comparison.base_columns
+        excess += max(axis_comparison.best.chi2 - freedom, 0.0)
+        raw += float(
+            np.sum(data.error_dps(axis)[0] ** 2 / (first.white_var[axis] + axis_comparison.best.noise.size_dps**2))
+        )
     return float(np.clip(1.0 - excess / max(raw, 1e-12), 0.0, 1.0))

@@ -51,17 +51,17 @@ def compare_axis(data: ReducedRecording, design: Design, axis: str) -> AxisCompa
         white_now = white + _growing(data, design, y, white, explained)
         if means is None or not np.array_equal(white_now, means.white_var):
             means = means_by_noise(design, y, white_now, noises)
-        found = evidence(design, y, means, scale, int(design.present.sum()))
-        leader = int(np.argmax(found.log_bf)) if len(found.log_bf) else -1
-        if estimate == 1 or leader < 0 or found.log_bf[leader] < REESTIMATE_FROM:
+        axis_evidence = evidence(design, y, means, scale, int(design.present.sum()))
+        leader = int(np.argmax(axis_evidence.log_bf)) if len(axis_evidence.log_bf) else -1
+        if estimate == 1 or leader < 0 or axis_evidence.log_bf[leader] < REESTIMATE_FROM:
             break
-        explained = _explained(design, found, leader)
-    return AxisComparison(found, white_now, scale)
+        explained = _explained(design, axis_evidence, leader)
+    return AxisComparison(axis_evidence, white_now, scale)
 
 
-def _explained(design: Design, found: AxisEvidence, option: int) -> NDArray[np.float64]:
+def _explained(design: Design, axis_evidence: AxisEvidence, option: int) -> NDArray[np.float64]:
     """Return what an option explains, (R, m)."""
-    coefficients, _ = solve_option(found.best, found.slices[option])
+    coefficients, _ = solve_option(axis_evidence.best, axis_evidence.slices[option])
     return np.asarray(design.options[option].rows @ coefficients)
 
 
@@ -256,16 +256,16 @@ def compare_models(
     """Compare every candidate with a model. `designs` may be those of an earlier call for the same model and data."""
     report_stage("preparing candidates")
     designs = designs or {axis: design_of(data, model, axis, catalogue) for axis in data.info.axes}
-    found = {}
+    axis_comparisons = {}
     for axis, design in designs.items():
         number = len({(option.candidate, option.smooth) for option in design.options})
         report_stage(f"comparing {number} candidates, axis {axis}")
-        found[axis] = compare_axis(data, design, axis)
-    axes = {axis: one.evidence for axis, one in found.items()}
+        axis_comparisons[axis] = compare_axis(data, design, axis)
+    axes = {axis: one.evidence for axis, one in axis_comparisons.items()}
     return Comparison(
         data, model, designs, axes,
-        {axis: one.white_var for axis, one in found.items()},
-        {axis: one.scale for axis, one in found.items()},
+        {axis: one.white_var for axis, one in axis_comparisons.items()},
+        {axis: one.scale for axis, one in axis_comparisons.items()},
         rank_candidates(designs, axes, data.info.technology or ""),
     )  # fmt: skip
 
@@ -287,11 +287,11 @@ def with_noise_of(comparison: Comparison, fuller: Comparison) -> Comparison:
     """
     axes = {}
     for axis, design in comparison.designs.items():
-        found, other = comparison.axes[axis], fuller.axes[axis]
+        axis_comparison, other = comparison.axes[axis], fuller.axes[axis]
         y = comparison.data.error_dps(axis)
         (left,) = eliminate_base(design, y, fuller.white_var[axis], fuller.scales[axis], [other.best.noise])
-        gain, dimensions = gains_of(left, found.slices)
+        gain, dimensions = gains_of(left, axis_comparison.slices)
         axes[axis] = replace(
-            found, best=left, gain=gain, dimensions=dimensions, weights=other.weights, noises=other.noises
+            axis_comparison, best=left, gain=gain, dimensions=dimensions, weights=other.weights, noises=other.noises
         )
     return replace(comparison, axes=axes, white_var=fuller.white_var, scales=fuller.scales)

@@ -70,7 +70,7 @@ def suspects_of(
     effects = [c for c in comparison.candidates if not c.smooth]
     shown = [c for c in effects if c.physical][:SHOWN]
     shown += [c for c in effects if not c.physical and c.log_bf >= ENOUGH][:UNPHYSICAL_SHOWN]
-    found = []
+    suspects = []
     for candidate in shown:
         after = _fit_with(comparison, candidate, data, model, shape_of)
         if after is not None and _is_worse(before, after):
@@ -82,8 +82,8 @@ def suspects_of(
             fitted or coefficients_of(seen, candidate), bool(fitted), share, after,
             alias_group(comparison, candidate) if candidate.log_bf >= ENOUGH else (candidate.id,),
         )  # fmt: skip
-        found.append(suspect)
-    return found
+        suspects.append(suspect)
+    return suspects
 
 
 def _is_worse(before: FitResult | None, after: FitResult) -> bool:
@@ -136,13 +136,13 @@ def _fit_with(
 
 def _fitted_coefficients(after: FitResult, candidate: Candidate) -> dict[str, dict[str, Coefficient]]:
     """Return axis -> name -> value, u and unit of the candidate in a fit, on the axes on which it competed."""
-    found: dict[str, dict[str, Coefficient]] = {}
+    by_axis: dict[str, dict[str, Coefficient]] = {}
     for axis in (axis for axis in candidate.option if axis in after.fitted.axes):
         fit = after.fitted.axes[axis]
         rows = [k for k, owner in enumerate(fit.effects) if owner == candidate.id]
         # one coefficient for all temperatures: the columns of a table are alike
-        found[axis] = with_derived({
+        by_axis[axis] = with_derived({
             fit.names[k]: {"value": float(fit.values[k, 0]), "u": none_for_nan(fit.u)[k][0], "unit": fit.units[k]}
             for k in rows
         })  # fmt: skip
-    return {axis: values for axis, values in found.items() if values}
+    return {axis: values for axis, values in by_axis.items() if values}

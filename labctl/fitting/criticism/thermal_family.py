@@ -206,11 +206,13 @@ def _rival(data: FitData, model: ErrorModel, effect: str) -> LeftOut:
          for term in terms]
         for axis in axes
     ]  # fmt: skip
-    found: list[tuple[Axis, NDArray[np.bool_], NDArray[np.float64]]] = []
+    rivals: list[tuple[Axis, NDArray[np.bool_], NDArray[np.float64]]] = []
     for seen, tested in stretches_of(data):
         left = np.zeros(len(terms))
         for axis, own in zip(axes, options, strict=True):
             left += [float(np.sum(axis.left_over_noise(columns, seen) ** 2)) for columns in own]
         best = int(np.argmin(left))
-        found += [(axis, tested, axis.errors(own[best], seen, tested)) for axis, own in zip(axes, options, strict=True)]
-    return pooled(found)
+        rivals += [
+            (axis, tested, axis.errors(own[best], seen, tested)) for axis, own in zip(axes, options, strict=True)
+        ]
+    return pooled(rivals)

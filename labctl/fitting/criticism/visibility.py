@@ -91,10 +91,10 @@ def schedule_of(recording: Recording, model: ErrorModel | None = None) -> Schedu
 def effect_visibilities(schedule: Schedule) -> list[EffectVisibility]:
     """Return every effect of the catalogue with its visible share and smallest detectable size, most visible first."""
     absent = untestable_channels(schedule.data)
-    found = [
+    visibilities = [
         _of_effect(schedule, effect_id, absent.get(effect_id)) for effect_id in CATALOGUE if effect_id != NEVER_MISSING
     ]
-    return sorted(found, key=lambda v: -v.share)
+    return sorted(visibilities, key=lambda v: -v.share)
 
 
 def _of_effect(schedule: Schedule, effect_id: str, absent: list[str] | None) -> EffectVisibility:
@@ -123,7 +123,7 @@ def _of_effect(schedule: Schedule, effect_id: str, absent: list[str] | None) -> 
 def not_testable(comparison: Comparison, catalogue: Mapping[str, Effect]) -> list[NotTestable]:
     """Return the effects that a recording cannot show, as JSON: a channel is missing, or the schedule hides them."""
     absent = untestable_channels(comparison.data, catalogue)
-    found: list[NotTestable] = [
+    untestable: list[NotTestable] = [
         {"effect": effect_id, "why": "channel", "needs": needs} for effect_id, needs in absent.items()
     ]
     shares = visible_shares(comparison)
@@ -131,17 +131,17 @@ def not_testable(comparison: Comparison, catalogue: Mapping[str, Effect]) -> lis
         if kind.id in absent or kind.id in comparison.model.effect_ids or kind.id == NEVER_MISSING:
             continue
         if shares.get(kind.id, 0.0) < LEAST_VISIBLE:
-            found.append({"effect": kind.id, "why": "schedule", "needs": [], "visible": shares.get(kind.id, 0.0)})
-    return found
+            untestable.append({"effect": kind.id, "why": "schedule", "needs": [], "visible": shares.get(kind.id, 0.0)})
+    return untestable
 
 
 def visible_shares(comparison: Comparison) -> dict[str, float]:
     """Return effect id -> the share that is visible beside the base, 0 to 1, in its most visible shape."""
     shares: dict[str, float] = {}
     for axis, design in comparison.designs.items():
-        found = comparison.axes[axis]
-        for option, where in zip(design.options, found.slices, strict=True):
+        axis_comparison = comparison.axes[axis]
+        for option, where in zip(design.options, axis_comparison.slices, strict=True):
             if not option.smooth:
-                share = visible_share(found.best, where)
+                share = visible_share(axis_comparison.best, where)
                 shares[option.candidate] = max(shares.get(option.candidate, 0.0), share)
     return shares

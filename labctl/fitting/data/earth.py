@@ -79,9 +79,9 @@ def turning_columns(info: RecordingInfo, channels: Channels, axis: str) -> Array
     middle, half = start + turned / 2, turned / 2
     shrink = np.sinc(half / np.pi)  # the mean of a cosine over what was turned
     cosine, sine = np.cos(middle) * shrink, np.sin(middle) * shrink
-    found = []
+    turning = []
     for there, here in channels.positions():
         if Position.of(there).axis != axis:
             for part in channels.by_recording(here):  # the table's zero may point elsewhere on another day
-                found += [np.where(part, cosine, 0.0), np.where(part, sine, 0.0)]
-    return np.column_stack(found) if found else np.zeros((len(channels), 0))
+                turning += [np.where(part, cosine, 0.0), np.where(part, sine, 0.0)]
+    return np.column_stack(turning) if turning else np.zeros((len(channels), 0))

@@ -204,10 +204,10 @@ def _white(points: Recording) -> dict[str, Array] | None:
     `gyro_*_white_std` is taken where it is there: the white level alone, without lines from the table's steps, which
     average out over a data set and are no noise of the mean. What coarse steps of the output leave in a mean is added.
     """
-    found: dict[str, Array] = {}
+    white_by_axis: dict[str, Array] = {}
     for axis in points.info.axes:
         variance = white_var_of(points, axis)
         if variance is None or not np.all(np.isfinite(variance)) or not np.any(variance > 0):
             return None
-        found[axis] = np.maximum(variance, 1e-6 * float(np.median(variance[variance > 0])))
-    return found
+        white_by_axis[axis] = np.maximum(variance, 1e-6 * float(np.median(variance[variance > 0])))
+    return white_by_axis

@@ -126,12 +126,12 @@ def _least_known(infos: Sequence[RecordingInfo]) -> tuple[Standard, ...]:
 
     Campaigns of one bench share the errors of its standards, so that more campaigns do not reduce this uncertainty.
     """
-    found: dict[tuple[str, str], Standard] = {}
+    least_known: dict[tuple[str, str], Standard] = {}
     for each in (standard for info in infos for standard in info.standards):
-        known = found.get((each.quantity, each.name))
+        known = least_known.get((each.quantity, each.name))
         if known is None or known.standard_u <= each.standard_u:
-            found[each.quantity, each.name] = each
-    return tuple(found.values())
+            least_known[each.quantity, each.name] = each
+    return tuple(least_known.values())
 
 
 def _require_alike(order: Sequence[int], parts: Mapping[int, Recording]) -> None:
@@ -195,13 +195,13 @@ def _environment(recording: Recording, columns: Rows) -> Rows:
         return {name: np.asarray(recording.columns[name] if name != "run" else columns["run"]) for name in names} | (
             {"run": np.asarray(columns["run"])} if "t_s" in names else {}
         )
-    found = {name: np.asarray(values) for name, values in source.items()}
-    if "run" in found:
+    environment_rows = {name: np.asarray(values) for name, values in source.items()}
+    if "run" in environment_rows:
         own = np.unique(np.asarray(recording.columns.get("run", np.ones(1))))
-        found["run"] = np.asarray(found["run"], dtype=np.int64) - int(own.min()) + int(runs.min())
-        return found
-    repeated = {name: np.tile(values, len(runs)) for name, values in found.items()}
-    return repeated | {"run": np.repeat(runs, len(found["t_s"]))}
+        environment_rows["run"] = np.asarray(environment_rows["run"], dtype=np.int64) - int(own.min()) + int(runs.min())
+        return environment_rows
+    repeated = {name: np.tile(values, len(runs)) for name, values in environment_rows.items()}
+    return repeated | {"run": np.repeat(runs, len(environment_rows["t_s"]))}
 
 
 def _below_one_another(tables: Sequence[Rows]) -> Rows:

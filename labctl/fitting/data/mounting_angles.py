@@ -99,9 +99,9 @@ class AngleColumns:
         """Return k."""
         return self.values.shape[1]
 
-    def angles_rad(self, found: Array) -> dict[str, float]:
+    def angles_rad(self, coefficients: Array) -> dict[str, float]:
         """Return the angles by name, rad, for coefficients of the columns (k,)."""
-        return dict(zip(self.names, (self.combined @ found).tolist(), strict=True))
+        return dict(zip(self.names, (self.combined @ coefficients).tolist(), strict=True))
 
 
 def angle_columns(channels: Channels, axis: str, placed_rad: float = 0.0) -> AngleColumns:
@@ -128,12 +128,12 @@ def angle_columns(channels: Channels, axis: str, placed_rad: float = 0.0) -> Ang
 
 def _block_diagonal(blocks: Sequence[Array]) -> Array:
     """Return a matrix with these, (r, c) each, along its diagonal."""
-    found = np.zeros((sum(len(block) for block in blocks), sum(block.shape[1] for block in blocks)))
+    stacked = np.zeros((sum(len(block) for block in blocks), sum(block.shape[1] for block in blocks)))
     row = column = 0
     for block in blocks:
-        found[row : row + len(block), column : column + block.shape[1]] = block
+        stacked[row : row + len(block), column : column + block.shape[1]] = block
         row, column = row + len(block), column + block.shape[1]
-    return found
+    return stacked
 
 
 def placed_rad(standards: Iterable[Standard]) -> float:
@@ -161,14 +161,14 @@ def leaning_rates(channels: Channels, angles_rad: Mapping[str, Mapping[str, floa
 
 def angle_regressor(channels: Channels, name: str) -> Array:
     """Return what rows show of one angle, (n,) deg/s per radian, whichever of its mountings they hold."""
-    found = np.zeros(len(channels))
+    regressor = np.zeros(len(channels))
     for text, rows in channels.positions():
         position = Position.of(text)
         if name == f"{position}{PLACED}":
-            found[rows] = 1.0
+            regressor[rows] = 1.0
         elif name in _names(position):
-            found[rows] = _shown(position, (name,))[0]
-    return np.asarray(found * channels.table_rate_dps())
+            regressor[rows] = _shown(position, (name,))[0]
+    return np.asarray(regressor * channels.table_rate_dps())
 
 
 def turned_positions(channels: Channels) -> tuple[str, ...]:
@@ -223,8 +223,8 @@ def separates_any(positions: Iterable[str], axis: str) -> bool:
 
 
 def _schemes(positions: tuple[str, ...], axis: str) -> Iterable[_Scheme]:
-    found = (_scheme(positions, other) for other in BODY_AXES if other != axis)
-    return [scheme for scheme in found if scheme is not None]
+    schemes = (_scheme(positions, other) for other in BODY_AXES if other != axis)
+    return [scheme for scheme in schemes if scheme is not None]
 
 
 @cache

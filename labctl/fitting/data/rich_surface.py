@@ -77,33 +77,33 @@ def _orthonormal(
 ) -> NDArray[np.float64]:
     m, k = begin.shape
     most = min(int(share * m), m - LEAST_FREE)
-    found = np.empty((m, max(most, k)), order="F")
-    found[:, :k] = begin
+    orthonormal = np.empty((m, max(most, k)), order="F")
+    orthonormal[:, :k] = begin
     for block in blocks:
         for column in block.T:
-            if k < most and (new := _new_part(column, found[:, :k], least_new)) is not None:
-                found[:, k] = new
+            if k < most and (new := _new_part(column, orthonormal[:, :k], least_new)) is not None:
+                orthonormal[:, k] = new
                 k += 1
-    return found[:, :k]
+    return orthonormal[:, :k]
 
 
 def _linear(channels: Channels) -> NDArray[np.float64]:
     """Return orthonormal columns (m, k) of a bias in every position and the response to every axis."""
     places = [rows.astype(np.float64) for _, rows in channels.positions()]
-    found = np.zeros((len(channels), 0))
+    independent = np.zeros((len(channels), 0))
     for column in (*places, *channels.rates.values()):
-        if (new := _new_part(column, found, LEAST_NEW)) is not None:
-            found = np.column_stack([found, new])
-    return found
+        if (new := _new_part(column, independent, LEAST_NEW)) is not None:
+            independent = np.column_stack([independent, new])
+    return independent
 
 
-def _new_part(column: Array, found: NDArray[np.float64], least_new: float) -> Array | None:
+def _new_part(column: Array, basis: NDArray[np.float64], least_new: float) -> Array | None:
     size = float(np.linalg.norm(column))
     if size == 0:
         return None
     left = column / size
     for _ in range(2):  # the second time takes out what rounding left
-        left = left - found @ (found.T @ left)
+        left = left - basis @ (basis.T @ left)
     new = float(np.linalg.norm(left))
     return np.asarray(left / new) if new > least_new else None
 
@@ -204,10 +204,10 @@ def _is_on_ramps(channels: Channels) -> bool:
 def since_first(channels: Channels) -> Array:
     """Return the time since the first row of the same recording, (m,) s."""
     t_s = channels.recording_t_s()
-    found = np.empty(len(t_s))
+    elapsed_s = np.empty(len(t_s))
     for rows in channels.by_recording(np.ones(len(t_s), dtype=bool)):
-        found[rows] = t_s[rows] - t_s[rows].min()
-    return found
+        elapsed_s[rows] = t_s[rows] - t_s[rows].min()
+    return elapsed_s
 
 
 def _carried(signs: Array) -> Array:

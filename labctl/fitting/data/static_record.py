@@ -55,7 +55,7 @@ class StaticRecord:
 
 
 def _axis_json(noise: Allan, is_prior: bool) -> AllanJson:
-    found: AllanJson = {
+    axis_json: AllanJson = {
         "tau_s": plain_list(noise.tau_s),
         "deviation_dps": plain_list(noise.deviation_dps),
         "low_dps": plain_list(noise.low_dps),
@@ -68,12 +68,12 @@ def _axis_json(noise: Allan, is_prior: bool) -> AllanJson:
         "replaces_datasheet": is_prior,
     }
     if noise.from_s > noise.tau_s[0]:
-        found["from_s"] = noise.from_s
+        axis_json["from_s"] = noise.from_s
     if noise.smoothing_s > 0:
-        found["smoothing_s"] = noise.smoothing_s
+        axis_json["smoothing_s"] = noise.smoothing_s
     if noise.step_dps is not None:
-        found["step_dps"] = noise.step_dps
-    return found
+        axis_json["step_dps"] = noise.step_dps
+    return axis_json
 
 
 def _figure_json(figure: Figure) -> NoiseFigure:

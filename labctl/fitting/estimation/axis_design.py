@@ -112,16 +112,16 @@ def _exercised(data: FitData, model: ErrorModel, channels: Channels, axis: str) 
     At one rate the part of an effect that grows with the rate is the same as its part at rest, so only that is claimed.
     A held coefficient is known whatever the recording exercises.
     """
-    found = model.columns(channels, axis)
+    named_columns = model.columns(channels, axis)
     still = {name for name in channels.rates if data.distinct_rates(name) < TOLD_APART}
     if not still:
-        return found
+        return named_columns
     none = np.zeros(len(data))
     stopped = channels.with_rates({name: none if name in still else v for name, v in channels.rates.items()})
     at_rest = model.columns(stopped, axis)
     return [
         (owner, column)
-        for (owner, column), (_, left) in zip(found, at_rest, strict=True)
+        for (owner, column), (_, left) in zip(named_columns, at_rest, strict=True)
         if np.any(left.values) or model.held.of(axis, owner, column.name) is not None
     ]
 

@@ -77,7 +77,7 @@ class AxisSolutions:
     @property
     def turning(self) -> dict[str, Array]:
         """The Earth's rate that goes round with the table, axis -> cosine and sine per position, deg/s."""
-        return {axis: found.turning for axis, found in self.nuisance.items()}
+        return {axis: axis_nuisance.turning for axis, axis_nuisance in self.nuisance.items()}
 
 
 def solve_axes(data: FitData, model: ErrorModel, fixed: Mapping[str, Solution] | None = None) -> AxisSolutions:
@@ -88,12 +88,12 @@ def solve_axes(data: FitData, model: ErrorModel, fixed: Mapping[str, Solution] |
 
     Raises NotEnoughData where the data sets do not determine the coefficients.
     """
-    found = _solve_each(data, model, fixed)
-    if not any(each.angles_rad for each in found.nuisance.values()):
-        return found
-    rates = leaning(data, found.nuisance).channels.rates
+    solutions = _solve_each(data, model, fixed)
+    if not any(each.angles_rad for each in solutions.nuisance.values()):
+        return solutions
+    rates = leaning(data, solutions.nuisance).channels.rates
     again = _solve_each(replace(data, channels=data.channels.with_rates(rates)), model, fixed)
-    return replace(again, nuisance={axis: found.nuisance[axis].plus(each) for axis, each in again.nuisance.items()})
+    return replace(again, nuisance={axis: solutions.nuisance[axis].plus(each) for axis, each in again.nuisance.items()})
 
 
 def _solve_each(data: FitData, model: ErrorModel, fixed: Mapping[str, Solution] | None) -> AxisSolutions:
@@ -124,7 +124,7 @@ def leaning(data: FitData, nuisance: Mapping[str, Nuisance]) -> FitData:
     The angles are the fixture's and the table's: known from all data, they are no error of the model in a part that
     lacks the mountings which separate them.
     """
-    rates = leaning_rates(data.channels, {axis: found.angles_rad for axis, found in nuisance.items()})
+    rates = leaning_rates(data.channels, {axis: axis_nuisance.angles_rad for axis, axis_nuisance in nuisance.items()})
     return replace(data, channels=data.channels.with_rates(rates), angles_known=True)
 
 
@@ -252,10 +252,10 @@ def fit_turning(fitted: FittedModel, data: FitData) -> dict[str, Nuisance]:
     For judging a calibration on a recording that it was not fitted to: the direction of north is not known in advance.
     """
     left = residuals(fitted, data)
-    found: dict[str, Nuisance] = {}
+    by_axis: dict[str, Nuisance] = {}
     for axis, values in left.items():
         columns = turning_columns(data.info, data.channels, axis)
         independent = columns.shape[1] > 0 and rank_of(columns) == columns.shape[1]
         turning = np.asarray(np.linalg.lstsq(columns, values)[0] if independent else [], dtype=np.float64)
-        found[axis] = Nuisance(turning)
-    return found
+        by_axis[axis] = Nuisance(turning)
+    return by_axis

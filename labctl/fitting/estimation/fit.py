@@ -64,15 +64,15 @@ def errors_by_leg(data: FitData, preset: Preset, solutions: Mapping[str, Solutio
     up, down = legs > 0, legs < 0
     if min(int(up.sum()), int(down.sum())) < LEAST_SETS:
         return []
-    found = [
+    leg_errors = [
         _tested(data, preset, solutions, [(up, down)], ("heating", "cooling")),
         _tested(data, preset, solutions, [(down, up)], ("cooling", "heating")),
     ]
     numbers, counts = np.unique(legs[legs != 0], return_counts=True)
     if 2 < len(numbers) <= MOST_LEGS and counts.min() >= LEAST_SETS:
         pairs = [((legs != 0) & (legs != number), legs == number) for number in numbers]
-        found.append(_tested(data, preset, solutions, pairs, ("all legs but one", "each leg in turn")))
-    return found
+        leg_errors.append(_tested(data, preset, solutions, pairs, ("all legs but one", "each leg in turn")))
+    return leg_errors
 
 
 def _tested(
@@ -172,11 +172,11 @@ def held_out_errors(data: FitData, preset: Preset, solutions: Mapping[str, Solut
         try:
             model, rows = preset.build(seen)
             require_enough_data(seen.take(rows), model)
-            found = solve_axes(seen.take(rows), model, solutions)
+            solved = solve_axes(seen.take(rows), model, solutions)
         except NotEnoughData:
             return {}
         try:
-            left = residuals(FittedModel(model, found.fits), left_out, found.nuisance)
+            left = residuals(FittedModel(model, solved.fits), left_out, solved.nuisance)
         except NotConverged as error:
             at_c = float(left_out.temperature_c.mean())
             raise NotConverged(
@@ -217,41 +217,41 @@ def fit_preset(data: FitData, preset: Preset) -> FitResult:
     model, rows = preset.build(data)
     used = data.take(rows)
     require_enough_data(used, model)
-    found = solve_axes(used, model)
-    fitted = FittedModel(_with_shapes(model, found.fits, data.channels.history), found.fits)
-    residual = residuals(fitted, data, found.nuisance)
+    solved = solve_axes(used, model)
+    fitted = FittedModel(_with_shapes(model, solved.fits, data.channels.history), solved.fits)
+    residual = residuals(fitted, data, solved.nuisance)
     raw = {axis: data.outputs[axis] - data.true_rate_dps(axis) for axis in data.outputs}
-    floor, leaned = data.noise_floor, leaning(data, found.nuisance)
+    floor, leaned = data.noise_floor, leaning(data, solved.nuisance)
     error = ErrorFigures(
-        rms(raw), rms(residual), rms(held_out_errors(leaned, preset, found.solutions)), floor.rms_dps, floor.source,
-        tuple(errors_by_leg(leaned, preset, found.solutions)),
+        rms(raw), rms(residual), rms(held_out_errors(leaned, preset, solved.solutions)), floor.rms_dps, floor.source,
+        tuple(errors_by_leg(leaned, preset, solved.solutions)),
     )  # fmt: skip
     return FitResult(
         fitted,
         error,
         data.covered.temperature_c,
         valid_rates_dps(fitted, data),
-        {axis: _noise_json(floor.axes[axis], solution) for axis, solution in found.solutions.items()},
-        _environment(data, found.turning),
+        {axis: _noise_json(floor.axes[axis], solution) for axis, solution in solved.solutions.items()},
+        _environment(data, solved.turning),
         residual,
         left_out_dps=_left_out_dps(fitted, data),
-        shapes=shapes_of(used, fitted, found.solutions),
-        joint=joint_findings(data, model, preset, found),
+        shapes=shapes_of(used, fitted, solved.solutions),
+        joint=joint_findings(data, model, preset, solved),
         mountings=mountings_of(data.channels),
-        angles_rad={axis: each.angles_rad for axis, each in found.nuisance.items() if each.angles_rad},
+        angles_rad={axis: each.angles_rad for axis, each in solved.nuisance.items() if each.angles_rad},
     )
 
 
 def _left_out_dps(fitted: FittedModel, data: FitData) -> dict[str, float]:
     """Return effect -> what it does to the data sets, root mean square deg/s, of the effects that are not exported."""
-    found = {}
+    by_effect = {}
     for term in fitted.model.terms:
         if not is_exported(term):
             rest = without(fitted, term.effect)
             channels = data.seen_by(fitted.model.argument)
             parts = {axis: fitted.error_dps(channels, axis) - rest.error_dps(channels, axis) for axis in data.outputs}
-            found[term.effect] = rms(parts) or 0.0
-    return found
+            by_effect[term.effect] = rms(parts) or 0.0
+    return by_effect
 
 
 def _with_shapes(model: ErrorModel, fits: Mapping[str, AxisFit], history: TemperatureHistory) -> ErrorModel:
@@ -280,18 +280,20 @@ def _noise_json(noise: AxisNoise, solution: Solution) -> AxisNoiseJson:
 def _environment(data: FitData, turning: Mapping[str, Array]) -> FitEnvironment:
     """Return which thermometer the fit went by and how the Earth's rate was treated, as JSON."""
     info = data.info
-    found: FitEnvironment = {}
+    environment_json: FitEnvironment = {}
     if is_chambers(data.channels.columns):
-        found["temperature"] = "the thermometer of the chamber, because the recording has no thermometer of the unit"
+        environment_json["temperature"] = (
+            "the thermometer of the chamber, because the recording has no thermometer of the unit"
+        )
     if info.latitude_deg is None:
-        return {**found, "earth_rate": "not subtracted: the latitude of the bench is not known"}
-    found |= {
+        return {**environment_json, "earth_rate": "not subtracted: the latitude of the bench is not known"}
+    environment_json |= {
         "earth_rate": "subtracted",
         "latitude_deg": info.latitude_deg,
         "along_table_axis_dps": up_rate_dps(info),
     }
     fitted = {a: np.hypot(c[0::2], c[1::2]).tolist() for a, c in turning.items() if len(c)}
     if fitted:
-        found["once_per_turn_dps"] = fitted
-        found["once_per_turn_expected_dps"] = turning_size_dps(info)
-    return found
+        environment_json["once_per_turn_dps"] = fitted
+        environment_json["once_per_turn_expected_dps"] = turning_size_dps(info)
+    return environment_json

@@ -162,13 +162,13 @@ SEEN = 0.01
 SMALLEST = 1e-12
 
 
-def joint_findings(data: FitData, model: ErrorModel, preset: Preset, found: AxisSolutions) -> JointJson | None:
-    """Return what several recordings say together; None for a single one. `found` is the fit to all of them."""
+def joint_findings(data: FitData, model: ErrorModel, preset: Preset, solutions: AxisSolutions) -> JointJson | None:
+    """Return what several recordings say together; None for a single one. `solutions` is the fit to all of them."""
     recordings = recordings_in(data.channels.columns)
     if len(recordings) < 2:
         return None
-    repeatability = {axis: _repeatability(data, axis, found) for axis in data.outputs}
-    agreement, not_compared = agreement_of(data, model, found.solutions)
+    repeatability = {axis: _repeatability(data, axis, solutions) for axis in data.outputs}
+    agreement, not_compared = agreement_of(data, model, solutions.solutions)
     held_out, pooled = _held_out(data, preset)
     return {
         "recordings": recordings,
@@ -181,9 +181,9 @@ def joint_findings(data: FitData, model: ErrorModel, preset: Preset, found: Axis
     }
 
 
-def _repeatability(data: FitData, axis: str, found: AxisSolutions) -> list[RepeatabilityJson]:
+def _repeatability(data: FitData, axis: str, solutions: AxisSolutions) -> list[RepeatabilityJson]:
     """Return the spread of each kind of shift of one axis, with the shifts themselves."""
-    shifts, solution = shifts_of(data.channels, axis), found.solutions[axis]
+    shifts, solution = shifts_of(data.channels, axis), solutions.solutions[axis]
     begin = len(solution.values) - len(shifts)
     u = np.sqrt(np.maximum(np.diag(solution.covariance)[begin:], 0.0))
     lines: list[RepeatabilityJson] = []

@@ -37,11 +37,11 @@ class TimeErrors:
 
     def parts(self, along: NDArray[np.float64]) -> tuple[ErrorPart, ...]:
         """Return the parts of a covariance; `along` (k, 1 + j) is the change of the coefficients by each."""
-        found = (
+        error_parts = (
             ErrorPart(TIME_COMMON_U_S.removesuffix("_u_s"), self.common_u_s, "s", along[:, :1]),
             ErrorPart(TIME_U_S.removesuffix("_u_s"), self.own_u_s, "s", along[:, 1:]),
         )
-        return tuple(part for part in found if part.u > 0)
+        return tuple(part for part in error_parts if part.u > 0)
 
 
 def time_errors(data: FitData, axis: str) -> TimeErrors | None:

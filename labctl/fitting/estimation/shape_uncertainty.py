@@ -56,13 +56,13 @@ def shapes_of(
         ))  # fmt: skip
         information += rows.T @ rows
     u_log = _u(information)
-    found: dict[str, dict[str, Coefficient]] = {}
+    by_axis: dict[str, dict[str, Coefficient]] = {}
     for each, u in zip(moved, u_log.tolist(), strict=True):
         value = each.term.parameters[each.name]
-        found.setdefault(each.term.effect, {})[each.name] = {
+        by_axis.setdefault(each.term.effect, {})[each.name] = {
             "value": value, "u": value * u if np.isfinite(u) else None, "unit": each.unit,
         }  # fmt: skip
-    return found
+    return by_axis
 
 
 def _slope_dps(data: FitData, fitted: FittedModel, axis: str, moved: _Moved) -> Array:
@@ -97,8 +97,8 @@ def _u(information: NDArray[np.float64]) -> Array:
     """Return standard uncertainties from an information matrix (k, k); infinite where it has none."""
     size = np.sqrt(np.maximum(np.diag(information), 0.0))
     seen = size > LEAST
-    found = np.full(len(size), np.inf)
+    u = np.full(len(size), np.inf)
     if seen.any():
         scaled = information[np.ix_(seen, seen)] / np.outer(size[seen], size[seen])
-        found[seen] = np.sqrt(np.maximum(np.diag(np.linalg.pinv(scaled, rcond=1e-10)), 0.0)) / size[seen]
-    return found
+        u[seen] = np.sqrt(np.maximum(np.diag(np.linalg.pinv(scaled, rcond=1e-10)), 0.0)) / size[seen]
+    return u

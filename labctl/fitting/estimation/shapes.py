@@ -60,9 +60,9 @@ def with_shapes(data: FitData, preset: Preset, *, all_of_them: bool = False) -> 
     return Preset(preset.name, build, preset.inner_only)
 
 
-def _with_structure(data: FitData, model: ErrorModel, found: Sequence[Term]) -> Sequence[Term]:
+def _with_structure(data: FitData, model: ErrorModel, thermal_terms: Sequence[Term]) -> Sequence[Term]:
     """Return terms in their best shapes with the heat flows of the lags among them that the recording shows."""
-    shaped = {term.effect: term for term in found}
+    shaped = {term.effect: term for term in thermal_terms}
     lags = [lag.effect for lag in lags_of(model) if lag.effect in shaped and lag.effect not in model.held.effects]
     flows: list[str] = []
     for effect in lags:

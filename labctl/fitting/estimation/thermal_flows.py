@@ -231,12 +231,12 @@ def best_taus(axes: Sequence[Axis], structure: Structure, seen: NDArray[np.bool_
     groups = [([axis], gain) for axis, gain in zip(axes, gains, strict=True)]
     if not structure.per_axis:
         groups = [(list(axes), np.sum(gains, axis=0))]
-    found: dict[str, Mapping[str, float]] = {}
+    tau_by_axis: dict[str, Mapping[str, float]] = {}
     for group, gain in groups:
         begin = np.log(GRID_S[places[int(np.argmax(gain))]])
         logarithms = refined(partial(moved_around, group, structure, seen), begin, LOG_BOUNDS, steps)
-        found |= {axis.name: structure.taus_s(logarithms) for axis in group}
-    return found
+        tau_by_axis |= {axis.name: structure.taus_s(logarithms) for axis in group}
+    return tau_by_axis
 
 
 def moved_around(
@@ -244,7 +244,7 @@ def moved_around(
 ) -> list[Local]:
     """Return what is left of each axis at logarithms of time constants, and what each of them moves."""
     taus_s = structure.taus_s(logarithms)
-    found = []
+    neighbours = []
     for axis in group:
         own = axis.columns(structure, taus_s)
         moved = [
@@ -252,8 +252,8 @@ def moved_around(
             for name in structure.constants
         ]
         rows = axis.over_noise(np.column_stack([axis.base, own, *moved, axis.y]), seen)
-        found.append(Local(rows, axis.base.shape[1], own.shape[1]))
-    return found
+        neighbours.append(Local(rows, axis.base.shape[1], own.shape[1]))
+    return neighbours
 
 
 def left_out_by(
@@ -265,21 +265,21 @@ def left_out_by(
 
 def errors_of(axes: Sequence[Axis], structure: Structure, stretches: Sequence[Stretch]) -> Errors:
     """Return the same, axis by axis and stretch by stretch."""
-    found = []
+    error_list = []
     for seen, tested in stretches:
         taus_s = best_taus(axes, structure, seen)
-        found += [
+        error_list += [
             (axis, tested, axis.errors(axis.columns(structure, taus_s[axis.name]), seen, tested)) for axis in axes
         ]
-    return found
+    return error_list
 
 
 def pooled(errors: Errors) -> LeftOut:
     """Return the errors of stretches together: of an axis, the data sets that were tested, and their errors, deg/s."""
     chi2 = 0.0
-    for axis, tested, found in errors:
+    for axis, tested, axis_errors in errors:
         whole = np.zeros(len(tested))
-        whole[tested] = found
+        whole[tested] = axis_errors
         chi2 += float(np.sum(axis.over_noise(whole[:, None], tested) ** 2))
-    every = np.concatenate([found for *_, found in errors])
+    every = np.concatenate([axis_errors for *_, axis_errors in errors])
     return LeftOut(float(np.sqrt(np.mean(every**2))), chi2, len(every))

@@ -71,18 +71,18 @@ def thermal_response(data: FitData, model: ErrorModel, term: Term) -> ThermalRes
     axes = [Axis(data, rest, axis, kind) for axis in data.outputs]
     tried = [structure for structure in STRUCTURES if structure.id != "per_axis" or len(axes) > 1]
     errors = {structure.id: errors_of(axes, structure, stretches) for structure in (NONE, *tried)}
-    held_out = {name: pooled(found) for name, found in errors.items()}
+    held_out = {name: pooled(axis_errors) for name, axis_errors in errors.items()}
     every = np.ones(len(data), dtype=bool)
-    chosen, found = _told_apart(axes, tried, held_out, every)
+    chosen, axis_errors = _told_apart(axes, tried, held_out, every)
     structures = dict.fromkeys((axis.name for axis in axes), chosen)
     if len(axes) > 1:
         own = [_of_axis(axis, errors, stretches, every) for axis in axes]
         held_out[BY_AXIS] = pooled([each for part in own for each in part.errors])
         if len({part.structure.id for part in own}) > 1 and held_out[BY_AXIS].is_below(held_out[chosen.id]):
             structures = {part.name: part.structure for part in own}
-            found = {part.name: part.taus_s for part in own}
+            axis_errors = {part.name: part.taus_s for part in own}
             chosen = _by_axis(structures)
-    return ThermalResponse(_term_of(axes, term, structures, found), chosen, held_out)
+    return ThermalResponse(_term_of(axes, term, structures, axis_errors), chosen, held_out)
 
 
 @dataclass(frozen=True)
@@ -109,8 +109,8 @@ def _of_axis(
         own[of_axis.id] = known if structure.per_axis else errors_of([axis], of_axis, stretches)
     held_out = {name: pooled(left) for name, left in own.items()}
     while True:
-        structure, found = _told_apart([axis], tried, held_out, every)
-        taus_s = found[axis.name]
+        structure, structure_errors = _told_apart([axis], tried, held_out, every)
+        taus_s = structure_errors[axis.name]
         if structure is tried[0] or _is_seen(axis, structure, taus_s, tried[0], every):
             return _OfAxis(axis.name, structure, taus_s, own[structure.id])
         tried.remove(structure)
@@ -146,9 +146,9 @@ def _told_apart(
     tried = list(structures)
     while True:
         chosen = _chosen(tried, held_out)
-        found = best_taus(axes, chosen, every, MOST_STEPS)
-        if are_told_apart(axes, chosen, found, every):
-            return chosen, found
+        taus = best_taus(axes, chosen, every, MOST_STEPS)
+        if are_told_apart(axes, chosen, taus, every):
+            return chosen, taus
         tried.remove(chosen)
 
 
@@ -161,16 +161,16 @@ def _chosen(tried: Sequence[Structure], held_out: Mapping[str, LeftOut]) -> Stru
     return chosen
 
 
-def are_told_apart(axes: Sequence[Axis], structure: Structure, found: Taus, seen: NDArray[np.bool_]) -> bool:
+def are_told_apart(axes: Sequence[Axis], structure: Structure, taus: Taus, seen: NDArray[np.bool_]) -> bool:
     """Return whether the two time constants of a structure are not one and the same.
 
     Those of two flows on each axis: nearer ones are one flow. Those of warming and cooling on one axis at least, beyond
     `TOLD_APART` standard uncertainties of their ratio.
     """
     if structure.two_ways:
-        return any(_ways_differ(axis, structure, found[axis.name], seen) for axis in axes)
+        return any(_ways_differ(axis, structure, taus[axis.name], seen) for axis in axes)
     least = GRID_S[APART] / GRID_S[0]
-    both = [(taus_s["tau"], taus_s["second_tau"]) for taus_s in found.values() if "second_tau" in taus_s]
+    both = [(taus_s["tau"], taus_s["second_tau"]) for taus_s in taus.values() if "second_tau" in taus_s]
     return all(max(pair) >= least * min(pair) for pair in both)
 
 
@@ -207,14 +207,14 @@ def stretches_of(data: FitData) -> list[tuple[NDArray[np.bool_], NDArray[np.bool
         others = {_rises(data, other) for other in whole if other is not part}
         pieces = np.array_split(np.flatnonzero(part), 1 if len(others) == 2 else 2)
         parts += [np.isin(np.arange(len(data)), piece) for piece in pieces]
-    found = []
+    stretches = []
     for part in parts:
         seen, warm = ~part, data.temperature_c
         low, high = float(warm[seen].min()) - BEYOND_K, float(warm[seen].max()) + BEYOND_K
         tested = part & (warm >= low) & (warm <= high)
         if tested.sum() >= LEAST_SETS:
-            found.append((seen, tested))
-    return found if len(found) > 1 else []
+            stretches.append((seen, tested))
+    return stretches if len(stretches) > 1 else []
 
 
 def _rises(data: FitData, leg: NDArray[np.bool_]) -> bool:
@@ -223,7 +223,7 @@ def _rises(data: FitData, leg: NDArray[np.bool_]) -> bool:
     return bool(np.mean(second) > np.mean(first))
 
 
-def _term_of(axes: Sequence[Axis], term: Term, structures: Mapping[str, Structure], found: Taus) -> Term:
+def _term_of(axes: Sequence[Axis], term: Term, structures: Mapping[str, Structure], taus: Taus) -> Term:
     """Return the term with the time constants of the axes' structures, those of each axis or of all."""
     named = {name: value for name, value in term.parameters.items() if not name.endswith("_s")}
     kept = {name: value for name, value in named.items() if not name.startswith("curved")}
@@ -232,7 +232,7 @@ def _term_of(axes: Sequence[Axis], term: Term, structures: Mapping[str, Structur
     apart = any(structure.per_axis for structure in structures.values()) and len(axes) > 1
     for axis in axes if apart else axes[:1]:
         of_axis = f"_{axis.name}" if apart else ""
-        kept |= {f"{name}{of_axis}_s": value for name, value in found[axis.name].items()}
+        kept |= {f"{name}{of_axis}_s": value for name, value in taus[axis.name].items()}
     return replace(term, parameters=kept)
 
 

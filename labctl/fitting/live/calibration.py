@@ -206,13 +206,13 @@ class LiveCalibration:
         try:
             readings = readings_of(recording)
             up = _up(readings)
-            found = self._rests(readings)
+            rests = self._rests(readings)
             why = ""
         except NotEnoughData as error:
-            found, why = _Rests(np.zeros((0, 3)), 0, 0.0), self._plain(error)
-        if not why and (len(found.up) != self._fitted[0] or finally_):
-            self._fitted = (len(found.up), *self._fit(recording))
-        return self._state(recording, found, why, up)
+            rests, why = _Rests(np.zeros((0, 3)), 0, 0.0), self._plain(error)
+        if not why and (len(rests.up) != self._fitted[0] or finally_):
+            self._fitted = (len(rests.up), *self._fit(recording))
+        return self._state(recording, rests, why, up)
 
     def _rests(self, readings: PoseReadings) -> _Rests:
         rests = find_rests(readings)
@@ -238,23 +238,23 @@ class LiveCalibration:
     def _plain(self, error: Exception) -> str:
         return str(error).removeprefix(f"{self.info.serial}: ")
 
-    def _state(self, recording: Recording, found: _Rests, why: str, up: tuple[float, float, float] | None) -> LiveState:
+    def _state(self, recording: Recording, rests: _Rests, why: str, up: tuple[float, float, float] | None) -> LiveState:
         target, (_, result, refused) = self.target, self._fitted
-        covers = covered(found.up)
+        covers = covered(rests.up)
         coefficients = () if result is None else tuple(coefficients_of(result, target))
         turns = 0 if result is None or result.poses is None else result.poses["moves"]["used"]
         absent = [each.name for each, has in zip(DIRECTIONS[: target.poses], covers, strict=False) if not has]
-        missing = [text for text in (_poses_text(absent, target), why or (refused if len(found.up) else "")) if text]
+        missing = [text for text in (_poses_text(absent, target), why or (refused if len(rests.up) else "")) if text]
         missing += [
             f"U of {each.name} of {each.axis} is {each.expanded:.2g}, above its limit of {each.limit:g} ({each.unit})"
             for each in coefficients
             if not each.is_met
         ]
-        request = PoseRequest(self._pose(found.up, covers, coefficients), target.rest_s) if missing else None
+        request = PoseRequest(self._pose(rests.up, covers, coefficients), target.rest_s) if missing else None
         t_s = recording.columns["t_s"]
         return LiveState(
             float(np.asarray(t_s, dtype=np.float64)[-1]) if len(t_s) else 0.0, len(recording), self._lost,
-            self._damaged, found.still_s, found.count,
+            self._damaged, rests.still_s, rests.count,
             tuple(each.name for each, has in zip(DIRECTIONS[: target.poses], covers, strict=False) if has),
             target.poses, coefficients, tuple(missing), request,
             turns_left(coefficients, turns), () if result is None else left_out_of(result), result, up,

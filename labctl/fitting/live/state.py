@@ -90,8 +90,10 @@ class LiveState:
 def coefficients_of(result: FitResult, target: Target) -> Iterator[LiveCoefficient]:
     """Yield the coefficients of a fit in poses, axis by axis, with U and its limit."""
     for axis in AXES:
-        found = result.fitted.axes[axis]
-        for name, value, u, unit in zip(found.names, found.values[:, 0], found.u[:, 0], found.units, strict=True):
+        axis_fit = result.fitted.axes[axis]
+        for name, value, u, unit in zip(
+            axis_fit.names, axis_fit.values[:, 0], axis_fit.u[:, 0], axis_fit.units, strict=True
+        ):
             limit = target.u if name.startswith(_LIMITED) else target.bias_dps if name == "bias" else None
             yield LiveCoefficient(axis, name, float(value), NORMAL_K * float(u), unit, limit)
 
@@ -106,12 +108,12 @@ def left_out_of(result: FitResult) -> tuple[str, ...]:
 
 def needs_of_fit(coefficients: tuple[LiveCoefficient, ...]) -> Array:
     """Return how much a turn about each axis would add, (3,): by the least certain coefficient that it tells."""
-    found = np.zeros(3)
+    missing = np.zeros(3)
     for each in coefficients:
         if each.name == "scale_factor" or each.name.startswith("misalignment"):
             column = AXES.index(each.axis) if each.name == "scale_factor" else "xyz".index(each.name[-1])
-            found[column] = max(found[column], each.expanded / (each.limit or 1.0))
-    return found
+            missing[column] = max(missing[column], each.expanded / (each.limit or 1.0))
+    return missing
 
 
 def turns_left(coefficients: tuple[LiveCoefficient, ...], turns: int) -> int | None:

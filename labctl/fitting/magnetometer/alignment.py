@@ -68,13 +68,13 @@ class _Seen:
 
 
 def align_field(
-    readings: PoseReadings, solved: Solved, field_ut: NDArray[np.float64], found: Magnetometer
+    readings: PoseReadings, solved: Solved, field_ut: NDArray[np.float64], magnetometer: Magnetometer
 ) -> FieldAlignment:
     """Return the alignment by a calibration by hand, and by the magnetometer's readings (n, 3), uT, with theirs.
 
     Raises NotEnoughData where rests and turns do not determine it.
     """
-    seen = _seen(readings, solved, field_ut, found)
+    seen = _seen(readings, solved, field_ut, magnetometer)
     turn = _start(seen)
     dip = float(np.mean(np.sum(solved.accelerometer.up * (seen.direction @ turn.T), axis=1)))
     change, place, extra = np.inf, 0.0, 0.0
@@ -107,15 +107,15 @@ def align_field(
     return result
 
 
-def _seen(readings: PoseReadings, solved: Solved, field_ut: NDArray[np.float64], found: Magnetometer) -> _Seen:
+def _seen(readings: PoseReadings, solved: Solved, field_ut: NDArray[np.float64], magnetometer: Magnetometer) -> _Seen:
     rests = solved.rests
     means = np.array([field_ut[a:b].mean(axis=0) for a, b in zip(rests.begin, rests.end, strict=True)])
     variance = density_in_rests(field_ut, rests, readings.spacing_s) / rests.duration_s[:, None]
-    away = means - found.hard_iron_ut
-    field = away @ found.soft_iron
+    away = means - magnetometer.hard_iron_ut
+    field = away @ magnetometer.soft_iron
     direction = unit(field)
     across = (np.eye(3) - direction[:, :, None] * direction[:, None, :]) / np.linalg.norm(field, axis=1)[:, None, None]
-    by_reading = across @ found.soft_iron
+    by_reading = across @ magnetometer.soft_iron
     columns = [-by_reading]
     for i, j in PLACES:
         change = np.zeros_like(away)
@@ -125,7 +125,7 @@ def _seen(readings: PoseReadings, solved: Solved, field_ut: NDArray[np.float64],
         columns.append(np.einsum("kab,kb->ka", across, change)[:, :, None])
     noise = np.einsum("kai,ki,kbi->kab", by_reading, variance, by_reading)
     return _Seen(
-        solved, direction, noise, np.concatenate(columns, axis=2), found.covariance[:9, :9],
+        solved, direction, noise, np.concatenate(columns, axis=2), magnetometer.covariance[:9, :9],
         of_readings(solved.moves.take(solved.gyro.used), solved.bias),
     )  # fmt: skip
 

@@ -48,8 +48,8 @@ class Held:
 
     def of(self, axis: str, effect: str, name: str) -> HeldCoefficient | None:
         """Return a held coefficient; None for one that is estimated."""
-        found = self.axes.get(axis, {}).get(name)
-        return found if found is not None and found.effect == effect else None
+        held_coefficient = self.axes.get(axis, {}).get(name)
+        return held_coefficient if held_coefficient is not None and held_coefficient.effect == effect else None
 
     @property
     def effects(self) -> frozenset[str]:

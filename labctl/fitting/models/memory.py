@@ -237,28 +237,28 @@ class RunningMemory:
 
         A sample that is no number moves nothing.
         """
-        found = np.empty((len(t_s), self._sizes.shape[1]))
+        errors_dps = np.empty((len(t_s), self._sizes.shape[1]))
         for begin in range(0, len(t_s), BLOCK):
             block = slice(begin, begin + BLOCK)
-            self._block(t_s[block], temperature_c[block], found[block])
-        if found.shape[1] == self._axes:
-            return Remembered(found)
-        return Remembered(found[:, : self._axes], found[:, self._axes :])
+            self._block(t_s[block], temperature_c[block], errors_dps[block])
+        if errors_dps.shape[1] == self._axes:
+            return Remembered(errors_dps)
+        return Remembered(errors_dps[:, : self._axes], errors_dps[:, self._axes :])
 
-    def _block(self, t_s: Array, warm: Array, found: Array) -> None:
-        """Write the errors of some samples into `found`."""
+    def _block(self, t_s: Array, warm: Array, errors: Array) -> None:
+        """Write the errors of some samples into `errors`."""
         known = np.isfinite(t_s)
         known &= np.isfinite(warm)
         if known.all():
-            self._known_block(t_s, warm, found)
+            self._known_block(t_s, warm, errors)
             return
-        found[:] = np.nan
+        errors[:] = np.nan
         if known.any():
-            of_known = np.empty((int(known.sum()), found.shape[1]))
+            of_known = np.empty((int(known.sum()), errors.shape[1]))
             self._known_block(t_s[known], warm[known], of_known)
-            found[known] = of_known
+            errors[known] = of_known
 
-    def _known_block(self, t_s: Array, warm: Array, found: Array) -> None:
+    def _known_block(self, t_s: Array, warm: Array, errors: Array) -> None:
         if self._last is None:
             self.start(MemoryState(float(t_s[0]), float(warm[0]), (float(warm[0]),) * len(self._followers)))
         assert self._last is not None
@@ -274,9 +274,9 @@ class RunningMemory:
         ends = tuple(float(moved[each.movement][-1]) for each in self._followers)
         self._last = float(t_s[-1]), float(warm[-1]), ends
         if self._sizes.shape == (1, 1):  # a product of matrices would cost as much as the state
-            np.multiply(rows[0], self._sizes[0, 0], out=found[:, 0])
+            np.multiply(rows[0], self._sizes[0, 0], out=errors[:, 0])
         else:
-            np.matmul(np.array(rows).T, self._sizes, out=found)
+            np.matmul(np.array(rows).T, self._sizes, out=errors)
 
 
 def check_order(running: RunningMemory, t_s: Array) -> None:

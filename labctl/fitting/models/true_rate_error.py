@@ -25,9 +25,9 @@ def errors_at_true_rates(fitted: FittedModel, here: Channels) -> dict[str, Array
     fastest = max(float(np.max(np.abs(rate), initial=0.0)) for rate in here.rates.values())
     for _ in range(ROUNDS):
         seen = here.with_rates({**here.rates, **{axis: here.rates[axis] + errors[axis] for axis in errors}})
-        found = {axis: fitted.error_dps(seen, axis) for axis in errors}
-        change = max(float(np.max(np.abs(found[axis] - errors[axis]), initial=0.0)) for axis in errors)
-        errors = found
+        error_at_rate = {axis: fitted.error_dps(seen, axis) for axis in errors}
+        change = max(float(np.max(np.abs(error_at_rate[axis] - errors[axis]), initial=0.0)) for axis in errors)
+        errors = error_at_rate
         if change < CLOSE_DPS * max(1.0, fastest):
             return errors
     raise NotConverged(

@@ -292,8 +292,8 @@ class _Octaves:
         likeliest = likeliest_correlation(self.variance, self.tau, self.m, self.phases)
         later = (self.fit(k) for k in range(1, len(self.m) - LEAST_OCTAVES + 1))
         rivals = itertools.chain([self.fit(0, likeliest)], later)
-        found = (fit for fit in rivals if _shows_white(fit, PREVAILING_OCTAVES) and self._explained_before(fit))
-        return next(found, whole)
+        explained = (fit for fit in rivals if _shows_white(fit, PREVAILING_OCTAVES) and self._explained_before(fit))
+        return next(explained, whole)
 
     def _explained_before(self, fit: _Fitted) -> bool:
         before = slice(len(self.tau) - len(fit.tau) + 1)

@@ -149,7 +149,7 @@ def _fewest(design: NDArray[np.float64], variance: Array, freedom: Array, *, qua
         _pruned(design, variance, freedom, sorted([*every, first]))
         for first in ((QUANTIZATION, SMOOTHED) if quantized else (SMOOTHED,))
     ]
-    return min(rivals, key=lambda found: found[1])[0]
+    return min(rivals, key=lambda candidate: candidate[1])[0]
 
 
 def _pruned(design: NDArray[np.float64], variance: Array, freedom: Array, kept: list[int]) -> tuple[Array, float]:
@@ -173,10 +173,10 @@ def _fit(design: NDArray[np.float64], variance: Array, freedom: Array, kept: lis
         weight = np.sqrt(freedom / 2) / model
         columns = design[:, kept] * weight[:, None]
         size = np.linalg.norm(columns, axis=0)
-        found = nonnegative_least_squares(columns / size, variance * weight)
+        coefficients = nonnegative_least_squares(columns / size, variance * weight)
         before = model
-        model = np.maximum(design[:, kept] @ (found / size), 1e-12 * variance)
-        terms[kept] = found / size
+        model = np.maximum(design[:, kept] @ (coefficients / size), 1e-12 * variance)
+        terms[kept] = coefficients / size
         if np.all(np.abs(model - before) <= CONVERGED_VAR + CONVERGED * before):
             break
     ratio = variance / model

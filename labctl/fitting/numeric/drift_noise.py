@@ -89,22 +89,22 @@ def _expected_of_one(
     band[1, :-1] = -own[0, 1:]
     pull = np.zeros_like(ordered, order="F")
     pull[1:] = before[0, 1:, None] * ordered[:-1]
-    found, _ = dtbtrs(band, pull, uplo="L", diag="U", overwrite_b=True)
-    return np.asarray(found)[None]
+    expected, _ = dtbtrs(band, pull, uplo="L", diag="U", overwrite_b=True)
+    return np.asarray(expected)[None]
 
 
 def _expected_of_many(
     ordered: NDArray[np.float64], before: NDArray[np.float64], own: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return the same for many drifts, (drifts, m, k), row by row for all of them at once."""
-    found = np.empty((len(ordered), len(before), ordered.shape[1]))
-    found[0] = 0.0
-    np.multiply(before.T[1:, :, None], ordered[:-1, None, :], out=found[1:])
-    pull = np.empty(found.shape[1:])
-    for row, last, share in zip(found[1:], found[:-1], own.T[1:, :, None], strict=True):
+    expected = np.empty((len(ordered), len(before), ordered.shape[1]))
+    expected[0] = 0.0
+    np.multiply(before.T[1:, :, None], ordered[:-1, None, :], out=expected[1:])
+    pull = np.empty(expected.shape[1:])
+    for row, last, share in zip(expected[1:], expected[:-1], own.T[1:, :, None], strict=True):
         np.multiply(share, last, out=pull)
         np.add(row, pull, out=row)
-    return np.ascontiguousarray(found.transpose(1, 0, 2))
+    return np.ascontiguousarray(expected.transpose(1, 0, 2))
 
 
 def _filter(

@@ -90,21 +90,21 @@ class Steps:
         """
         start_k = behind_k
         cools = self.now_c < float(self.now_c[0] + self.fall_k[0]) + behind_k
-        found = np.empty_like(self.now_c)
+        lag_k = np.empty_like(self.now_c)
         begin = 0
         while True:
             rest = slice(begin, None)
-            found[rest] = self._two_ways(warming_s, cooling_s, cools, begin, start_k)
+            lag_k[rest] = self._two_ways(warming_s, cooling_s, cools, begin, start_k)
             cooled = np.empty_like(cools[rest])
             cooled[0] = start_k + self.fall_k[begin] > 0
-            np.greater(found[begin:-1] + self.fall_k[begin + 1 :], 0.0, out=cooled[1:])
+            np.greater(lag_k[begin:-1] + self.fall_k[begin + 1 :], 0.0, out=cooled[1:])
             changed = cooled != cools[rest]
             first = int(np.argmax(changed))
             if not changed[first]:
-                return found
+                return lag_k
             cools[rest] = cooled
             begin += first
-            start_k = behind_k if begin == 0 else float(found[begin - 1])
+            start_k = behind_k if begin == 0 else float(lag_k[begin - 1])
 
     def _two_ways(
         self, warming_s: float, cooling_s: float, cools: NDArray[np.bool_], begin: int, behind_k: float
@@ -142,18 +142,18 @@ class Steps:
 
 def _changes(values: Array, last: float) -> Array:
     """Return by how much each value, (n,), is more than the one before it, the first of them `last`."""
-    found = np.empty_like(values)
-    found[0] = values[0] - last
-    np.subtract(values[1:], values[:-1], out=found[1:])
-    return found
+    changes = np.empty_like(values)
+    changes[0] = values[0] - last
+    np.subtract(values[1:], values[:-1], out=changes[1:])
+    return changes
 
 
 def _falls(values: Array, last: float) -> Array:
     """Return by how much each value, (n,), is less than the one before it, the first of them `last`."""
-    found = np.empty_like(values)
-    found[0] = last - values[0]
-    np.subtract(values[:-1], values[1:], out=found[1:])
-    return found
+    falls = np.empty_like(values)
+    falls[0] = last - values[0]
+    np.subtract(values[:-1], values[1:], out=falls[1:])
+    return falls
 
 
 @lru_cache(maxsize=2)
@@ -174,12 +174,12 @@ def _means(ratios: Array) -> Array:
     terms = [1.0, -1.0 / 2]
     while abs(following := -terms[-1] / (len(terms) + 1)) * longest ** len(terms) > NEGLIGIBLE:
         terms.append(following)
-    found = ratios * terms[-1]
+    means = ratios * terms[-1]
     for term in terms[-2:0:-1]:
-        found += term
-        found *= ratios
-    found += 1.0
-    return found
+        means += term
+        means *= ratios
+    means += 1.0
+    return means
 
 
 def _decayed(ratios: Array, exponents: Array, pull: Array, start: float) -> Array:
@@ -192,9 +192,9 @@ def _decayed(ratios: Array, exponents: Array, pull: Array, start: float) -> Arra
         return _one_by_one(np.exp(-ratios), pull, start)
     weights = np.exp(exponents, out=exponents)
     pull *= weights
-    found = _decaying_sum(1.0, pull, start)
-    found /= weights
-    return found
+    decayed = _decaying_sum(1.0, pull, start)
+    decayed /= weights
+    return decayed
 
 
 def _decaying_sum(keep: float, values: Array, start: float) -> Array:
@@ -207,8 +207,8 @@ def _decaying_sum(keep: float, values: Array, start: float) -> Array:
     if n < FEW:
         return _one_by_one(keep, values, start)
     within, whole_lane = _lane(keep)
-    found = np.empty(n)
-    lanes = found[:whole].reshape(-1, LANE)
+    sums = np.empty(n)
+    lanes = sums[:whole].reshape(-1, LANE)
     given = values[:whole].reshape(-1, LANE)
     given[0, 0] += keep * start
     ends = _decaying_sum(whole_lane, given[:-1] @ within[:, -1], 0.0)
@@ -216,8 +216,8 @@ def _decaying_sum(keep: float, values: Array, start: float) -> Array:
     for begin in range(0, len(lanes), LANES):
         np.matmul(given[begin : begin + LANES], within, out=lanes[begin : begin + LANES])
     if whole < n:
-        found[whole:] = _one_by_one(keep, values[whole:], float(found[whole - 1]))
-    return found
+        sums[whole:] = _one_by_one(keep, values[whole:], float(sums[whole - 1]))
+    return sums
 
 
 @lru_cache(maxsize=16)

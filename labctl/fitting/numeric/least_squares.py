@@ -143,12 +143,12 @@ def solve(
     fits = _at(whole, y, scatter, [drift]) if drift is not None else _over_grid(whole, y, scatter)
     # the triangle of the first columns is that of a fit of them alone
     fits = replace(fits, r=fits.r[:, :k, :k], projected=fits.projected[:, :k])
-    found = _collect(fits, design, y, scatter)
+    solution = _collect(fits, design, y, scatter)
     if random is not None:
-        found = _with_random_effects(found, fits, design, y, random)
+        solution = _with_random_effects(solution, fits, design, y, random)
     if considered is None:
-        return found
-    return replace(found, along_held=_along(fits, design, scatter, considered.columns, _tightened(found, random)))
+        return solution
+    return replace(solution, along_held=_along(fits, design, scatter, considered.columns, _tightened(solution, random)))
 
 
 def drift_beside(columns: NDArray[np.float64], y: Array, scatter: Scatter) -> Drift:
@@ -240,7 +240,7 @@ def _collect(fits: _Fits, design: NDArray[np.float64], y: Array, scatter: Scatte
 
 
 def _with_random_effects(
-    found: Solution, fits: _Fits, design: NDArray[np.float64], y: Array, random: RandomEffects
+    solution: Solution, fits: _Fits, design: NDArray[np.float64], y: Array, random: RandomEffects
 ) -> Solution:
     """Return a solution averaged also over the spread of the random effects, which so far is that of wide priors."""
     counting = np.flatnonzero(~(fits.weights() < NEGLIGIBLE_NOISE))
@@ -248,7 +248,7 @@ def _with_random_effects(
         Triangles(fits.r[counting], fits.projected[counting], fits.scale[counting], fits.log_evidence[counting]), random
     )
     return replace(
-        found,
+        solution,
         values=mixed.values,
         covariance=mixed.covariance,
         residual=y - design @ mixed.values,
@@ -256,11 +256,11 @@ def _with_random_effects(
     )
 
 
-def _tightened(found: Solution, random: RandomEffects | None) -> Array:
+def _tightened(solution: Solution, random: RandomEffects | None) -> Array:
     """Return what the found spread of each random effect adds to the root of its prior's precision, (q,)."""
     if random is None:
         return np.zeros(0)
-    spread = np.maximum(np.array([component.value for component in found.components])[random.kind], LEAST_SPREAD)
+    spread = np.maximum(np.array([component.value for component in solution.components])[random.kind], LEAST_SPREAD)
     return np.asarray(np.sqrt(np.maximum(spread**-2.0 - random.wide**-2.0, 0.0)))
 
 
@@ -274,11 +274,11 @@ def _along(
     below[:, k - q : k] = np.diag(tightened)
     weights = fits.weights()
     counting = np.flatnonzero(~(weights < NEGLIGIBLE_NOISE))
-    found = np.zeros((k, columns.shape[1]))
+    projected = np.zeros((k, columns.shape[1]))
     for point, share in zip(counting.tolist(), weights[counting] / weights[counting].sum(), strict=True):
         rows = drift_noise.whitened(scatter, [fits.drifts[point]], white, np.column_stack([design, columns]))[0][0]
         rows = np.vstack([rows, below])
         size = np.maximum(np.linalg.norm(rows[:, :k], axis=0), 1e-300)
         taken, *_ = np.linalg.lstsq(rows[:, :k] / size, rows[:, k:], rcond=1e-12)
-        found -= share * taken / size[:, None]
-    return found
+        projected -= share * taken / size[:, None]
+    return projected

@@ -14,26 +14,26 @@ def nonnegative_least_squares(columns: NDArray[np.float64], y: Array) -> Array:
     By active sets (Lawson and Hanson 1974, chapter 23). SciPy's takes longer to import than this takes altogether.
     """
     gram, inner = columns.T @ columns, columns.T @ y
-    found, kept = np.zeros(len(inner)), np.zeros(len(inner), dtype=np.bool_)
+    solution, kept = np.zeros(len(inner)), np.zeros(len(inner), dtype=np.bool_)
     tolerance = 10 * max(columns.shape) * np.finfo(np.float64).eps * float(np.abs(columns).sum(axis=0).max())
     for _ in range(3 * len(inner)):
-        slope = np.where(kept, -np.inf, inner - gram @ found)
+        slope = np.where(kept, -np.inf, inner - gram @ solution)
         if not slope.max() > tolerance:
             break
         kept[np.argmax(slope)] = True
-        found = _feasible(gram, inner, found, kept)
-    return found
+        solution = _feasible(gram, inner, solution, kept)
+    return solution
 
 
-def _feasible(gram: NDArray[np.float64], inner: Array, found: Array, kept: NDArray[np.bool_]) -> Array:
+def _feasible(gram: NDArray[np.float64], inner: Array, solution: Array, kept: NDArray[np.bool_]) -> Array:
     """Return the solution of the columns that are kept, after leaving out of `kept` those it makes negative."""
     while True:
-        wanted = np.zeros(len(found))
+        wanted = np.zeros(len(solution))
         wanted[kept] = np.linalg.solve(gram[kept][:, kept], inner[kept])
         negative = kept & (wanted <= 0)
         if not negative.any():
             return wanted
-        share = found[negative] / (found[negative] - wanted[negative])
-        found = found + share.min() * (wanted - found)
+        share = solution[negative] / (solution[negative] - wanted[negative])
+        solution = solution + share.min() * (wanted - solution)
         kept[np.flatnonzero(negative)[share <= share.min()]] = False
-        found = np.where(kept, found, 0.0)
+        solution = np.where(kept, solution, 0.0)

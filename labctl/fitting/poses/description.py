@@ -103,9 +103,9 @@ def alignment_json(alignment: Alignment) -> AlignmentJson:
     }
 
 
-def alignment_text(found: AlignmentJson) -> str:
+def alignment_text(alignment: AlignmentJson) -> str:
     """Return an alignment in one sentence, with U = 2 u."""
-    angles = ", ".join(f"{each['value']:.3f} +- {2 * each['u']:.3f}" for each in found["axes"].values())
+    angles = ", ".join(f"{each['value']:.3f} +- {2 * each['u']:.3f}" for each in alignment["axes"].values())
     return f"Gyro triad turned from the accelerometer triad about x, y, z by {angles} deg (U, k = 2)."
 
 

@@ -49,13 +49,13 @@ def move_errors(recording: Recording, correct: Correct) -> MoveErrors:
     moves = every.take(every.usable)
     before, there = accelerometer.up[moves.before], accelerometer.up[moves.before + 1]
     seen = gravity_at_end(moves, accelerometer)
-    found = _square_to(there, seen - there)
+    error_across = _square_to(there, seen - there)
     # a small rotation by r turns gravity by r x up, so r = up x what gravity is off by
-    about = np.asarray(np.cross(there, np.einsum("mc,mca->ma", found, tangents(there))), dtype=np.float64)
+    about = np.asarray(np.cross(there, np.einsum("mc,mca->ma", error_across, tangents(there))), dtype=np.float64)
     counted = np.concatenate([[0], np.cumsum(outside)])
     within = np.searchsorted(readings.t_s, moves.t_s)
     return MoveErrors(
-        per_second(found, moves.duration_s),
+        per_second(error_across, moves.duration_s),
         per_second(about, moves.duration_s),
         moves.t_s,
         angle_between_deg(before, there),

@@ -131,7 +131,7 @@ def _axes(bias: Bias, gyro: Gyroscope) -> dict[str, AxisFit]:
 
     They are not quite: a bias also enters the moves beside it. What that makes of the matrix is in its covariance.
     """
-    found = {}
+    axis_fits = {}
     for i, axis in enumerate(AXES):
         others = [j for j in range(3) if j != i]
         solution, order = bias.solutions[i], [0, 1 + i, *(1 + j for j in others)]
@@ -143,8 +143,8 @@ def _axes(bias: Bias, gyro: Gyroscope) -> dict[str, AxisFit]:
         whole[0, 4:] = whole[4:, 0] = rest[0, 1:]
         matrix_names = ("scale_factor", *(f"misalignment_{AXES[j]}" for j in others))
         names = ("bias", *matrix_names, "g_own", *(f"g_{AXES[j]}" for j in others))
-        found[str(axis)] = AxisFit(EFFECTS, names, UNITS, values[:, None], whole)
-    return found
+        axis_fits[str(axis)] = AxisFit(EFFECTS, names, UNITS, values[:, None], whole)
+    return axis_fits
 
 
 def _between(rest: Array, row: Array) -> Array:

@@ -107,10 +107,10 @@ class _Noises:
         of gravity the moves tell too, with 2m - 9. By the sizes alone an estimate that came out large stays in every
         equation while one that came out small is made up for by the second variance: on average that is too much.
         """
-        found = self.accelerometer
-        k = int(np.count_nonzero(found.used))
+        accelerometer = self.accelerometer
+        k = int(np.count_nonzero(accelerometer.used))
         freedom = k - PARAMETERS
-        white, scatter = float(self.white_g2[found.used].mean()), found.residual_g**2 * k
+        white, scatter = float(self.white_g2[accelerometer.used].mean()), accelerometer.residual_g**2 * k
         typical = float(self.white_g2.mean())
 
         def sizes(pose_g2: float) -> float:

@@ -82,11 +82,11 @@ def readings_of(recording: Recording) -> PoseReadings:
 
 
 def _breaks(recording: Recording, valid: NDArray[np.bool_], t_s: Array) -> NDArray[np.bool_]:
-    found = np.zeros(len(t_s), dtype=np.bool_)
+    is_break = np.zeros(len(t_s), dtype=np.bool_)
     steps = np.diff(t_s)
-    found[1:] = steps > GAP * float(np.median(steps))
+    is_break[1:] = steps > GAP * float(np.median(steps))
     for name in ("run", "mounting"):
         if name in recording.columns:
             values = np.asarray(recording.columns[name])[valid]
-            found[1:] |= values[1:] != values[:-1]
-    return found
+            is_break[1:] |= values[1:] != values[:-1]
+    return is_break

@@ -94,10 +94,10 @@ def _coarse(true: NDArray[np.float64], step_s: NDArray[np.float64], every: int) 
     kept[rows, np.searchsorted(keep, last)] = true[rows, last]
     vectors, _ = _steps(kept, longer_s)
     steps = _matrices(vectors)
-    found = np.broadcast_to(np.eye(3), (len(true), 3, 3)).copy()
+    rotation = np.broadcast_to(np.eye(3), (len(true), 3, 3)).copy()
     for k in range(vectors.shape[1]):
-        found = found @ steps[:, k]
-    return found
+        rotation = rotation @ steps[:, k]
+    return rotation
 
 
 def _angle_between(first: NDArray[np.float64], second: NDArray[np.float64]) -> Array:

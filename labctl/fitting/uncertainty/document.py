@@ -61,7 +61,10 @@ def uncertainty_json(
         vectors = vector_bounds(fitted, reach, warm, evidence=evidence, name=name, bench=bench)
     except (BadInput, NotEnoughData):
         return None
-    axes = {axis: _bound([(r, t, found[axis]) for r, t, found in places], coefficients[axis]) for axis in fitted.axes}
+    axes = {
+        axis: _bound([(r, t, uncertainty[axis]) for r, t, uncertainty in places], coefficients[axis])
+        for axis in fitted.axes
+    }
     for axis, bound in axes.items():
         bound["vector"], bound["cross_rates"] = vectors[axis], cross_rates(fitted, coefficients[axis])
     unstated = [source for one in axes.values() for source in one["budget"]["not_stated"]]
@@ -77,13 +80,13 @@ def uncertainty_json(
 def _bound(places: list[tuple[float, float, RateUncertainty]], coefficients: Mapping[str, Budget]) -> AxisBoundJson:
     """Return the place with the largest U; where it is unknown somewhere, the first such place and why."""
     unknown = next((place for place in places if place[2].expanded_dps is None), None)
-    rate, warm, found = unknown or max(places, key=lambda place: place[2].expanded_dps or 0.0)
+    rate, warm, bound = unknown or max(places, key=lambda place: place[2].expanded_dps or 0.0)
     return {
-        "bound_dps": found.expanded_dps,
+        "bound_dps": bound.expanded_dps,
         "rate_dps": rate,
         "temperature_c": warm,
-        "why": "; ".join(f"{part}: {why}" for part, why in found.unknown.items()),
-        "budget": found.budget.to_json(),
+        "why": "; ".join(f"{part}: {why}" for part, why in bound.unknown.items()),
+        "budget": bound.budget.to_json(),
         "coefficients": {name: _expanded(one) for name, one in coefficients.items()},
     }
 

@@ -41,12 +41,12 @@ def slope_error(left: LocalModelError, temperature_c: float, across: str | None 
     weight = near_weights(left.warmth_away(temperature_c)[known])
     root, size = np.sqrt(weight / weight.sum()), np.maximum(squares.max(axis=0), np.finfo(float).tiny)
     beyond = left.left_var[known] - left.white_var[known]
-    found = nnls(root[:, None] * (squares / size), root * beyond)[0] / size
+    slope_variance = nnls(root[:, None] * (squares / size), root * beyond)[0] / size
     column = 1 if across is None else 2 + list(left.across_dps or {}).index(across)
     turned = weight * (squares[:, column] > 0)
-    noise = float(weight @ left.white_var[known] / weight.sum()) + found[0]
+    noise = float(weight @ left.white_var[known] / weight.sum()) + slope_variance[0]
     unseen = LEAST_SHARE * np.sqrt(2 / effective_number(turned)) * noise * turned.sum() / (turned @ squares[:, column])
-    return float(np.sqrt(max(found[column], unseen)))
+    return float(np.sqrt(max(slope_variance[column], unseen)))
 
 
 def slope_unknown(left: LocalModelError, temperature_c: float, across: str | None = None) -> str | None:

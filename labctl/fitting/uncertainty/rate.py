@@ -50,11 +50,11 @@ def rate_uncertainty(
     It is that of `rate_vector_uncertainty` where the unit turns about the axis of the output alone; where it turns
     about others, U is larger. Arguments and errors raised are the same.
     """
-    found = {}
+    by_axis = {}
     for axis in fitted.axes:
         at = rate_vector_uncertainty(fitted, {axis: rate_dps}, temperature_c, evidence=evidence, name=name, bench=bench)
-        found[axis] = of_budget(at.budgets[axis], evidence.get(axis))
-    return found
+        by_axis[axis] = of_budget(at.budgets[axis], evidence.get(axis))
+    return by_axis
 
 
 def of_budget(budget: Budget, evidence: AxisEvidence | None) -> RateUncertainty:

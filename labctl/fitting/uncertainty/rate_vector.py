@@ -161,13 +161,13 @@ class _Place:
         ]
         model = [model_line(fitted, axis, evidence.get(axis), self.rates_dps, warm) for axis in self.outputs]
         later = [repeatability_line(fitted, evidence.get(axis)) for axis in self.outputs]
-        found = [
+        evaluations = [
             _propagated(coefficients, related, self.gain),
             _propagated(model, related, alone),
             _propagated(later, alone, alone),
         ]
         unread = [axis for axis in BODY_AXES if axis not in self.outputs and self.rates_dps[axis]]
-        return [*found, self._cross_rates(unread)] if unread else found
+        return [*evaluations, self._cross_rates(unread)] if unread else evaluations
 
     def of_time(self, bench: BenchConditions | None) -> list[SourceLines]:
         """Return the lines of the time of a reference rate that changed."""
@@ -215,7 +215,7 @@ class _Place:
         `aligned` is without what a rotation of the frame takes off: of two outputs the mean of both parts is left, and
         of the part about an axis without output nothing. What the mountings with one axis up separate is not in it.
         """
-        found: dict[str, list[Array]] = {quantity: [] for quantity in ANGLE_QUANTITIES}
+        columns_by_quantity: dict[str, list[Array]] = {quantity: [] for quantity in ANGLE_QUANTITIES}
         gains = {axis: AngleGains() if bench is None else bench.angle_gains(axis) for axis in BODY_AXES}
         for up, towards in permutations(BODY_AXES, 2):
             each = np.zeros(len(self.outputs))
@@ -226,9 +226,9 @@ class _Place:
             elif up in self.outputs:
                 each[self.outputs.index(towards)] = self.rates_dps[up] / 2
                 each[self.outputs.index(up)] = self.rates_dps[towards] / 2
-            for quantity, columns in found.items():
+            for quantity, columns in columns_by_quantity.items():
                 columns.append(each * gains[up].of(quantity))
-        return {quantity: np.column_stack(columns) for quantity, columns in found.items()}
+        return {quantity: np.column_stack(columns) for quantity, columns in columns_by_quantity.items()}
 
 
 def _budget(sources: Sequence[SourceLines], row: int) -> Budget:
@@ -249,13 +249,13 @@ def _correlation(outputs: Sequence[str], evidence: Mapping[str, AxisEvidence]) -
     Outputs that were measured together have the same noise and drift in the same data sets, so that their coefficients
     are correlated as these are.
     """
-    found = np.eye(len(outputs))
+    matrix = np.eye(len(outputs))
     for row, axis in enumerate(outputs):
         if axis in evidence:
             for other, value in evidence[axis].correlation.items():
                 if other in outputs:
-                    found[row, outputs.index(other)] = value
-    return found
+                    matrix[row, outputs.index(other)] = value
+    return matrix
 
 
 def _propagated(lines: Sequence[BudgetLine], correlation: Array, gain: Array) -> SourceLines:
@@ -263,8 +263,8 @@ def _propagated(lines: Sequence[BudgetLine], correlation: Array, gain: Array) ->
     u = np.array([np.nan if line.u is None else line.u for line in lines])
     known = np.nan_to_num(u)
     covariance = gain @ (np.outer(known, known) * correlation) @ gain.T
-    found = tuple(
+    propagated = tuple(
         line if line.u is None else replace(line, u=float(s), contribution=float(s))
         for line, s in zip(lines, np.sqrt(np.maximum(np.diag(covariance), 0.0)), strict=True)
     )
-    return SourceLines(found, covariance)
+    return SourceLines(propagated, covariance)

@@ -153,10 +153,10 @@ def _sensitivity(standard: Standard, bench: BenchConditions, s: Sensitivities) -
         return np.zeros_like(s.relative_rate), IN_COEFFICIENTS
     if standard.quantity in ANGLE_QUANTITIES and (why := _why_less(standard.quantity, bench)):
         return _SENSITIVITY[standard.quantity, standard.unit_name](s, bench), why
-    found = _SENSITIVITY[standard.quantity, standard.unit_name](s, bench)
-    if found is None:
+    sensitivity = _SENSITIVITY[standard.quantity, standard.unit_name](s, bench)
+    if sensitivity is None:
         return None, NO_SENSITIVITY if standard.quantity == "supply" else NO_LATITUDE
-    return found, ""
+    return sensitivity, ""
 
 
 def _why_less(quantity: str, bench: BenchConditions) -> str:

@@ -44,13 +44,13 @@ def left_variance(data: FitData, preset: Preset) -> dict[str, Array]:
     Raises NotEnoughData where the data sets do not determine the model.
     """
     model, rows = preset.build(data)
-    found = solve_axes(data.take(rows), model)
-    inside = residuals(FittedModel(model, found.fits), data, found.nuisance)
-    data = leaning(data, found.nuisance)
+    axis_solutions = solve_axes(data.take(rows), model)
+    inside = residuals(FittedModel(model, axis_solutions.fits), data, axis_solutions.nuisance)
+    data = leaning(data, axis_solutions.nuisance)
     by_temperature = data.folds
     if preset.inner_only:
         by_temperature = by_temperature[1:-1]
-    outside = [_left_out(data, preset, masks, found.solutions) for masks in (by_temperature, rate_folds(data))]
+    outside = [_left_out(data, preset, masks, axis_solutions.solutions) for masks in (by_temperature, rate_folds(data))]
     left = {}
     for axis, values in inside.items():
         within = within_runs(data, values)
@@ -88,7 +88,7 @@ def _left_out(
     data: FitData, preset: Preset, masks: list[NDArray[np.bool_]], solutions: Mapping[str, Solution]
 ) -> dict[str, Array]:
     """Return axis -> (m,) residuals of each data set by the fit without its fold, NaN where there is none."""
-    found = {axis: np.full(len(data), np.nan) for axis in data.outputs}
+    residual_dps = {axis: np.full(len(data), np.nan) for axis in data.outputs}
     for mask in masks:
         seen = data.take(~mask)
         if mask.all():
@@ -101,8 +101,8 @@ def _left_out(
         except LabctlError:  # too little is left, or a law that cannot be inverted: this fold says nothing
             continue
         for axis, values in without.items():
-            found[axis][mask] = values
-    return found
+            residual_dps[axis][mask] = values
+    return residual_dps
 
 
 #: Of a calibration that an earlier version of labctl has made.
@@ -120,7 +120,7 @@ class AxisEvidence:
     def to_json(self) -> AxisEvidenceJson:
         """Return this as JSON, the variances in (deg/s)^2."""
         local = self.model_error
-        found: AxisEvidenceJson = {
+        evidence_json: AxisEvidenceJson = {
             "rate_dps": local.rate_dps.tolist(),
             "temperature_c": local.temperature_c.tolist(),
             "left_var": plain_list(local.left_var),
@@ -130,13 +130,13 @@ class AxisEvidence:
             "repeatability_source": self.repeatability.source if self.repeatability else "none",
         }
         if self.repeatability and self.repeatability.convention:
-            found["repeatability_convention"] = self.repeatability.convention
-            found["repeatability_text"] = self.repeatability.text
+            evidence_json["repeatability_convention"] = self.repeatability.convention
+            evidence_json["repeatability_text"] = self.repeatability.text
         if local.across_dps is not None:
-            found["across_dps"] = {axis: rates.tolist() for axis, rates in local.across_dps.items()}
+            evidence_json["across_dps"] = {axis: rates.tolist() for axis, rates in local.across_dps.items()}
         if self.correlation:
-            found["correlation"] = dict(self.correlation)
-        return found
+            evidence_json["correlation"] = dict(self.correlation)
+        return evidence_json
 
     @staticmethod
     def from_json(record: AxisEvidenceJson) -> AxisEvidence:
@@ -166,9 +166,9 @@ def use_evidence(
     determine the model.
     """
     model, rows = preset.build(data)
-    found = solve_axes(data.take(rows), model)
+    solutions = solve_axes(data.take(rows), model)
     left = left_variance(data, preset)
-    inside = residuals(FittedModel(model, found.fits), data, found.nuisance)
+    inside = residuals(FittedModel(model, solutions.fits), data, solutions.nuisance)
     repeatability = repeatability_of(data, inside, instability_dps or {})
     correlation = _correlation({axis: within_runs(data, values) for axis, values in inside.items()})
     return {
@@ -195,13 +195,13 @@ def _turned_across(data: FitData, axis: str) -> dict[str, Array]:
 
 def _correlation(residual_dps: Mapping[str, Array]) -> dict[str, dict[str, float]]:
     """Return axis -> other axis -> correlation coefficient of their residuals, where both scatter."""
-    found: dict[str, dict[str, float]] = {axis: {} for axis in residual_dps}
+    by_pair: dict[str, dict[str, float]] = {axis: {} for axis in residual_dps}
     for one, other in permutations(residual_dps, 2):
         known = np.isfinite(residual_dps[one]) & np.isfinite(residual_dps[other])
         pair = np.array([residual_dps[one][known], residual_dps[other][known]])
         if np.all(np.ptp(pair, axis=1) > 0):
-            found[one][other] = float(np.atleast_2d(np.corrcoef(pair))[0, 1])
-    return found
+            by_pair[one][other] = float(np.atleast_2d(np.corrcoef(pair))[0, 1])
+    return by_pair
 
 
 def evidence_of(

@@ -44,18 +44,18 @@ def vector_bounds(
         {axis: reach_dps * part for axis, part in zip(BODY_AXES, place, strict=True)}
         for place in (PLACES if reach_dps else PLACES[:1])
     ]
-    found = [
+    bounds = [
         rate_vector_uncertainty(fitted, rates, warm, evidence=evidence, name=name, bench=bench)
         for warm in temperatures_c
         for rates in vectors
     ]
-    return {axis: _bound(axis, found, reach_dps) for axis in fitted.axes}
+    return {axis: _bound(axis, bounds, reach_dps) for axis in fitted.axes}
 
 
-def _bound(axis: str, found: Sequence[RateVectorUncertainty], reach_dps: float) -> VectorBoundJson:
-    unknown = next((each for each in found if each.budgets[axis].expanded is None), None)
-    place = unknown or max(found, key=lambda each: each.budgets[axis].expanded or 0.0)
-    aligned = [each.aligned_budgets[axis].expanded or 0.0 for each in found]
+def _bound(axis: str, uncertainties: Sequence[RateVectorUncertainty], reach_dps: float) -> VectorBoundJson:
+    unknown = next((each for each in uncertainties if each.budgets[axis].expanded is None), None)
+    place = unknown or max(uncertainties, key=lambda each: each.budgets[axis].expanded or 0.0)
+    aligned = [each.aligned_budgets[axis].expanded or 0.0 for each in uncertainties]
     return {
         "bound_dps": None if unknown else place.budgets[axis].expanded,
         "aligned_bound_dps": None if unknown else max(aligned),

@@ -53,9 +53,9 @@ def converted(target: str, mapped: MappedColumn, column: RawColumn, problems: Pr
         given = f"unit {name!r} is not known" if name else "no unit is given" + (f" ({implied})" if implied else "")
         problems.add(_unknown_unit(target, column, quantity, given))
         return None
-    found = mapped.sign * (unit.factor * values + unit.zero)
-    _refuse_impossible(target, column, found, quantity, problems)
-    return found
+    converted_values = mapped.sign * (unit.factor * values + unit.zero)
+    _refuse_impossible(target, column, converted_values, quantity, problems)
+    return converted_values
 
 
 def output_of(mapped: MappedColumn, column: RawColumn) -> tuple[Array, OutputUnit | None]:

@@ -43,7 +43,7 @@ def checked_map(document: object, name: str = "map") -> ColumnMap:
     except ValidationError as error:
         # a misspelt key is both unknown and missing: the unknown one is what a person looks for
         each = sorted(error.errors(), key=lambda e: e["type"] != "extra_forbidden")
-        raise BadInput(f"{name}: {'; '.join(_line(found) for found in each[:5])}; correct the map") from error
+        raise BadInput(f"{name}: {'; '.join(_line(problem) for problem in each[:5])}; correct the map") from error
 
 
 def _line(error: Any) -> str:

@@ -16,15 +16,15 @@ _SHOWN = 12
 
 def idle_entries(table: RawTable, column_map: ColumnMap) -> list[str]:
     """Return a line for each entry of a map that changes nothing in what becomes of a file."""
-    found = [*_units(table, column_map), *_data_sets(column_map), *_constants(column_map)]
+    entries = [*_units(table, column_map), *_data_sets(column_map), *_constants(column_map)]
     for target, mapped in column_map.columns.items():
-        found += _column(target, mapped)
+        entries += _column(target, mapped)
     layout = column_map.file.model_dump(exclude_none=True)
     if layout and table.layout is None:
-        found.append(
+        entries.append(
             f"[file] {', '.join(layout)}: the file is no text, so this changes nothing; leave [file] out of the map"
         )
-    return found
+    return entries
 
 
 def _units(table: RawTable, column_map: ColumnMap) -> Iterator[str]:

@@ -57,15 +57,15 @@ def propose(table: RawTable, serial: str | None = None, stated: Units | None = N
     if not columns:
         columns = _by_names(table, guesses, stated)
     columns = {target: _in_stated(target, mapped, stated) for target, mapped in columns.items()}
-    found = {target: table.columns[str(mapped.source)] for target, mapped in columns.items()}
+    sources_by_target = {target: table.columns[str(mapped.source)] for target, mapped in columns.items()}
     kind = "samples" if "t_s" in columns or "table_rate_dps" not in columns else "points"
-    _guess_force(columns, found, guesses)
+    _guess_force(columns, sources_by_target, guesses)
     proposed = ColumnMap(
         serial=serial or serial_of(table),
         kind="points" if kind == "points" else "samples",
         file=_file_keys(table),
         columns=columns,
-        datasets=_data_sets(table, columns, found) if kind == "samples" else DataSets(),
+        datasets=_data_sets(table, columns, sources_by_target) if kind == "samples" else DataSets(),
     )
     return Proposal(proposed, guesses)
 
@@ -186,16 +186,16 @@ def _is_counter(target: str, column: RawColumn) -> bool:
     return COUNTERS.fullmatch(name) is not None and bool(len(steps)) and bool((steps == 1).mean() > 0.9)
 
 
-def _guess_force(columns: dict[str, MappedColumn], found: dict[str, RawColumn], guesses: list[str]) -> None:
+def _guess_force(columns: dict[str, MappedColumn], sources_by_target: dict[str, RawColumn], guesses: list[str]) -> None:
     """Fill in the unit of the accelerometer by gravity; without one its columns are left out."""
     names = [f"accel_{axis}_g" for axis in "xyz"]
     there = [name for name in names if name in columns]
-    if not there or all(columns[name].unit or found[name].unit for name in there):
+    if not there or all(columns[name].unit or sources_by_target[name].unit for name in there):
         return
     unit, scale = "", None
     if len(there) == len(names):
-        force = np.column_stack([found[name].values for name in names])
-        unit, scale, why = force_unit(force, _still(found, len(force)))
+        force = np.column_stack([sources_by_target[name].values for name in names])
+        unit, scale, why = force_unit(force, _still(sources_by_target, len(force)))
         if unit:
             scaled = f", {scale:g} words per g" if scale else ""
             guesses.append(f"accelerometer: unit taken for {unit}{scaled} ({why})")
@@ -203,12 +203,12 @@ def _guess_force(columns: dict[str, MappedColumn], found: dict[str, RawColumn], 
         if unit:
             columns[name] = columns[name].model_copy(update={"unit": unit, "scale": scale})
         else:
-            del columns[name], found[name]
+            del columns[name], sources_by_target[name]
 
 
-def _still(found: dict[str, RawColumn], n: int) -> NDArray[np.bool_]:
+def _still(sources_by_target: dict[str, RawColumn], n: int) -> NDArray[np.bool_]:
     """Return when the unit was still, from its accelerometer: its spread knows no unit."""
-    force = np.column_stack([found[f"accel_{axis}_g"].values for axis in "xyz"])
+    force = np.column_stack([sources_by_target[f"accel_{axis}_g"].values for axis in "xyz"])
     size = float(np.nanmedian(np.linalg.norm(np.nan_to_num(force), axis=1))) or 1.0
     # a share of gravity of 1 % counts as 1 deg/s of a gyro: both are ten times the noise of a common sensor
     still: Movement = movement(100.0 * force / size, np.arange(n) / 100.0)
@@ -233,21 +233,21 @@ def _file_keys(table: RawTable) -> FileKeys:
     return FileKeys(separator=separator, decimal=decimal, header=layout.header, data=layout.data, encoding=encoding)
 
 
-def _data_sets(table: RawTable, columns: dict[str, MappedColumn], found: dict[str, RawColumn]) -> DataSets:
+def _data_sets(table: RawTable, columns: dict[str, MappedColumn], sources_by_target: dict[str, RawColumn]) -> DataSets:
     """Return the rule for data sets: a column that numbers or names them, steps of the table's rate, or bursts."""
     for name, column in table.columns.items():
         if PARTS.fullmatch(folded(name)) and _long_stretches(column):
             return DataSets(by="column", column=name)
-    rate = found.get("table_rate_dps")
+    rate = sources_by_target.get("table_rate_dps")
     if rate is not None and _long_stretches(rate):
         return DataSets(by="column", column=rate.name)
-    times = found.get("t_s")
+    times = sources_by_target.get("t_s")
     if times is not None and not times.is_text and len(times.values) > 2:
         steps = np.diff(times.values)
         unit = find_unit("s", columns["t_s"].unit or times.unit)
         long = GAP_S / unit.factor if unit is not None else np.inf
         gaps = (steps > max(GAP_STEPS * float(np.median(steps)), long)).sum()
-        if gaps >= 2 and "table_rate_dps" not in found:
+        if gaps >= 2 and "table_rate_dps" not in sources_by_target:
             return DataSets(by="gaps")
     return DataSets()
 

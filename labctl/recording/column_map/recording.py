@@ -109,7 +109,7 @@ def recording_of(table: RawTable, column_map: ColumnMap) -> MappedLog:
     problems = Problems(table.path)
     for line in (*table.problems, *idle_entries(table, column_map)):
         problems.add(line)
-    found = sources(table, column_map, problems)
+    raw_columns = sources(table, column_map, problems)
     if table.rows < LEAST_ROWS:
         problems.add(f"{table.rows} row of readings; a recording needs at least {LEAST_ROWS}, of one unit in one run")
     if not column_map.axes:
@@ -117,19 +117,19 @@ def recording_of(table: RawTable, column_map: ColumnMap) -> MappedLog:
             "no column is known to be the output of a gyro (it has "
             f"{', '.join(repr(name[:40]) for name in list(table.columns)[:20])}); write [columns.gyro_x], _y or _z"
         )
-    valid = found.get("valid")
-    for target, column in found.items():
+    valid = raw_columns.get("valid")
+    for target, column in raw_columns.items():
         if target == "t_s" and column.is_text and _is_date(column_map, column):
             continue
         if column.is_boolean or not _holds_text(target):
             allowed = valid is not None and target.startswith("gyro_")
             allowed |= column_map.kind == "samples" and is_thermometer(target)  # these are filled in, or refused, below
             refuse_wrong_cells(column, target, problems, empty_allowed=allowed)
-    times = _times(column_map, found.get("t_s"), table.rows, problems)
+    times = _times(column_map, raw_columns.get("t_s"), table.rows, problems)
     if column_map.kind == "points" and times is None and "t_s" not in column_map.columns:
         problems.lines = [line for line in problems.lines if not line.startswith("no column of time")]
         times = TimeAxis(np.arange(table.rows, dtype=np.float64), None)
-    usable = {target: column for target, column in found.items() if _is_usable(target, column)}
+    usable = {target: column for target, column in raw_columns.items() if _is_usable(target, column)}
     columns = _columns(column_map, usable, problems)
     problems.raise_if_any()
     assert times is not None  # else a problem was raised
@@ -157,10 +157,10 @@ def _holds_text(target: str) -> bool:
     return target in BY_NAME and BY_NAME[target].kind == "text"
 
 
-def _columns(column_map: ColumnMap, found: dict[str, RawColumn], problems: Problems) -> dict[str, Any]:
+def _columns(column_map: ColumnMap, sources_by_target: dict[str, RawColumn], problems: Problems) -> dict[str, Any]:
     """Return every column but time in the unit of the recording's, the gyro's in deg/s."""
     columns: dict[str, Any] = {}
-    for target, column in found.items():
+    for target, column in sources_by_target.items():
         if target == "t_s":
             continue
         if _holds_text(target):
@@ -175,7 +175,7 @@ def _columns(column_map: ColumnMap, found: dict[str, RawColumn], problems: Probl
 
 
 def _assembled(
-    table: RawTable, column_map: ColumnMap, found: dict[str, RawColumn], columns: dict[str, Any], times: TimeAxis,
+    table: RawTable, column_map: ColumnMap, raw_columns: dict[str, RawColumn], columns: dict[str, Any], times: TimeAxis,
     problems: Problems,
 ) -> MappedLog:  # fmt: skip
     if column_map.kind == "samples" and (filled := fill_between(columns, times.t_s, problems)):
@@ -202,7 +202,7 @@ def _assembled(
     output: dict[str, OutputUnit] = {}
     for axis in column_map.axes:
         name = f"gyro_{axis}"
-        columns[name], unit = output_of(column_map.columns[name], found[name])
+        columns[name], unit = output_of(column_map.columns[name], raw_columns[name])
         if unit is not None:
             output[axis] = unit
     info = _info(table, column_map, motion, output, times, problems)

@@ -19,35 +19,35 @@ def source(table: RawTable, named: str | int) -> RawColumn | None:
         by_number = list(table.columns.values())
         exact = table.columns.get(f"column {named}")
         return exact or (by_number[named - 1] if 1 <= named <= len(by_number) else None)
-    found = table.columns.get(named)
-    if found is not None:
-        return found
+    raw_column = table.columns.get(named)
+    if raw_column is not None:
+        return raw_column
     loose = [column for name, column in table.columns.items() if name.strip().lower() == named.strip().lower()]
     return loose[0] if len(loose) == 1 else None
 
 
 def sources(table: RawTable, column_map: ColumnMap, problems: Problems) -> dict[str, RawColumn]:
     """Return the file's column behind each of a recording's; what is not there, or occurs twice, is a problem."""
-    found: dict[str, RawColumn] = {}
+    raw_columns: dict[str, RawColumn] = {}
     used = defaultdict(list)
     for target, mapped in column_map.columns.items():
         column = source(table, mapped.source)
         if column is None:
             problems.add(_not_there(table, mapped.source, target))
             continue
-        found[target] = column
+        raw_columns[target] = column
         used[column.name].append(target)
     for name, targets in used.items():
         if len(targets) > 1 and any(target.startswith(("gyro_", "accel_")) for target in targets):
             problems.add(f"column {name!r} is mapped to {' and '.join(targets)}; each needs a column of its own")
-    return found
+    return raw_columns
 
 
 def unused(table: RawTable, column_map: ColumnMap) -> list[str]:
     """Return the columns of a file that a map does not use, in the file's order."""
     named = [mapped.source for mapped in column_map.columns.values()]
     named += [column_map.datasets.column] if column_map.datasets.column is not None else []
-    used = {found.name for each in named if (found := source(table, each)) is not None}
+    used = {column.name for each in named if (column := source(table, each)) is not None}
     return [name for name in table.columns if name not in used]
 
 

@@ -65,10 +65,10 @@ def time_axis(column_map: ColumnMap, column: RawColumn | None, rows: int, proble
     if unit.is_epoch or (len(values) and EPOCH_S[0] <= counted[0] <= EPOCH_S[1]):
         started = _instant(column, float(counted[0]), problems)
         counted = (values - values[0]) * unit.factor
-    found = _finer(column, TimeAxis(counted, started), problems)
-    _refuse_backwards(column, values, found.t_s, problems, wraps=mapped.wrap_bits is None)
-    _refuse_impossible(column, unit, found.t_s, column_map.sample_rate_hz, problems)
-    return found
+    axis = _finer(column, TimeAxis(counted, started), problems)
+    _refuse_backwards(column, values, axis.t_s, problems, wraps=mapped.wrap_bits is None)
+    _refuse_impossible(column, unit, axis.t_s, column_map.sample_rate_hz, problems)
+    return axis
 
 
 def _unknown(column: RawColumn, rows: int) -> str:
@@ -83,15 +83,15 @@ def _unknown(column: RawColumn, rows: int) -> str:
     )
 
 
-def _finer(column: RawColumn, found: TimeAxis, problems: Problems) -> TimeAxis:
+def _finer(column: RawColumn, axis_read: TimeAxis, problems: Problems) -> TimeAxis:
     """Return the times of the readings where the stamps are coarser, such as whole seconds, or of their arrival."""
-    between = spread_between(found.t_s) or spread_packets(found.t_s)
+    between = spread_between(axis_read.t_s) or spread_packets(axis_read.t_s)
     if isinstance(between, str):
         problems.add(f"column {column.name!r} (time): {between}")
     if not isinstance(between, Spread):
-        return found
-    zero_s = float(between.t_s[0] - found.t_s[0]) if found.started_at is not None else 0.0
-    started = None if found.started_at is None else found.started_at + timedelta(seconds=zero_s)
+        return axis_read
+    zero_s = float(between.t_s[0] - axis_read.t_s[0]) if axis_read.started_at is not None else 0.0
+    started = None if axis_read.started_at is None else axis_read.started_at + timedelta(seconds=zero_s)
     said = f"column {column.name!r}: {between.said}"
     return TimeAxis(between.t_s - (between.t_s[0] if started is not None else 0.0), started, said)
 
@@ -114,10 +114,10 @@ def _dates(column: RawColumn, unit: str, rate_hz: float | None, problems: Proble
     except ValueError as error:
         problems.add(f"column {column.name!r} for t_s: {error}; expected {EXPECTED}")
         return None
-    found = _finer(column, TimeAxis(read.t_s, read.first), problems)
-    _refuse_backwards(column, found.t_s, found.t_s, problems, wraps=False)
-    _refuse_impossible(column, None, found.t_s, rate_hz, problems)
-    return found
+    axis = _finer(column, TimeAxis(read.t_s, read.first), problems)
+    _refuse_backwards(column, axis.t_s, axis.t_s, problems, wraps=False)
+    _refuse_impossible(column, None, axis.t_s, rate_hz, problems)
+    return axis
 
 
 def _refuse_backwards(column: RawColumn, raw: Array, t_s: Array, problems: Problems, *, wraps: bool) -> None:

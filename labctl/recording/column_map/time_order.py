@@ -42,8 +42,8 @@ def in_order_of_time(table: RawTable, column_map: ColumnMap) -> tuple[RawTable, 
         name: replace(each, values=each.values[kept], words=None if each.words is None else each.words[kept])
         for name, each in table.columns.items()
     }
-    found = _twice(table, values, kept) or next((marked.finding for marked in check_clock(series)), None)
-    return replace(table, columns=columns, rows=int(kept.sum()), first_rows=()), found
+    problem = _twice(table, values, kept) or next((marked.finding for marked in check_clock(series)), None)
+    return replace(table, columns=columns, rows=int(kept.sum()), first_rows=()), problem
 
 
 def _twice(table: RawTable, values: NDArray[np.float64], kept: NDArray[np.bool_]) -> Finding | None:

@@ -46,14 +46,16 @@ def read(path: Path, _: TableOptions) -> RawTable:
     refuse_large(path, MOST_LOG_BYTES)
     kind, arrays = reader
     with parsed_by_library(path, kind, "write it again, or write its arrays as CSV"):
-        found = arrays(path)
+        arrays_read = arrays(path)
     columns: dict[int, list[RawColumn]] = defaultdict(list)
-    for name, (values, unit) in found.items():
+    for name, (values, unit) in arrays_read.items():
         for column in _columns(name, values, unit):
             columns[len(column.values)].append(column)
     lengths = sorted((n for n in columns if n > 1), key=lambda n: (not _has_gyro(_without_prefix(columns[n])), -n))
     if not lengths:
-        has = ", ".join(f"{name} {values.shape}" for name, (values, _) in list(found.items())[:_SHOWN]) or "nothing"
+        has = (
+            ", ".join(f"{name} {values.shape}" for name, (values, _) in list(arrays_read.items())[:_SHOWN]) or "nothing"
+        )
         raise BadRecording(f"{path}: no array of numbers with more than one row (it has {has}); write them as CSV")
     if len(lengths) > 1 and _has_gyro(_without_prefix(columns[lengths[1]])):
         both = " and ".join(f"{columns[n][0].name} ({n} rows)" for n in lengths[:2])
@@ -134,14 +136,14 @@ def _npy(path: Path) -> _Arrays:
 def _npz(path: Path) -> _Arrays:
     with zipfile.ZipFile(path) as archive:
         refuse_too_large(path, sum(each.file_size for each in archive.infolist()))
-    found: _Arrays = {}
+    arrays_read: _Arrays = {}
     with np.load(path, allow_pickle=False) as archive:
         for name in archive.files:
             try:
-                found[name] = (archive[name], "")
+                arrays_read[name] = (archive[name], "")
             except ValueError:  # an array of Python objects, which is code that would be run
                 continue
-    return found
+    return arrays_read
 
 
 def _mat5(path: Path) -> _Arrays:
@@ -150,26 +152,26 @@ def _mat5(path: Path) -> _Arrays:
     shapes = whosmat(str(path))
     refuse_too_large(path, sum(8 * int(np.prod(shape)) for _, shape, _ in shapes))
     opaque = [name for name, _, kind in shapes if kind in {"opaque", "unknown", "object"}]
-    found: _Arrays = {}
+    arrays_read: _Arrays = {}
     variables = [name for name, _, kind in shapes if kind not in {"opaque", "unknown", "object", "function"}]
     for name, value in loadmat(str(path), squeeze_me=True, struct_as_record=False, variable_names=variables).items():
         if not name.startswith("__"):
-            _flatten(name, value, found)
-    if not found and opaque:
+            _flatten(name, value, arrays_read)
+    if not arrays_read and opaque:
         raise BadRecording(
             f"{path}: {', '.join(opaque[:_SHOWN]) or 'its content'} is a MATLAB table or object, which only MATLAB "
             "reads; write it as CSV in MATLAB: writetable(NAME, 'FILE.csv') (timetable2table first for a timetable)"
         )
-    return found
+    return arrays_read
 
 
-def _flatten(name: str, value: Any, found: _Arrays) -> None:
+def _flatten(name: str, value: Any, arrays: _Arrays) -> None:
     """Add the arrays of a variable, those of a struct as NAME.FIELD."""
     if isinstance(value, np.ndarray):
-        found[name] = (value, "")
+        arrays[name] = (value, "")
     elif fields := getattr(value, "_fieldnames", None):
         for field in fields:
-            _flatten(f"{name}.{field}", getattr(value, field), found)
+            _flatten(f"{name}.{field}", getattr(value, field), arrays)
 
 
 def _hdf5(path: Path) -> _Arrays:
@@ -180,15 +182,15 @@ def _hdf5(path: Path) -> _Arrays:
             f"{path}: this is an HDF5 or MATLAB 7.3 file, and h5py, which reads it, is not installed; install it "
             f"with `{INSTALL}`; in MATLAB, save FILE.mat -v7 writes a file that needs no package"
         ) from error
-    found: _Arrays = {}
+    arrays_read: _Arrays = {}
     with h5py.File(path, "r") as file:
         sets: list[tuple[str, Any]] = []
         file.visititems(lambda name, each: sets.append((name, each)) if isinstance(each, h5py.Dataset) else None)
         usable = [(name, each) for name, each in sets if _is_table(name, each)]
         refuse_too_large(path, sum(8 * each.size * max(len(each.dtype.names or ()), 1) for _, each in usable))
         for name, each in usable:
-            found[name.replace("/", ".")] = (each[()], _unit_of(each.attrs))
-    return found
+            arrays_read[name.replace("/", ".")] = (each[()], _unit_of(each.attrs))
+    return arrays_read
 
 
 def _is_table(name: str, each: Any) -> bool:

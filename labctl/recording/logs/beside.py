@@ -55,8 +55,8 @@ def _time(table: RawTable, column_map: ColumnMap | None, main: RawColumn | None)
     """Return the column of time of a file: that of the map or of the main file, else the one that its name shows."""
     mapped = column_map.columns.get("t_s") if column_map is not None else None
     for named in (mapped.source if mapped is not None else None, main.name if main is not None else None):
-        if named is not None and (found := source(table, named)) is not None and found.is_number:
-            return found
+        if named is not None and (raw_column := source(table, named)) is not None and raw_column.is_number:
+            return raw_column
     by_target = [name for name, target in table.targets.items() if target == "t_s"]
     named_so = [name for name, column in table.columns.items() if name_says(name).target == "t_s" and column.is_number]
     return table.columns[(by_target + named_so)[0]] if by_target + named_so else None

@@ -98,8 +98,8 @@ def is_number(cell: str) -> bool:
 
 
 def _separator(lines: list[str]) -> str:
-    found = [_division(lines, separator) for separator in SEPARATORS.values()]
-    best = max(found, key=lambda each: (each.score > 0, each.width > 1, round(each.score, 1), each.width))
+    divisions = [_division(lines, separator) for separator in SEPARATORS.values()]
+    best = max(divisions, key=lambda each: (each.score > 0, each.width > 1, round(each.score, 1), each.width))
     return best.separator
 
 

@@ -70,16 +70,16 @@ def with_damaged_times(
     damaged: NDArray[np.bool_], at_ns: NDArray[np.int64], arrived_ns: NDArray[np.int64], values: NDArray[np.float64]
 ) -> NDArray[np.bool_]:
     """Return which messages are damaged, (n,): also those whose time is none, or whose values, (n, 6), are all 0."""
-    found = damaged | ((at_ns == 0) & (np.median(at_ns) != 0))
+    is_wrong = damaged | ((at_ns == 0) & (np.median(at_ns) != 0))
     empty = ~values.any(axis=1)
     if np.mean(empty) < 0.5:  # else the unit has no other output
-        found |= empty
+        is_wrong |= empty
     if len(at_ns) >= NEIGHBOURS:
         late_s = (at_ns - arrived_ns) / NS
         padded = np.pad(late_s, NEIGHBOURS // 2, mode="edge")
         usual = np.median(np.lib.stride_tricks.sliding_window_view(padded, NEIGHBOURS), axis=1)
-        found |= np.abs(late_s - usual) > MOST_APART_S
-    return found
+        is_wrong |= np.abs(late_s - usual) > MOST_APART_S
+    return is_wrong
 
 
 def unread_messages(damaged: NDArray[np.bool_], arrived_ns: NDArray[np.int64], stated: int) -> Unread | None:

@@ -63,10 +63,10 @@ def read(path: Path, options: SheetOptions) -> RawTable:
         if not rows:
             raise BadRecording(f"{path}: the sheet is empty; expected readings of a gyro")
         try:
-            found = read_text(made, TextOptions.model_validate({**options.model_dump(exclude={"sheet"})}))
+            table = read_text(made, TextOptions.model_validate({**options.model_dump(exclude={"sheet"})}))
         except BadRecording as error:
             raise BadRecording(str(error).replace(str(made), str(path))) from error
-    return replace(found, path=path, layout=None)
+    return replace(table, path=path, layout=None)
 
 
 def _chosen(path: Path, sheets: dict[str, Any], wanted: str | None) -> str:

@@ -140,13 +140,13 @@ def _runs(content: bytes) -> Iterator[tuple[int, int, Gap | None]]:
             continue
         if last >= start and content[last + 2] == DATA:
             at, walk.last_us = last, before_us
-        found = walk.goes_on(at + 1 if at != last else at + MESSAGE)
-        gap = Gap(at, found, walk.last_us, None)
-        if found < len(content):
-            walk.take(found)
-            gap = Gap(at, found, gap.before_us, walk.last_us)
+        next_at = walk.goes_on(at + 1 if at != last else at + MESSAGE)
+        gap = Gap(at, next_at, walk.last_us, None)
+        if next_at < len(content):
+            walk.take(next_at)
+            gap = Gap(at, next_at, gap.before_us, walk.last_us)
         yield start, at, gap
-        start = at = found
+        start = at = next_at
         last = -1
     if at > start:
         yield start, at, None

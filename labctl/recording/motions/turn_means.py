@@ -34,7 +34,7 @@ def turned_points(
     length = np.array([t_s[here][-1] - t_s[here][0] for here in sets])
     known = np.maximum(length, 1e-12)
     turn = np.asarray(points["turn_deg"], dtype=np.float64)
-    found: dict[str, NDArray[np.generic]] = {
+    point_recording: dict[str, NDArray[np.generic]] = {
         "duration_s": length,
         "table_rate_dps": np.where(turn != 0, turn / known, 0.0),
     }
@@ -42,9 +42,9 @@ def turned_points(
         if not name.startswith("gyro_"):
             continue
         readings = np.asarray(values, dtype=np.float64)
-        found[name] = np.array([trapezoidal_mean(t_s[here], readings[here]) for here in sets])
-        found[f"{name}{TIME}"] = np.array([_time_std(t_s[here], readings[here]) for here in sets])
-    return found
+        point_recording[name] = np.array([trapezoidal_mean(t_s[here], readings[here]) for here in sets])
+        point_recording[f"{name}{TIME}"] = np.array([_time_std(t_s[here], readings[here]) for here in sets])
+    return point_recording
 
 
 def trapezoidal_mean(t_s: NDArray[np.float64], values: NDArray[np.float64]) -> float:
@@ -76,9 +76,9 @@ def rates_as_turned(recording: Recording) -> NDArray[np.float64]:
     """
     columns = recording.columns
     rate = np.asarray(columns["table_rate_dps"], dtype=np.float64)
-    found, position = rate.copy(), np.asarray(columns["position"]).astype(np.str_)
+    turned_dps, position = rate.copy(), np.asarray(columns["position"]).astype(np.str_)
     for axis in recording.info.axes:
         output = recording.gyro_dps(axis)
-        found[position == axis] = output[position == axis]
-        found[position == f"-{axis}"] = -output[position == f"-{axis}"]
-    return np.where(rate == 0, 0.0, found)
+        turned_dps[position == axis] = output[position == axis]
+        turned_dps[position == f"-{axis}"] = -output[position == f"-{axis}"]
+    return np.where(rate == 0, 0.0, turned_dps)

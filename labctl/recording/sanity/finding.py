@@ -32,13 +32,17 @@ class Finding:
 
     def to_json(self) -> FindingJson:
         """Return the finding as JSON, with its sentence."""
-        found: FindingJson = {
+        finding_json: FindingJson = {
             "what": self.what, "severity": self.severity, "where": self.where, "said": self.said, "value": self.value,
             "unit": self.unit, "expected": self.expected, "do": self.do, "text": self.text, "part": self.part,
         }  # fmt: skip
         if self.n is not None:
-            found["channel"], found["n"], found["may_leave_out"] = self.channel, self.n, self.may_leave_out
-        return found
+            finding_json["channel"], finding_json["n"], finding_json["may_leave_out"] = (
+                self.channel,
+                self.n,
+                self.may_leave_out,
+            )
+        return finding_json
 
 
 def certain(findings: Iterable[Finding]) -> list[Finding]:

@@ -46,11 +46,11 @@ FACTORS = (
 )
 
 
-def check_responses(summary: Summary, found: Mapping[str, Mapping[str, Response]]) -> Iterator[Finding]:
+def check_responses(summary: Summary, responses_by_axis: Mapping[str, Mapping[str, Response]]) -> Iterator[Finding]:
     """Yield what is wrong with known responses."""
     own: dict[str, list[tuple[str, Response]]] = {}
     crossed: dict[str, str] = {}  # position -> the output that follows the table instead
-    for position, outputs in found.items():
+    for position, outputs in responses_by_axis.items():
         axis = Position.of(position).axis
         if axis not in outputs:
             continue
@@ -58,7 +58,7 @@ def check_responses(summary: Summary, found: Mapping[str, Mapping[str, Response]
             crossed[position] = other
         else:
             own.setdefault(axis, []).append((position, outputs[axis]))
-    yield from _crossed(crossed, found)
+    yield from _crossed(crossed, responses_by_axis)
     for axis, known in own.items():
         yield from _of_axis(summary, axis, known)
 
@@ -73,7 +73,7 @@ def _follower(axis: str, outputs: Mapping[str, Response]) -> str | None:
     return name if is_response and abs(outputs[axis].gain) < CROSSED_SHARE * abs(strongest.gain) else None
 
 
-def _crossed(crossed: Mapping[str, str], found: Mapping[str, Mapping[str, Response]]) -> Iterator[Finding]:
+def _crossed(crossed: Mapping[str, str], responses_by_axis: Mapping[str, Mapping[str, Response]]) -> Iterator[Finding]:
     reported: set[frozenset[str]] = set()
     for position, other in crossed.items():
         axis = Position.of(position).axis
@@ -93,10 +93,11 @@ def _crossed(crossed: Mapping[str, str], found: Mapping[str, Mapping[str, Respon
                 f"mark these data sets with the position in which the unit was mounted ({other}?), or correct the "
                 "columns' order"
             )
-        gain = found[position][other].gain
+        gain = responses_by_axis[position][other].gain
         yield Finding(
             "axes", "certain", where,
-            f"while axis {axis} is along the table's axis, output {axis} has gain {found[position][axis].gain:.3g} "
+            f"while axis {axis} is along the table's axis, output {axis} has gain "
+            f"{responses_by_axis[position][axis].gain:.3g} "
             f"and output {other} has gain {gain:.3g}",
             gain, "1", f"output {axis} to follow", do,
         )  # fmt: skip

@@ -214,16 +214,16 @@ def check_reference(summary: Summary) -> list[Finding]:
     )
     usable = np.isfinite(turning) & (np.abs(rate) >= LEAST_DPS)
     ways = {"forwards": usable & (rate > 0), "backwards": usable & (rate < 0)}
-    found = {
+    deviations = {
         way: 1e6 * np.array(_deviation(rate[here], turning[here], u[here]))
         for way, here in ways.items()
         if np.count_nonzero(here) >= (LEAST_SETS if np.isnan(u[here]).any() else 1)
     }
-    off = [way for way, (ppm, u_ppm) in found.items() if max(NO_PPM, COVERAGE * u_ppm) < abs(ppm)]
-    if not off or max(abs(ppm) for ppm, _ in found.values()) > LARGEST_PPM:
+    off = [way for way, (ppm, u_ppm) in deviations.items() if max(NO_PPM, COVERAGE * u_ppm) < abs(ppm)]
+    if not off or max(abs(ppm) for ppm, _ in deviations.values()) > LARGEST_PPM:
         return []
-    each = ", ".join(f"{ppm:+.0f} ppm {way} (u {u_ppm:.0f} ppm)" for way, (ppm, u_ppm) in found.items())
-    worst_ppm = max((float(found[way][0]) for way in off), key=abs)
+    each = ", ".join(f"{ppm:+.0f} ppm {way} (u {u_ppm:.0f} ppm)" for way, (ppm, u_ppm) in deviations.items())
+    worst_ppm = max((float(deviations[way][0]) for way in off), key=abs)
     return [
         Finding(
             "table_rate_ratio", "likely", "column table_rate_dps",
@@ -273,27 +273,27 @@ def findings_of(
     if len(summary) == 0:
         return sorted(of_readings, key=_order)
     aside = np.asarray(summary[VERIFICATION], dtype=np.bool_)
-    found = list(check_damage(summary.info))
+    findings = list(check_damage(summary.info))
     if not aside.all():
-        found += _findings(summary.take(~aside), environment)
+        findings += _findings(summary.take(~aside), environment)
     if aside.any():
         of_part = _findings(summary.take(aside), None)
-        found += [replace(each, part="verification", where=f"verification part, {each.where}") for each in of_part]
-    return sorted([*found, *_not_said(of_readings, found)], key=_order)
+        findings += [replace(each, part="verification", where=f"verification part, {each.where}") for each in of_part]
+    return sorted([*findings, *_not_said(of_readings, findings)], key=_order)
 
 
-def _not_said(of_readings: Sequence[Finding], found: Sequence[Finding]) -> Iterator[Finding]:
+def _not_said(of_readings: Sequence[Finding], findings: Sequence[Finding]) -> Iterator[Finding]:
     """Yield findings of readings but those that the data sets' figures say too, with what they leave in the means."""
-    said = {(each.what, each.channel) for each in found if each.channel}
+    said = {(each.what, each.channel) for each in findings if each.channel}
     yield from (each for each in of_readings if (each.what, each.channel) not in said)
 
 
-def _with_gross(found: Sequence[Finding], gross: Sequence[Finding]) -> list[Finding]:
+def _with_gross(findings: Sequence[Finding], gross: Sequence[Finding]) -> list[Finding]:
     """Return findings of rates and the gross ones: what wraps explains all else of its axis; none is said twice."""
     wrapped = {each.where.partition(",")[0] for each in gross if each.what == "wrapped"}
-    said = {each.where for each in found} | {"of a whole axis" for each in found if each.what in OF_AXIS}
+    said = {each.where for each in findings} | {"of a whole axis" for each in findings if each.what in OF_AXIS}
     added = [each for each in gross if each.what == "wrapped" or not {each.where, "of a whole axis"} & said]
-    return [*(each for each in found if not wrapped & set(each.where.split(", "))), *added]
+    return [*(each for each in findings if not wrapped & set(each.where.split(", "))), *added]
 
 
 def _order(finding: Finding) -> bool:

@@ -28,9 +28,9 @@ MATCH_SCATTERS, MATCH_SHARE = 4.0, 5e-3
 MOST_TOLD = 5
 
 
-def check_outlying(summary: Summary, found: Mapping[str, Mapping[str, Response]]) -> Iterator[Finding]:
+def check_outlying(summary: Summary, responses_by_axis: Mapping[str, Mapping[str, Response]]) -> Iterator[Finding]:
     """Yield each data set whose output belongs to another rate than it has."""
-    for position, outputs in found.items():
+    for position, outputs in responses_by_axis.items():
         axis = Position.of(position).axis
         one = outputs.get(axis)
         if one is None or not POSSIBLE[0] <= abs(one.gain) <= POSSIBLE[1] or int(one.rows.sum()) < LEAST_SETS:

@@ -40,7 +40,7 @@ class Response:
 def responses(summary: Summary) -> dict[str, dict[str, Response]]:
     """Return position -> output axis -> response, where the table's rates determine one."""
     position = np.asarray(summary["position"]).astype(np.str_)
-    found: dict[str, dict[str, Response]] = {}
+    by_axis: dict[str, dict[str, Response]] = {}
     for there in dict.fromkeys(position.tolist()):
         rows = position == there
         rate = np.asarray(summary["table_rate_dps"], dtype=np.float64)[rows]
@@ -49,11 +49,11 @@ def responses(summary: Summary) -> dict[str, dict[str, Response]]:
             continue
         fast = float(np.abs(rate).max())
         design = _design(rate / fast, np.asarray(summary["temperature_c"], dtype=np.float64)[rows])
-        found[there] = {
+        by_axis[there] = {
             axis: _response(there, axis, rows, design, summary.of_axis("mean", axis)[rows], fast)
             for axis in summary.info.axes
         }
-    return found
+    return by_axis
 
 
 def _design(share: NDArray[np.float64], warm: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -216,7 +216,7 @@ def _one_set(
         np.asarray(rows["table_rate_dps"], dtype=np.float64)[here] if "table_rate_dps" in rows else np.zeros(len(t_s))
     )
     warm = temperature_of(rows)
-    found: dict[str, Any] = {
+    summary_row: dict[str, Any] = {
         **_place(info, rows, here.start),
         "n": len(rate),
         "table_rate_dps": float(rate.mean()),
@@ -229,12 +229,12 @@ def _one_set(
     }
     if info.motion == "turns":
         as_turned = np.asarray(rows["rate_as_turned_dps"], dtype=np.float64)[here]
-        found |= {**_turn(rows, here.start), "duration_s": float(t_s[-1] - t_s[0])}
-        found |= {"rate_low_dps": float(as_turned.min()), "rate_high_dps": float(as_turned.max())}
+        summary_row |= {**_turn(rows, here.start), "duration_s": float(t_s[-1] - t_s[0])}
+        summary_row |= {"rate_low_dps": float(as_turned.min()), "rate_high_dps": float(as_turned.max())}
     for axis, values in outputs.items():
         figures = _output(values[here], None if warm is None else warm[here], at_rest=not rate.any())
-        found |= {f"{name}_{axis}": value for name, value in figures.items()}
-    return found
+        summary_row |= {f"{name}_{axis}": value for name, value in figures.items()}
+    return summary_row
 
 
 def _stretches(
@@ -326,7 +326,7 @@ def _of_means(recording: Recording) -> Summary:
     warm = np.full(m, np.nan) if warm is None else warm
     t_s = np.asarray(rows["t_s"], dtype=np.float64) if "t_s" in rows else np.full(m, np.nan)
     unknown = np.full(m, np.nan)
-    found: dict[str, NDArray[np.generic]] = {
+    columns: dict[str, NDArray[np.generic]] = {
         "dataset": np.asarray(rows["dataset"]) if "dataset" in rows else np.arange(1, m + 1),
         "position": np.asarray(rows["position"]).astype(np.str_) if "position" in rows else np.full(m, info.axes[0]),
         "run": np.asarray(rows["run"]) if "run" in rows else np.ones(m, dtype=np.int64),
@@ -339,8 +339,8 @@ def _of_means(recording: Recording) -> Summary:
     }  # fmt: skip
     if info.motion == "turns":
         turns = [_turn(rows, row) for row in range(m)]
-        found |= {name: np.array([turn[name] for turn in turns]) for name in turns[0]}
-        found["duration_s"] = np.asarray(rows["duration_s"], dtype=np.float64)
+        columns |= {name: np.array([turn[name] for turn in turns]) for name in turns[0]}
+        columns["duration_s"] = np.asarray(rows["duration_s"], dtype=np.float64)
     for axis in info.axes:
         output = info.output.get(axis)
         scale = abs(output.scale) if output else 1.0
@@ -353,5 +353,5 @@ def _of_means(recording: Recording) -> Summary:
             "change": np.full(m, NO_CHANGE.size),
         }
         figures |= {"change_row": np.full(m, NO_CHANGE.row), **dict.fromkeys(("wander", "code", "code_step"), unknown)}
-        found |= {f"{name}_{axis}": values for name, values in figures.items()}
-    return Summary(info, found)
+        columns |= {f"{name}_{axis}": values for name, values in figures.items()}
+    return Summary(info, columns)

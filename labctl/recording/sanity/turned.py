@@ -50,7 +50,7 @@ def off_turns(summary: Summary) -> list[OffTurn]:
     turn, u_deg = (np.asarray(summary[name], dtype=np.float64) for name in ("turn_deg", "turn_u_deg"))
     ratio = _ratios(summary, turned)
     axis = np.char.lstrip(np.asarray(summary["position"]).astype(np.str_), "-")
-    found = []
+    turns = []
     for row in np.flatnonzero(np.isfinite(ratio)):
         expected, allowed = _expected(ratio, axis, int(row))
         if expected is None:
@@ -60,23 +60,23 @@ def off_turns(summary: Summary) -> list[OffTurn]:
         if abs(share - 1) > tolerance:
             certain = allowed < OFF_ALONE and abs(share - 1) > CERTAIN_SHARE
             said = float(turn[row])
-            found.append(OffTurn(int(row), said, float(share) * said, tolerance * abs(said), certain))
-    return found
+            turns.append(OffTurn(int(row), said, float(share) * said, tolerance * abs(said), certain))
+    return turns
 
 
 def _ratios(summary: Summary, turned: NDArray[np.bool_]) -> NDArray[np.float64]:
     """Return the integral of each turn over its stated angle, (m,); NaN at rest and where its axis has no output."""
     position = np.asarray(summary["position"]).astype(np.str_)
     turn, duration_s = (np.asarray(summary[name], dtype=np.float64) for name in ("turn_deg", "duration_s"))
-    found = np.full(len(summary), np.nan)
+    ratios = np.full(len(summary), np.nan)
     for axis in summary.info.axes:
         mean = summary.of_axis("mean", axis)
         for there, sign in ((axis, 1.0), (f"-{axis}", -1.0)):
             rows = turned & (position == there)
             rests = ~turned & (position == there) if np.any(~turned & (position == there)) else ~turned
             bias = float(np.median(mean[rests])) if rests.any() else 0.0
-            found[rows] = (mean[rows] - bias) * duration_s[rows] / (sign * turn[rows])
-    return found
+            ratios[rows] = (mean[rows] - bias) * duration_s[rows] / (sign * turn[rows])
+    return ratios
 
 
 def _expected(ratio: NDArray[np.float64], axis: NDArray[np.str_], row: int) -> tuple[float, float] | tuple[None, float]:

@@ -43,22 +43,24 @@ def check_database(
     """
     location = database or default_database()
     chain_anchor = None if anchor is None else _anchor(anchor)
-    found = check(location, chain_anchor=chain_anchor, keys=[read_public_key(path) for path in keys], progress=progress)
+    result = check(
+        location, chain_anchor=chain_anchor, keys=[read_public_key(path) for path in keys], progress=progress
+    )
     return CheckResponse(
-        ok=not found.findings,
+        ok=not result.findings,
         database=location,
-        blocks=found.blocks,
-        calibrations=found.calibrations,
-        audit_rows=found.audit_rows,
-        manifests=found.manifests,
-        not_sealed=found.not_sealed,
-        signed=found.signed,
+        blocks=result.blocks,
+        calibrations=result.calibrations,
+        audit_rows=result.audit_rows,
+        manifests=result.manifests,
+        not_sealed=result.not_sealed,
+        signed=result.signed,
         verified=bool(keys),
-        keys=list(found.keys),
-        anchor=None if found.head is None else str(found.head),
-        remarks=list(found.remarks),
+        keys=list(result.keys),
+        anchor=None if result.head is None else str(result.head),
+        remarks=list(result.remarks),
         kept_readings=[each.text for each in kept_beside(location)],
-        findings=[FindingResponse(part=each.part, text=each.text) for each in found.findings],
+        findings=[FindingResponse(part=each.part, text=each.text) for each in result.findings],
     )
 
 

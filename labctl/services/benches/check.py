@@ -108,14 +108,14 @@ def clock_of(bench: BenchFile) -> Clock:
 
 def shipped() -> list[ShippedBench]:
     """Return the benches that come with labctl: name, and what stands on them."""
-    found = []
+    benches = []
     for name, path in shipped_benches().items():
         bench = load_bench(str(path))
         units = ", ".join(f"{gyro.serial} ({gyro.driver})" for gyro in bench.gyros)
-        found.append(
+        benches.append(
             ShippedBench(name=name, text=", ".join([*(each.driver for each in bench.instruments.values()), units]))
         )
-    return found
+    return benches
 
 
 def serve_simulator(

@@ -43,13 +43,13 @@ def new_bench(
     if file.exists() and not force:
         raise BadInput(f"{file} exists already and was not changed; give another name, or --force to replace the file")
     clock = SystemClock()
-    found, lines = [], []
+    findings, lines = [], []
     for info, each in search(request.ports, request.hosts, clock):
-        found.append((info, each))
+        findings.append((info, each))
         text = each.recognised.text if each.recognised is not None else each.why_not
         lines.append(FoundResponse(address=each.address, kind=each.kind, driver=each.driver, text=text))
         seen(lines[-1])
-    sections = sections_of(found)
+    sections = sections_of(findings)
     complete(sections, request.settings, clock, ask)
     made = document(request.name, request.latitude_deg, sections)
     write(file, made, sections)
@@ -67,10 +67,10 @@ def search(ports: Sequence[str], hosts: Sequence[str], clock: Clock) -> Iterator
         yield None, find_on_host(name, int(number or MODBUS_PORT), clock)
 
 
-def sections_of(found: Sequence[tuple[PortInfo | None, Found]]) -> list[Section]:
+def sections_of(recognised: Sequence[tuple[PortInfo | None, Found]]) -> list[Section]:
     """Return the sections of what was recognised: one table, one chamber and the gyros. Raises BadInput."""
     made: list[Section] = []
-    for info, each in found:
+    for info, each in recognised:
         if each.recognised is None:
             continue
         if each.kind != "gyro" and (other := next((one for one in made if one.kind == each.kind), None)):
@@ -146,15 +146,15 @@ def parse_setting(text: str) -> tuple[str, object]:
         return key.strip(), value
 
 
-def _name(found: Found, made: Sequence[Section]) -> str:
-    if found.kind != "gyro":
-        return found.kind
-    same = sum(section.found.driver == found.driver for section in made)
-    return f"{found.driver}-{same + 1}" if same else found.driver
+def _name(recognised: Found, made: Sequence[Section]) -> str:
+    if recognised.kind != "gyro":
+        return recognised.kind
+    same = sum(section.found.driver == recognised.driver for section in made)
+    return f"{recognised.driver}-{same + 1}" if same else recognised.driver
 
 
-def _address(found: Found, info: PortInfo | None) -> dict[str, object]:
+def _address(recognised: Found, info: PortInfo | None) -> dict[str, object]:
     if info is not None:
         return {"port": info.path, **({"adapter": info.adapter} if info.adapter else {})}
-    host, _, number = found.address.rpartition(":")
+    host, _, number = recognised.address.rpartition(":")
     return {"host": host, **({} if int(number) == MODBUS_PORT else {"tcp_port": int(number)})}

@@ -22,10 +22,10 @@ def reference_channels(bench: Bench, bench_file: BenchFile) -> tuple[RawChannelJ
 
     Raises BadInput for two of one name, and for a chosen instrument that measures no temperature.
     """
-    found: list[RawChannelJson] = []
+    raw_channels: list[RawChannelJson] = []
     for settings in bench_file.references:
         channels = [raw_channel(channel) for channel in bench.references[settings.name].channels]
-        refuse_doubled_columns(settings.name, tuple(channels), tuple(found))
+        refuse_doubled_columns(settings.name, tuple(channels), tuple(raw_channels))
         if settings.is_temperature:
             warm = next((each for each in channels if each["unit"] == "deg C"), None)
             if warm is None:
@@ -34,8 +34,8 @@ def reference_channels(bench: Bench, bench_file: BenchFile) -> tuple[RawChannelJ
                     "is_temperature for a thermometer"
                 )
             warm["stands_for"] = TEMPERATURE
-        found += channels
-    return tuple(found)
+        raw_channels += channels
+    return tuple(raw_channels)
 
 
 def refuse_doubled_columns(name: str, channels: tuple[RawChannelJson, ...], others: tuple[RawChannelJson, ...]) -> None:

@@ -130,8 +130,8 @@ def revoke(store: Store, serial: str, version: int, request: RevokeRequest, at: 
         for row in reversed(store.certificates.of_unit(known))
         if row.version == version and row.number not in before
     ]
-    found = {"withdrawn_certificates": withdrawn, "fetched_by": fetched_by(store, known, version)}
-    return certification_response(row).model_copy(update=found)
+    answer = {"withdrawn_certificates": withdrawn, "fetched_by": fetched_by(store, known, version)}
+    return certification_response(row).model_copy(update=answer)
 
 
 def refusal(known: AssessmentResponse) -> str:

@@ -42,16 +42,16 @@ def _is_apart(before: CertifiedVersion, after: CertifiedVersion, least: timedelt
 def calibrations_of(store: Store, versions: Sequence[CertifiedVersion]) -> dict[int, Calibration]:
     """Return number of a calibration -> its content. Raises BadCalibrationFile, which names unit and version."""
     documents = store.certified_versions.documents([each.id for each in versions])
-    found = {}
+    calibrations = {}
     for each in versions:
         try:
-            found[each.id] = read_calibration(documents[each.id])
+            calibrations[each.id] = read_calibration(documents[each.id])
         except BadCalibrationFile as error:
             raise BadCalibrationFile(
                 f"{each.serial} version {each.version}, which the drift until the due date is computed from: {error}; "
                 "run `labctl check`"
             ) from error
-    return found
+    return calibrations
 
 
 def rates_of(

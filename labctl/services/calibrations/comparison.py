@@ -51,16 +51,16 @@ def worse_than_raw(error: Errors, *, late: bool = False) -> list[Finding]:
 
 def worse_than_before(before: Errors, after: Errors) -> list[Finding]:
     """Return findings where a changed model is worse than the one it was made from, or predicts no better."""
-    found = worse_than_raw(after)
+    findings = worse_than_raw(after)
     first, second = before.rms_dps, after.rms_dps
     if first is not None and second is not None and second > WORSE * first:
-        found.append(_of_change(f"the RMS error rises from {first:.4g} to {second:.4g} deg/s", first, second))
+        findings.append(_of_change(f"the RMS error rises from {first:.4g} to {second:.4g} deg/s", first, second))
     first, second = before.heldout_rms_dps, after.heldout_rms_dps
     if first is not None and second is not None and second >= first:
         rises = second > (1.0 + ROUNDING) * first
         said = f"the held-out RMS error {'rises' if rises else 'does not fall'}: {first:.4g} deg/s before, "
-        found.append(_of_change(f"{said}{second:.4g} deg/s after", first, second))
-    return found
+        findings.append(_of_change(f"{said}{second:.4g} deg/s after", first, second))
+    return findings
 
 
 def _of_change(said: str, first: float, second: float) -> Finding:

@@ -20,14 +20,14 @@ Found = Callable[[float, float], Mapping[str, RateUncertainty]]
 
 
 def contributions_over(
-    rates_dps: list[float], temperatures_c: list[float], found: Found
+    rates_dps: list[float], temperatures_c: list[float], uncertainty: Found
 ) -> dict[str, ContributionsOver]:
     """Return axis -> lines over the rate at the middle temperature, and over the temperature at the fastest rate."""
     middle_c = temperatures_c[len(temperatures_c) // 2]
     fastest_dps = max(rates_dps, key=abs)
     rates, warm = _between(rates_dps), _between(temperatures_c)
-    over_rate = [found(rate, middle_c) for rate in rates]
-    over_temperature = [found(fastest_dps, each) for each in warm]
+    over_rate = [uncertainty(rate, middle_c) for rate in rates]
+    over_temperature = [uncertainty(fastest_dps, each) for each in warm]
     return {
         axis: ContributionsOver(
             temperature_c=middle_c,

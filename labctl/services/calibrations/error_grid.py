@@ -58,11 +58,11 @@ class ErrorGrid:
             "temperature_c": self.temperature_c, "table_rate_dps": np.zeros(n), "position": np.full(n, "z"),
         }  # fmt: skip
         try:
-            found = errors_at_true_rates(calibration.fitted, Channels(columns, dict(self.rates_dps)))
+            errors = errors_at_true_rates(calibration.fitted, Channels(columns, dict(self.rates_dps)))
         except LabctlError:  # a law that has no inverse there
             return None
         valid = self._is_valid(calibration)
-        return np.concatenate([np.where(valid, found[axis], np.nan)[self.counts[axis]] for axis in self.axes])
+        return np.concatenate([np.where(valid, errors[axis], np.nan)[self.counts[axis]] for axis in self.axes])
 
     def _is_valid(self, calibration: Calibration) -> NDArray[np.bool_]:
         """Return where a version is valid, (n,); a limit that it does not have is none."""

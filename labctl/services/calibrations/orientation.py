@@ -235,8 +235,8 @@ def _rate_dps(source: _Source, axis: str, calibration: Calibration | None) -> tu
     output = np.column_stack([_column(source, f"gyro_{each}") for each in compensator.axes])
     warm = _column(source, "temperature_c") if compensator.needs_temperature else None
     known = {name: _column(source, name) for name in compensator.needs}
-    found = compensator.compensate_output(output, warm, known)
-    return found.rate_dps[:, compensator.axes.index(axis)], compensator.warning
+    rates = compensator.compensate_output(output, warm, known)
+    return rates.rate_dps[:, compensator.axes.index(axis)], compensator.warning
 
 
 def _column(source: _Source, name: str) -> Array:

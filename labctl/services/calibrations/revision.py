@@ -130,10 +130,10 @@ def _question(row: CalibrationRecord, measured: Measurements, request: ImproveRe
 def _residuals(change: _Change) -> ResidualColumns:
     """Return what a criticism of the changed model would leave, without all else that it says."""
     model = change.after.fitted.model
-    found = replace(
+    residuals = replace(
         criticise(change.measured.readings, model, CATALOGUE, points=change.points, full=False), base=change.after
     )
-    return residual_columns(found.data, found.residuals, change.points, change.measured.row.id, change.after)
+    return residual_columns(residuals.data, residuals.residuals, change.points, change.measured.row.id, change.after)
 
 
 def _change(store: Store, serial: str, request: ImproveRequest) -> _Change:
@@ -234,7 +234,7 @@ def plausible(result: FitResult, technology: str) -> dict[str, UsualRange]:
 
     A range is one of sizes; of an effect that has only one sign, the sign counts too.
     """
-    found: dict[str, UsualRange] = {}
+    usual_ranges: dict[str, UsualRange] = {}
     for term in result.fitted.model.terms:
         kind = kind_of(term)
         span = kind.ranges.get(technology)
@@ -246,5 +246,5 @@ def plausible(result: FitResult, technology: str) -> dict[str, UsualRange]:
                 first = fit.effects.index(term.effect)
                 sizes = zip(fit.values[first], fit.u[first], strict=True)
                 outside |= any(bool(kind.outside(technology, float(value), float(u))) for value, u in sizes)
-        found[term.effect] = {"from": span[0], "to": span[1], "inside": not outside}
-    return found
+        usual_ranges[term.effect] = {"from": span[0], "to": span[1], "inside": not outside}
+    return usual_ranges

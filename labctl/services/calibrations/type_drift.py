@@ -59,15 +59,15 @@ def drift_of_type(store: Store, own: CertifiedVersion, calibration: Calibration,
     if not model.strip():
         return NO_MODEL
     every = _histories(store, own, calibration, model, grid)
-    found = [each for each in every if np.isfinite(each.rates_dps).any()]
-    units = int(np.min(np.sum([np.isfinite(each.rates_dps).any(axis=0) for each in found], axis=0))) if found else 0
+    grids = [each for each in every if np.isfinite(each.rates_dps).any()]
+    units = int(np.min(np.sum([np.isfinite(each.rates_dps).any(axis=0) for each in grids], axis=0))) if grids else 0
     if units < LEAST_UNITS:
         noun = "unit has" if units == 1 else "units have"
         return TOO_FEW.format(model=model, units=units or "no", noun=noun, days=LEAST_APART.days, least=LEAST_UNITS)
-    most = max(len(each.years) for each in found)
-    rates = np.full((len(found), most, found[0].rates_dps.shape[1]), np.nan)
-    years = np.zeros((len(found), most))
-    for row, each in enumerate(found):
+    most = max(len(each.years) for each in grids)
+    rates = np.full((len(grids), most, grids[0].rates_dps.shape[1]), np.nan)
+    years = np.zeros((len(grids), most))
+    for row, each in enumerate(grids):
         rates[row, : len(each.years)], years[row, : len(each.years)] = each.rates_dps, each.years
     spans = years.sum(axis=1)
     return TypeDrift(of_type(rates, years), model, units, (float(spans.min()), float(spans.max())))

@@ -363,9 +363,9 @@ class BenchRunner:
         if hindrance:
             unconfirmed = "; ".join(filter(None, (unconfirmed, f"stopping: {hindrance}")))
         running, clock = (None, None) if job is None else (job.row.id, job.prepared.clock)
-        found = description(self._bench, running, unconfirmed, self._last_check, clock)
+        bench_answer = description(self._bench, running, unconfirmed, self._last_check, clock)
         stop = self.stop_latch.describe(hindrance, stopping=ends)
-        return found.model_copy(update={"stop": stop, "live": self.live.serial})
+        return bench_answer.model_copy(update={"stop": stop, "live": self.live.serial})
 
     @property
     def polls(self) -> tuple[int, int] | None:

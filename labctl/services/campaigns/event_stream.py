@@ -43,10 +43,10 @@ class StatusCache:
         moment = (loop, self._rung, int(loop.time() / FRESH_S))
         if moment != self._moment:
             self._moment, self._found = moment, {}
-        found = self._found.get(what)
-        if found is None:
-            found = self._found[what] = asyncio.ensure_future(asyncio.to_thread(look))
-        return cast(T, await asyncio.shield(found))  # one who leaves does not end it for the others
+        pending = self._found.get(what)
+        if pending is None:
+            pending = self._found[what] = asyncio.ensure_future(asyncio.to_thread(look))
+        return cast(T, await asyncio.shield(pending))  # one who leaves does not end it for the others
 
 
 class Bell:

@@ -32,12 +32,12 @@ class RecordedOperator:
         self._note(OPERATOR, "sent", prompt.kind.encode())
 
     def answer(self, prompt_id: str) -> Answer | None:
-        found = self._operator.answer(prompt_id)
+        given_answer = self._operator.answer(prompt_id)
         self._asked += 1
-        if found is not None:
-            said = CONFIRMED if found.confirmed else AGAIN if found.again else DECLINED
+        if given_answer is not None:
+            said = CONFIRMED if given_answer.confirmed else AGAIN if given_answer.again else DECLINED
             self._note(OPERATOR, "received", said, asked=self._asked)
-        return found
+        return given_answer
 
     def withdraw(self, prompt_id: str) -> None:
         self._operator.withdraw(prompt_id)

@@ -130,19 +130,19 @@ def errors_of(measured: Measurements, calibration: Calibration, about: Use) -> E
     recordings = list(measured.of_each.values())
     fitted = [error for each in recordings for error in _Part.of(calibration, fitted_part(each)).largest(about)]
     aside = [(each, part) for each in recordings if (part := verification_part(each)) is not None]
-    found: list[VerifiedError] = []
+    errors: list[VerifiedError] = []
     datasets = outside = 0
     for _, points in aside:
         seen = _Part.of(calibration, points, anew=True)
         outside += int(seen.outside.sum())
         for row in np.flatnonzero(~seen.outside).tolist():
             shown = list(seen.at(row, calibration, about))
-            found += shown
+            errors += shown
             datasets += bool(shown)
     if aside:
-        _require_cover(found, calibration, about, outside)
+        _require_cover(errors, calibration, about, outside)
     is_anew = bool(aside) and all(_is_anew(whole, part) for whole, part in aside)
-    return Errors(max(fitted, default=0.0), len(fitted), tuple(found), datasets, is_anew)
+    return Errors(max(fitted, default=0.0), len(fitted), tuple(errors), datasets, is_anew)
 
 
 def _is_anew(whole: Recording, part: Recording) -> bool:

@@ -46,8 +46,8 @@ def issue(store: Store, serial: str, version: int, request: CertificateRequest, 
     order = CertificateOrder.model_validate(kept.order) if kept and not _given(request) else request.order
     last = store.standards.last_finding()  # before the evidence is read: a later one is found when it is stored
     facts = facts_of(store, serial, version, order)
-    found = Found.of(store, facts)
-    refuse(facts, found)
+    evidence = Found.of(store, facts)
+    refuse(facts, evidence)
     _refuse_bad(store, facts)
     with signing_key(at) as key:
         if kept is not None and kept.signed_by is not None and key is None:
@@ -55,7 +55,7 @@ def issue(store: Store, serial: str, version: int, request: CertificateRequest, 
                 f"certificate {kept.number} is signed, and no key is set to sign the one that replaces it; name the "
                 f"key by {SIGN_KEY_VARIABLE}"
             )
-        certificate = to_be_signed(assembled(store, facts, found, request, at, kept), key)
+        certificate = to_be_signed(assembled(store, facts, evidence, request, at, kept), key)
         forms = forms_of(certificate, key, at)
     row = CertificateRow(
         certificate.number, serial, version, kept.number if kept else None, request.amend or "", request.by, at,
@@ -95,10 +95,10 @@ def _unchanged(kept: CertificateRow, request: CertificateRequest) -> Certificate
     return kept
 
 
-def refuse(facts: Facts, found: Found) -> None:
+def refuse(facts: Facts, evidence: Found) -> None:
     """Raise MissingFacts, or CertificateRefused for a version that was revoked, or certified by one person where two
     are needed, and for a standard outside its dates."""
-    if missing := [*facts.missing(), *found.missing()]:
+    if missing := [*facts.missing(), *evidence.missing()]:
         raise MissingFacts.of(facts.what, missing)
     act = facts.authorised
     if act is not None and act.act == "revoke":

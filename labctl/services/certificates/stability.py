@@ -47,10 +47,10 @@ def stability_until(store: Store, facts: Facts, until: datetime) -> StabilityRes
 
 def _measured(store: Store, facts: Facts) -> datetime:
     """Return when a version was measured: by its recordings, else by the order, without which nothing is issued."""
-    found = version_measured_at(store, facts.row)
-    if found is None and facts.performed_until is not None:
+    measured_at = version_measured_at(store, facts.row)
+    if measured_at is None and facts.performed_until is not None:
         return datetime.combine(facts.performed_until, time(), UTC)
-    return found or facts.row.created_at
+    return measured_at or facts.row.created_at
 
 
 def _type(known: Stability, years: float) -> TypeOfItem | None:

@@ -57,8 +57,8 @@ def verify_file(store: Store, path: Path, ca: Path | None, signers: Sequence[str
         forms = store.certificates.forms(row.number)
         kept = {"pdf": forms.pdf, "xml": forms.xml, "json": forms.document}[form]
         in_register = "same" if kept == content else "differs"
-    found = _signatures(content, form, path, ca)
-    answers = [_answer(each, wanted) for each in found]
+    signatures = _signatures(content, form, path, ca)
+    answers = [_answer(each, wanted) for each in signatures]
     certificate = None if row is None else certificate_by_number(store, row.number)
     # a DCC that is attached to a PDF is signed by itself, which says nothing of the pages
     own = [each for each in answers if each.valid and each.form == OWN.get(form)]
@@ -114,8 +114,8 @@ def _number_in(content: bytes, form: CertificateFormat) -> str | None:
         if form == "json":
             number = str(json.loads(content)["number"])
         else:
-            found = _NUMBER[form].findall(content)
-            number = html.unescape(found[-1].decode()) if found else ""
+            numbers = _NUMBER[form].findall(content)
+            number = html.unescape(numbers[-1].decode()) if numbers else ""
         return number if 0 < len(number) <= MOST_DIGITS and number.isprintable() else None
     except (ValueError, KeyError, TypeError, RecursionError):
         return None
@@ -139,15 +139,15 @@ def _signatures(content: bytes, form: CertificateFormat, path: Path, ca: Path | 
         ) from error
 
 
-def _answer(found: SignatureFound, wanted: Sequence[str]) -> SignatureResponse:
-    signer = None if found.signatory is None else SignatoryResponse.model_validate(found.signatory.model_dump())
+def _answer(signature: SignatureFound, wanted: Sequence[str]) -> SignatureResponse:
+    signer = None if signature.signatory is None else SignatoryResponse.model_validate(signature.signatory.model_dump())
     return SignatureResponse(
-        form=found.form,
-        valid=found.valid,
-        problem=found.problem,
+        form=signature.form,
+        valid=signature.valid,
+        problem=signature.problem,
         signed_by=signer,
-        signed_at=found.signed_at,
-        trust=found.trust,
-        reason=found.reason,
+        signed_at=signature.signed_at,
+        trust=signature.trust,
+        reason=signature.reason,
         expected=_is_one_of(signer, wanted) if wanted else None,
     )

@@ -180,9 +180,9 @@ def _compared(store: Store, row: RecordingRow, version: CalibrationRecord | None
     coefficients: Mapping[str, AxisCoefficients] = {} if version is None else version.answer["axes"]
     budgets = {} if calibration is None else calibration.document.get("response", {})
     responses = {
-        axis: found
+        axis: axis_response
         for axis in coefficients
-        if (found := _response(coefficients[axis], budgets.get(axis, {}))) is not None
+        if (axis_response := _response(coefficients[axis], budgets.get(axis, {}))) is not None
     }
     return answer.model_copy(update={
         "profile": profile_columns(data, errors, {axis: response for axis, (response, _) in responses.items()}),
@@ -227,25 +227,25 @@ def _expanded(budget: BudgetJson | None, u: float | None) -> float | None:
 
 def _single(axis: AxisCoefficients, name: str) -> tuple[float, float | None] | None:
     """Return a coefficient and its standard uncertainty; None where the model has none of this name."""
-    found = axis["coefficients"].get(name)
-    if found is None or isinstance(found, list):
+    coefficient = axis["coefficients"].get(name)
+    if coefficient is None or isinstance(coefficient, list):
         return None
-    value, u = found["value"], found["u"]
+    value, u = coefficient["value"], coefficient["u"]
     return None if isinstance(value, list) or isinstance(u, list) else (value, u)
 
 
 def _in_poses(store: Store, row: RecordingRow, calibration: Calibration | None) -> dict[str, object]:
     recording = source_of(store, row)
     correct: Correct = _as_it_is if calibration is None else correction_of(calibration, recording)
-    found = move_errors(recording, correct)
+    errors = move_errors(recording, correct)
     columns = PoseColumns(
-        from_s=found.t_s[:, 0].tolist(), until_s=found.t_s[:, 1].tolist(),
-        accelerometer_deg=found.accelerometer_deg.tolist(), gyro_deg=found.gyro_deg.tolist(),
-        residual_deg=found.residual_deg.tolist(),
+        from_s=errors.t_s[:, 0].tolist(), until_s=errors.t_s[:, 1].tolist(),
+        accelerometer_deg=errors.accelerometer_deg.tolist(), gyro_deg=errors.gyro_deg.tolist(),
+        residual_deg=errors.residual_deg.tolist(),
     )  # fmt: skip
     return {
-        "poses": columns, "rows": len(found.t_s), "of": len(found.t_s) + len(found.left_out),
-        "left_out": list(found.left_out),
+        "poses": columns, "rows": len(errors.t_s), "of": len(errors.t_s) + len(errors.left_out),
+        "left_out": list(errors.left_out),
     }  # fmt: skip
 
 

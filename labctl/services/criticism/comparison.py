@@ -143,8 +143,8 @@ def compare_version(
 def comparison_json(store: Store, serial: str, version: int, recording: int) -> ComparisonJson | None:
     """Return the comparison as JSON; None where the version cannot be applied to the recording."""
     try:
-        found = compare_version(store, serial, version, recording, other_unit=True)
-        return cast(ComparisonJson, found.model_dump(mode="json"))
+        comparison = compare_version(store, serial, version, recording, other_unit=True)
+        return cast(ComparisonJson, comparison.model_dump(mode="json"))
     except LabctlError:
         return None
 

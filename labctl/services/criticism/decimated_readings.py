@@ -59,13 +59,13 @@ def reading_beside(store: Store, rows: Sequence[RecordingRow]) -> Iterator[Decim
             return {row.id: read_recording_of(own, row) for row in wanted}
 
     with closing(Forked(read)) as forked:
-        found: dict[int, ReadRecording] = {}
+        readings: dict[int, ReadRecording] = {}
 
         def decimated(row: RecordingRow) -> ReadRecording:
             if not forked.is_forked:
                 return read_recording_of(store, row)
-            if not found:
-                found.update(forked.result())
-            return found[row.id]
+            if not readings:
+                readings.update(forked.result())
+            return readings[row.id]
 
         yield decimated

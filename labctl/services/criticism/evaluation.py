@@ -64,7 +64,7 @@ def evaluate(
     try:
         model = model_of(calibration)
         fitted = fit_means(measured.points, model)  # while the readings are being read
-        found = criticise(
+        criticised = criticise(
             measured.readings, model, catalogue, fitted=fitted, is_decimated=measured.is_decimated,
             static=measured.static,
         )  # fmt: skip
@@ -72,10 +72,10 @@ def evaluate(
         what = f"criticism of version {calibration.version} on {measured.named}"
         refuse_wrong(warnings, what, accepted=False, insist=f"; without refitting, {error}")
         raise
-    columns = residual_columns(found.data, found.residuals, measured.points, measured.row.id, found.base)
+    columns = residual_columns(criticised.data, criticised.residuals, measured.points, measured.row.id, criticised.base)
     serial, version = calibration.serial, calibration.version
-    experiments = _experiments(store, measured.row.campaign, found)
-    criticism = answer_of(serial, version, measured.recordings, found, experiments)
+    experiments = _experiments(store, measured.row.campaign, criticised)
+    criticism = answer_of(serial, version, measured.recordings, criticised, experiments)
     criticism = criticism.model_copy(update={"text": [*criticism.text, *held_sentences(model)]})
     return (
         with_warnings(criticism.model_copy(update={"applied": applied}), warnings),
@@ -89,13 +89,13 @@ def evaluate(
     )
 
 
-def _experiments(store: Store, campaign: int | None, found: Criticism) -> list[Experiment]:
-    if not found.verdict.indistinguishable:
+def _experiments(store: Store, campaign: int | None, criticism: Criticism) -> list[Experiment]:
+    if not criticism.verdict.indistinguishable:
         return []
     report_stage("checking experiments")
     from labctl.services.criticism.next_experiment import experiments_for  # noqa: PLC0415  it loads the drivers
 
-    return experiments_for(store, campaign, found)
+    return experiments_for(store, campaign, criticism)
 
 
 def _applied(store: Store, calibration: CalibrationRecord, measured: Measurements) -> VerificationResponse | None:

@@ -95,15 +95,17 @@ class Measurements:
 
         What is wrong with data sets that were measured to verify is an objection to certifying a version.
         """
-        found_in = {n: [w for w in found.warnings if w.part == "fitted"] for n, found in self.inspections.items()}
+        found_in = {
+            n: [w for w in inspection.warnings if w.part == "fitted"] for n, inspection in self.inspections.items()
+        }
         if len(self.rows) == 1:
             return [*found_in[self.row.id], *self.newer]
         return [
             warning.model_copy(
                 update={"where": f"recording {n}, {warning.where}", "text": f"recording {n}: {warning.text}"}
             )
-            for n, found in found_in.items()
-            for warning in found
+            for n, inspection in found_in.items()
+            for warning in inspection
         ] + [*undated_warnings(self.rows), *other_settings_warnings(self.rows)]
 
     @property
@@ -143,10 +145,10 @@ class Measurements:
     @cached_property
     def static(self) -> StaticRecord | None:
         """The longest static record by all readings, data sets as `readings` numbers them; None: there is none."""
-        found = [(number, read.static) for number, read in self._read.items() if read.static is not None]
-        if not found:
+        static_records = [(number, read.static) for number, read in self._read.items() if read.static is not None]
+        if not static_records:
             return None
-        recording, longest = max(found, key=lambda each: each[1].duration_s)
+        recording, longest = max(static_records, key=lambda each: each[1].duration_s)
         columns = self.readings.columns
         if RECORDING not in columns:
             return longest
@@ -187,8 +189,8 @@ def other_settings_warnings(rows: Sequence[RecordingRow]) -> Iterator[DataWarnin
     """Yield that the unit was set otherwise in one of several recordings than in the first one that says how."""
     known = [(row.id, RecordingInfo.model_validate(row.info).configuration) for row in rows]
     first, *others = [each for each in known if each[1]] or [(0, {})]
-    for number, found in others:
-        if differs := changed(first[1], found):
+    for number, settings in others:
+        if differs := changed(first[1], settings):
             said = ", ".join(f"{name} was {was} and is {now}" for name, (was, now) in differs.items())
             text = f"the unit is set otherwise than in recording {first[0]}: {said}"
             do = "fit the recordings of each setting by themselves"

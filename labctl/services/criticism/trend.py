@@ -47,17 +47,17 @@ def in_time(rows: Iterable[RecordingRow]) -> tuple[list[RecordingRow], list[Reco
 
 def occasions_of(store: Store, measured: Sequence[RecordingRow]) -> list[list[int]]:
     """Return the numbers of recordings, in order of time, by occasion: those that overlap or are close are of one."""
-    found: list[list[int]] = []
+    occasions: list[list[int]] = []
     reached = None
     for row in measured:
         begun = ordered_at(row.info)
         if reached is None or begun >= reached + LEAST_APART:
-            found.append([])
-        found[-1].append(row.id)
+            occasions.append([])
+        occasions[-1].append(row.id)
         ends = [each.t_until_s for each in store.recordings.data_sets(row.id) if each.t_until_s is not None]
         until = begun + timedelta(seconds=max(ends, default=0.0))
         reached = until if reached is None else max(reached, until)
-    return found
+    return occasions
 
 
 def occasions_text(occasions: Sequence[Sequence[int]], *, drifted: bool) -> Iterator[str]:
@@ -139,7 +139,7 @@ def _point(
     at = {each.id: ordered_at(each.info) for each in measured}
     before = [v for v in versions if v.recordings and all(at[n] < at[row.id] for n in v.recordings if n in at)]
     own = [v for v in versions if row.id in v.recordings]
-    found = TrendPoint(
+    point = TrendPoint(
         recording=row.id, at=at[row.id], as_found=_applied(store, before[-1:], data),
         as_left=_applied(store, own[-1:], data), rms_dps=None, axes={},
     )  # fmt: skip
@@ -148,22 +148,22 @@ def _point(
         errors, _ = applied_errors(read_calibration(reference.document), data.points, angles_rad=angles)
         channels = fit_data_of(data.points)
     except LabctlError as error:
-        return found.model_copy(update={"why": str(error)})
+        return point.model_copy(update={"why": str(error)})
     axes = {axis: line_left(values, channels.true_rate_dps(axis)) for axis, values in errors.items()}
     pooled = np.concatenate(list(errors.values()))
-    return found.model_copy(update={"rms_dps": float(np.sqrt(np.mean(pooled**2))), "axes": axes})
+    return point.model_copy(update={"rms_dps": float(np.sqrt(np.mean(pooled**2))), "axes": axes})
 
 
 def _applied(store: Store, version: Sequence[CalibrationRecord], data: Measurements) -> AppliedVersion | None:
     if not version:
         return None
     try:
-        found = left_by(store, version[0], data)
+        errors = left_by(store, version[0], data)
     except LabctlError:
         return None
     return AppliedVersion(
-        version=version[0].version, rms_dps=found.rms_dps, max_dps=found.max_dps, bias_dps=found.bias_dps,
-        part=found.part,
+        version=version[0].version, rms_dps=errors.rms_dps, max_dps=errors.max_dps, bias_dps=errors.bias_dps,
+        part=errors.part,
     )  # fmt: skip
 
 
@@ -171,13 +171,13 @@ def line_left(error_dps: Array, rate_dps: Array) -> AxisPoint:
     """Return what is left of bias and scale factor on one axis: a straight line over the rate, by least squares."""
     turned = len(np.unique(np.round(rate_dps, 3))) >= LEAST_RATES
     columns = np.column_stack([np.ones(len(rate_dps)), rate_dps] if turned else [np.ones(len(rate_dps))])
-    found, *_ = np.linalg.lstsq(columns, error_dps, rcond=None)
-    left = error_dps - columns @ found
+    coefficients, *_ = np.linalg.lstsq(columns, error_dps, rcond=None)
+    left = error_dps - columns @ coefficients
     variance = float(left @ left) / max(len(left) - columns.shape[1], 1)
     u = np.sqrt(np.diag(np.linalg.inv(columns.T @ columns)) * variance)
     return AxisPoint(
-        bias_dps=float(found[0]), u_bias_dps=float(u[0]),
-        scale_factor=float(found[1]) if turned else None, u_scale_factor=float(u[1]) if turned else None,
+        bias_dps=float(coefficients[0]), u_bias_dps=float(u[0]),
+        scale_factor=float(coefficients[1]) if turned else None, u_scale_factor=float(u[1]) if turned else None,
     )  # fmt: skip
 
 

@@ -91,15 +91,15 @@ def figures_of(data: FitData) -> list[Figure]:
     straight = np.array([Position.of(each).turned_deg == 0 for each in np.asarray(data.channels["position"]).tolist()])
     straight = straight if straight.any() else ~straight
     seen = _columns(data.take(straight))
-    found = [each for axis in data.outputs for each in (*_of_rates(seen, axis), *_at_rest(seen, axis))]
-    return [replace(each, rows=_spread(each.rows, straight)) for each in (*found, *_alignment(seen))]
+    characteristics = [each for axis in data.outputs for each in (*_of_rates(seen, axis), *_at_rest(seen, axis))]
+    return [replace(each, rows=_spread(each.rows, straight)) for each in (*characteristics, *_alignment(seen))]
 
 
 def _spread(rows: NDArray[np.bool_], among: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Return a mask of the data sets of another mask as one of all, (m,)."""
-    found = np.zeros(len(among), dtype=bool)
-    found[among] = rows
-    return found
+    is_spread = np.zeros(len(among), dtype=bool)
+    is_spread[among] = rows
+    return is_spread
 
 
 def _columns(data: FitData) -> _Columns:
@@ -129,8 +129,8 @@ def _of_rates(seen: _Columns, axis: str) -> Iterator[Figure]:
         white = seen.data.white_var
         u = None if white is None else np.sqrt(white[axis][here])
         yield Figure("scale_factor_nonlinearity", axis, nonlinearity_ppm(line, float(np.max(np.abs(rate))), u), here)
-    if (found := asymmetry_ppm(rate, seen.data.outputs[axis][here])) is not None:
-        yield Figure("scale_factor_asymmetry", axis, found, here)
+    if (value := asymmetry_ppm(rate, seen.data.outputs[axis][here])) is not None:
+        yield Figure("scale_factor_asymmetry", axis, value, here)
     yield from _over_temperature(seen, axis, own, line.scale_factor.value)
     yield from _from_run_to_run(seen, axis, own, line.scale_factor.value)
 
@@ -162,10 +162,10 @@ def _from_run_to_run(seen: _Columns, axis: str, own: NDArray[np.bool_], scale_fa
             }
             biases.append({run: line.bias_dps.value for run, line in lines.items()})
             scales.append({run: line.scale_factor.value for run, line in lines.items()})
-    if (found := repeatability(biases)) is not None:
-        yield Figure("bias_repeatability", axis, found[0], own)
-    if (found := repeatability(scales)) is not None:
-        yield Figure("scale_factor_repeatability", axis, _times(found[0], PPM / scale_factor), own)
+    if (value := repeatability(biases)) is not None:
+        yield Figure("bias_repeatability", axis, value[0], own)
+    if (value := repeatability(scales)) is not None:
+        yield Figure("scale_factor_repeatability", axis, _times(value[0], PPM / scale_factor), own)
 
 
 def _at_rest(seen: _Columns, axis: str) -> Iterator[Figure]:
@@ -178,8 +178,8 @@ def _at_rest(seen: _Columns, axis: str) -> Iterator[Figure]:
         range(len(seen.level_c)), key=lambda each: len(np.unique(seen.position[still & (seen.level == each)]))
     )
     rows = still & (seen.level == fullest)
-    if (found := g_sensitivity(seen.position[rows], error[rows])) is not None:
-        for along, estimate in zip(AXES, found, strict=True):
+    if (value := g_sensitivity(seen.position[rows], error[rows])) is not None:
+        for along, estimate in zip(AXES, value, strict=True):
             yield Figure("g_sensitivity", axis, estimate, rows, along)
 
 
@@ -194,8 +194,8 @@ def _bias_at_rest(seen: _Columns, axis: str, error: Array) -> Iterator[Figure]:
             at = (seen.level == level) & (seen.position == position)
             runs = np.unique(seen.run[at])
             groups.append({int(run): float(np.mean(error[at & (seen.run == run)])) for run in runs})
-    if (found := repeatability(groups)) is not None:
-        yield Figure("bias_repeatability", axis, found[0], np.ones(len(error), dtype=bool))
+    if (value := repeatability(groups)) is not None:
+        yield Figure("bias_repeatability", axis, value[0], np.ones(len(error), dtype=bool))
 
 
 def _alignment(seen: _Columns) -> Iterator[Figure]:
@@ -216,12 +216,12 @@ def _alignment(seen: _Columns) -> Iterator[Figure]:
             known &= line.scale_factor.u is not None
             u[i, j] = math.hypot(line.scale_factor.u or 0.0, 0.0 if i == j else leaning)
     try:
-        found = alignment_of(k, u if known else None)
+        alignment = alignment_of(k, u if known else None)
     except ValueError:  # an axis has its sign reversed: no rotation takes it there
         return
-    for axis, estimate in zip(AXES, found.misalignment_deg, strict=True):
+    for axis, estimate in zip(AXES, alignment.misalignment_deg, strict=True):
         yield Figure("misalignment", axis, estimate, used)
-    for pair, estimate in zip(PAIRS, found.orthogonality_deg, strict=True):
+    for pair, estimate in zip(PAIRS, alignment.orthogonality_deg, strict=True):
         yield Figure("orthogonality", pair, estimate, used)
 
 

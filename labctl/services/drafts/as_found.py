@@ -30,11 +30,11 @@ COVERAGE = 2.0
 def applied(store: Store, row: CalibrationRecord, measured: Measurements) -> tuple[AppliedDraft | None, str]:
     """Return what a version leaves of a recording, or None and why it cannot be applied."""
     try:
-        found = verify(store, row, measured)
+        verification = verify(store, row, measured)
         lines = _lines(row, measured)
     except REFUSALS as error:
         return None, str(error)
-    kept = found.model_dump(include=set(AppliedDraft.model_fields))
+    kept = verification.model_dump(include=set(AppliedDraft.model_fields))
     return AppliedDraft.model_validate({**kept, "lines": lines}), ""
 
 
@@ -89,7 +89,9 @@ def _changes(in_force: CalibrationRecord, draft: CalibrationRecord) -> tuple[lis
     if centres[0] != centres[1]:
         return [], f"the models are centred on different temperatures, {centres[0]} and {centres[1]} deg C"
     before = list(_entries(old["axes"]))
-    changes = [_change(entry, found) for entry in _entries(new["axes"]) if (found := _same(entry, before)) is not None]
+    changes = [
+        _change(entry, matching) for entry in _entries(new["axes"]) if (matching := _same(entry, before)) is not None
+    ]
     return changes, "" if changes else "no coefficient is at the same temperature in both"
 
 
@@ -98,8 +100,8 @@ _Entry = tuple[str, str, float | None, float, float | None, str]
 
 
 def _entries(axes: Mapping[str, AxisCoefficients]) -> Iterator[_Entry]:
-    for axis, found in axes.items():
-        coefficients = found["coefficients"]
+    for axis, axis_answer in axes.items():
+        coefficients = axis_answer["coefficients"]
         nodes = coefficients.get("temperature_c")
         for name, entry in coefficients.items():
             if not isinstance(entry, dict):

@@ -43,18 +43,18 @@ def _results(
         why = "" if error.heldout_rms_dps is not None else "no temperature could be left out of the fit"
         yield _result("heldout_rms_dps", None, error.heldout_rms_dps, most, why)
     if (most := limits.max_error_dps) is not None:
-        found = None if as_left is None else {axis: one.max_dps for axis, one in as_left.axes.items()}
-        yield from _by_axis("max_error_dps", found, most, "the draft cannot be applied to the recording")
+        results = None if as_left is None else {axis: one.max_dps for axis, one in as_left.axes.items()}
+        yield from _by_axis("max_error_dps", results, most, "the draft cannot be applied to the recording")
     if (most := limits.drift_dps) is not None:
         largest = None if drift is None else drift.largest_dps
         yield from _by_axis("drift_dps", largest, most, "no version was in force, or it cannot be applied")
 
 
-def _by_axis(limit: Limit, found: dict[str, float] | None, most: float, why: str) -> Iterator[LimitResult]:
-    if not found:
+def _by_axis(limit: Limit, largest_by_axis: dict[str, float] | None, most: float, why: str) -> Iterator[LimitResult]:
+    if not largest_by_axis:
         yield _result(limit, None, None, most, why)
         return
-    for axis, value in found.items():
+    for axis, value in largest_by_axis.items():
         yield _result(limit, axis, value, most, "")
 
 
@@ -101,17 +101,17 @@ def _assessed(store: Store, draft: CalibrationRecord, rules: FitRules) -> Assess
 
 
 def _compared(measured: Measurements, rules: FitRules) -> list[ComparedModel]:
-    found: list[ComparedModel] = []
+    models: list[ComparedModel] = []
     for model in rules.compare:
         report_stage(f"fitting {model}")
         try:
             error = fit(measured.source, model, [], covered=measured.covered).error
         except (BadInput, NotEnoughData, NotConverged) as refusal:
-            found.append(ComparedModel(model=model, error=None, why=str(refusal)))
+            models.append(ComparedModel(model=model, error=None, why=str(refusal)))
             continue
         figures = {name: getattr(error, name) for name in CertifiedErrors.model_fields}
-        found.append(ComparedModel(model=model, error=CertifiedErrors.model_validate(figures)))
-    return found
+        models.append(ComparedModel(model=model, error=CertifiedErrors.model_validate(figures)))
+    return models
 
 
 def _smallest_heldout(compared: list[ComparedModel], measured: Measurements) -> str | None:
@@ -137,8 +137,8 @@ def _as_found(
         return None, "no version was in force", None
     report_stage(f"applying version {version}")
     in_force = store.calibrations.get(draft.serial, version)
-    found, why = applied(store, in_force, measured)
+    verification, why = applied(store, in_force, measured)
     try:
-        return found, why, drift_from(in_force, draft, measured)
+        return verification, why, drift_from(in_force, draft, measured)
     except REFUSALS as error:
-        return found, why or str(error), None
+        return verification, why or str(error), None

@@ -90,11 +90,11 @@ class GyroSource:
         return Block(self._columns(readings), readings.lost, readings.damaged)
 
     def _columns(self, readings: Readings) -> dict[str, NDArray[np.generic]]:
-        found: dict[str, NDArray[np.generic]] = {"t_s": readings.t_s - (self._first_s or 0.0)}
+        columns: dict[str, NDArray[np.generic]] = {"t_s": readings.t_s - (self._first_s or 0.0)}
         for channel in self._gyro.channels:
             if channel.name in BY_NAME:
-                found[channel.name] = channel.value(readings.raw[channel.name])
-        return found | {"valid": readings.valid.astype(np.int64)}
+                columns[channel.name] = channel.value(readings.raw[channel.name])
+        return columns | {"valid": readings.valid.astype(np.int64)}
 
     def ask(self, request: PoseRequest | None) -> None:
         """Have the simulated person of a simulated bench do it; at a real one a person reads it."""

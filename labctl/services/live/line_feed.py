@@ -52,13 +52,13 @@ class DescriptorFeed:
             )
 
     def take(self) -> bytes | None:
-        found = b""
-        while len(found) < MOST_BYTES and select.select([self._descriptor], [], [], 0)[0]:
+        chunk = b""
+        while len(chunk) < MOST_BYTES and select.select([self._descriptor], [], [], 0)[0]:
             data = os.read(self._descriptor, 1 << 16)
             if not data:
-                return found or None
-            found += data
-        return found
+                return chunk or None
+            chunk += data
+        return chunk
 
     def close(self) -> None:
         """Leave it open: the process has it from its parent."""
@@ -90,18 +90,18 @@ class TcpFeed:
         self._socket.setblocking(False)
 
     def take(self) -> bytes | None:
-        found = b""
-        while self._socket is not None and len(found) < MOST_BYTES:
+        chunk = b""
+        while self._socket is not None and len(chunk) < MOST_BYTES:
             try:
                 data = self._socket.recv(1 << 16)
             except BlockingIOError:
-                return found
+                return chunk
             except OSError:  # reset by the sender: what it sent before is kept
                 data = b""
             if not data:
-                return found or None
-            found += data
-        return found
+                return chunk or None
+            chunk += data
+        return chunk
 
     def close(self) -> None:
         if self._socket is not None:

@@ -52,10 +52,10 @@ class UncertaintyHistory:
     def answer(self, number: int) -> LiveHistoryResponse:
         """Return all of it, by coefficient."""
         points = list(self._points)
-        found: dict[tuple[str, str], LiveUncertaintyColumn] = {}
+        columns: dict[tuple[str, str], LiveUncertaintyColumn] = {}
         for k, point in enumerate(points):
             for each in point.coefficients:
-                column = found.setdefault(
+                column = columns.setdefault(
                     (each.axis, each.name),
                     LiveUncertaintyColumn(
                         axis=each.axis, name=each.name, unit=each.unit, limit=each.limit, expanded=[None] * len(points)
@@ -66,7 +66,7 @@ class UncertaintyHistory:
             number=number,
             t_s=[point.t_s for point in points],
             poses=[point.poses for point in points],
-            coefficients=list(found.values()),
+            coefficients=list(columns.values()),
         )
 
 

@@ -48,7 +48,7 @@ def misalignment_outlook(plan: Plan, bench: BenchFile, limits: BenchLimits) -> M
     if not shares or not stated:
         return None
     now = _expanded(bench, shares)
-    found = []
+    outlooks = []
     for what, table, wider in _wider(plan.recipe):
         try:
             other = make_plan(wider, limits)
@@ -61,9 +61,9 @@ def misalignment_outlook(plan: Plan, bench: BenchFile, limits: BenchLimits) -> M
             turned=what, expanded=expanded, mountings=len(then) - len(shares),
             more_s=other.expected_s - plan.expected_s, recipe_toml=table,
         )  # fmt: skip
-        found.append(more)
+        outlooks.append(more)
     return MisalignmentOutlook(
-        expanded=now, further=sorted(found, key=lambda each: (each.expanded, each.more_s)),
+        expanded=now, further=sorted(outlooks, key=lambda each: (each.expanded, each.more_s)),
         not_stated=[each for each in ANGLE_QUANTITIES if each not in stated],
     )  # fmt: skip
 
@@ -164,13 +164,13 @@ def plan_answer(
 
 def _guessed(plan: Plan, bench: BenchFile) -> list[str]:
     """Return the figures of the expected time that no file states, in words."""
-    found: list[str] = []
+    guessed: list[str] = []
     if bench.air_tau_s is None and any(isinstance(step, MoveChamber) and step.expected_s for step in plan.steps):
-        found.append(
+        guessed.append(
             f"the air of the chamber follows a ramp with a time constant of {USUAL_AIR_TAU_S:g} s; state air_tau_s in "
             "[chamber] of the bench file"
         )
     mounts = [step.expected_s for step in plan.steps if isinstance(step, Mount) and step.expected_s]
     if mounts:
-        found.append(f"a person takes {mounts[0] / 60:g} min to mount the units")
-    return found
+        guessed.append(f"a person takes {mounts[0] / 60:g} min to mount the units")
+    return guessed

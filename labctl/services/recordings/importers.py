@@ -26,8 +26,8 @@ from labctl.services.recordings.staging import staging_folder
 from labctl.services.recordings.time_order import OUT_OF_ORDER, OutOfOrder, leaves_out_rows, refuse_unknown
 
 
-def _importer(found: object) -> Importer[Any] | TableImporter[Any]:
-    return found if isinstance(found, TableImporter) else instance_of(Importer)(found)
+def _importer(importer: object) -> Importer[Any] | TableImporter[Any]:
+    return importer if isinstance(importer, TableImporter) else instance_of(Importer)(importer)
 
 
 IMPORTERS: PluginGroup[Importer[Any] | TableImporter[Any]] = PluginGroup("labctl.importers", "importer", _importer)
@@ -78,15 +78,15 @@ def as_interchange(
 
 def parsed_options(texts: Sequence[str]) -> dict[str, str]:
     """Return options KEY=VALUE by key; raises BadInput."""
-    found: dict[str, str] = {}
+    options: dict[str, str] = {}
     for text in texts:
         key, equals, value = text.partition("=")
         if not equals or not key:
             raise BadInput(f"--option {text}: write KEY=VALUE")
-        if key in found:
+        if key in options:
             raise BadInput(f"--option {text}: {key} is given twice; give it once")
-        found[key] = value
-    return found
+        options[key] = value
+    return options
 
 
 def surest(path: Path) -> str:
@@ -143,13 +143,13 @@ def read_with(
             tables = [_table(each, column_map) for each in beside]
             made = mapped_file(name, importer, path, given, column_map, tables, out_of_order)
         else:
-            found = instance_of(Recording)(importer.read(path, given))
+            recording = instance_of(Recording)(importer.read(path, given))
     if made is not None:
         if accept is not None:
             accept(made)
-        found = made.recording
+        recording = made.recording
     read_by = f"read from {path.name} by importer {name} of {plugin.release}"
-    return _checked(path, found, read_by)
+    return _checked(path, recording, read_by)
 
 
 def log_with_map(

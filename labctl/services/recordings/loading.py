@@ -64,13 +64,13 @@ def is_profile(row: RecordingRow) -> bool:
     return row.kind == "samples" and row.info.get("motion") == "profile"
 
 
-def _with_steps(points: Recording, found: RecordingInspection) -> Recording:
+def _with_steps(points: Recording, inspection: RecordingInspection) -> Recording:
     """Return means with a column for what coarse steps of an output leave in them, where they do."""
-    if not found.quantisation_dps:
+    if not inspection.quantisation_dps:
         return points
     columns = dict(points.columns)
-    numbers, dataset = np.asarray(found.dataset), np.asarray(columns["dataset"], dtype=np.int64)
-    for axis, u_dps in found.quantisation_dps.items():
+    numbers, dataset = np.asarray(inspection.dataset), np.asarray(columns["dataset"], dtype=np.int64)
+    for axis, u_dps in inspection.quantisation_dps.items():
         unit = next((unit for name, unit in points.info.output.items() if name == axis), None)
         scale = abs(unit.scale) if unit else 1.0
         columns[f"gyro_{axis}{QUANTISATION}"] = per_reading(dataset, numbers, scale * np.asarray(u_dps))
@@ -151,10 +151,10 @@ def passed_over(
         return []
     chosen = rows[-1]
     newer = [row for row in store.recordings.of_unit(chosen.serial) if row.id > chosen.id and _measured(row)]
-    found = [row.id for row in reversed(newer) if is_to_verify(store, row)]
-    if not found:
+    passed = [row.id for row in reversed(newer) if is_to_verify(store, row)]
+    if not passed:
         return []
-    named = f"recording {found[0]}" if len(found) == 1 else f"recordings {', '.join(map(str, found))}"
+    named = f"recording {passed[0]}" if len(passed) == 1 else f"recordings {', '.join(map(str, passed))}"
     finding = Finding(
         "passed_over", "likely", named, f"measured only to verify a calibration, so recording {chosen.id} was used",
         None, "", "data sets that a fit takes in", "name another recording with --recording ID",

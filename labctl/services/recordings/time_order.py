@@ -45,10 +45,10 @@ class OutOfOrder:
 
     def rows_in_order(self, table: RawTable, column_map: ColumnMap) -> RawTable:
         """Return the log without those rows."""
-        kept, found = in_order_of_time(table, column_map)
-        if found is None or not (found.may_leave_out or self.also_steps):
+        kept, problem = in_order_of_time(table, column_map)
+        if problem is None or not (problem.may_leave_out or self.also_steps):
             return table
-        self.findings.append(found)
+        self.findings.append(problem)
         return kept
 
     def stated(self, recording: Recording, rows: int) -> Recording:

@@ -113,14 +113,14 @@ def _over_temperature(surface: Surface) -> tuple[list[PaperFigure], list[Missing
     absent: list[str] = []
     for size in paper.FIGURE_4_RATES_DPS:
         traces: list[PaperTrace] = []
-        found: list[str] = []
+        sentences: list[str] = []
         for wanted in (size, -size):
             nearest = float(centre[int(np.argmin(np.abs(centre - wanted)))])
             if abs(nearest - wanted) > NEAR_DPS:
                 absent.append(f"{wanted:+g}")
                 continue
             here, sign = centre == nearest, "+" if wanted > 0 else "-"
-            found.append(f"{nearest:+.1f}")
+            sentences.append(f"{nearest:+.1f}")
             warm, output = surface.temperature_c[here], float(surface.output_dps[here].mean())
             grid = np.linspace(warm.min(), warm.max(), ALONG)
             traces += [
@@ -128,7 +128,7 @@ def _over_temperature(surface: Surface) -> tuple[list[PaperFigure], list[Missing
                 trace(f"model, {sign} deg/s", grid, _modelled(surface, np.full(ALONG, output), grid), "line"),
             ]
         if traces:
-            panels.append(panel(f"{' and '.join(found)} deg/s", WARM, ERROR, traces))
+            panels.append(panel(f"{' and '.join(sentences)} deg/s", WARM, ERROR, traces))
     drawn = sum(len(t["x"]) for p in panels for t in p["traces"] if t["kind"] == "points")
     missing = []
     if absent:

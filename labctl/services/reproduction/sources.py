@@ -97,11 +97,11 @@ def rest_in(columns: Columns, recording: Recording) -> Rest | None:
     if not still and np.abs(np.asarray(columns["table_rate_dps"], dtype=np.float64)[good]).max() > AT_REST_DPS:
         return None
     t_s = np.asarray(columns["t_s"], dtype=np.float64)[good]
-    found = {}
+    rests = {}
     for axis in recording.info.axes:
         unit = recording.info.output.get(axis, OutputUnit())
-        found[str(axis)] = (np.asarray(columns[f"gyro_{axis}"], dtype=np.float64)[good] - unit.offset) / unit.scale
-    return Rest(t_s - t_s[0], found)
+        rests[str(axis)] = (np.asarray(columns[f"gyro_{axis}"], dtype=np.float64)[good] - unit.offset) / unit.scale
+    return Rest(t_s - t_s[0], rests)
 
 
 def _rest_of(recording: Recording) -> Rest | None:

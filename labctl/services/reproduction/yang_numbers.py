@@ -41,29 +41,29 @@ def conditions(name: str, data: FitData) -> Iterator[Value]:
 def k_g(fitted: FittedModel, temperature_c: float) -> dict[str, float]:
     """Return K_g by the paper's names at a temperature: Kij multiplies the rate about i in output j; B in deg/s."""
     basis = fitted.model.temperature.basis(np.array([temperature_c]))
-    found = {}
+    values = {}
     for out, axis in fitted.axes.items():
         for name, value in zip(axis.names, (axis.values @ basis.T)[:, 0], strict=True):
             if name == "bias":
-                found[f"B{out}"] = float(value)
+                values[f"B{out}"] = float(value)
             elif name == "scale_factor":
-                found[f"K{out}{out}"] = 1.0 + float(value)
+                values[f"K{out}{out}"] = 1.0 + float(value)
             elif name.startswith("misalignment_"):
-                found[f"K{name[-1]}{out}"] = float(value)
-    return found
+                values[f"K{name[-1]}{out}"] = float(value)
+    return values
 
 
 def coefficients(judged: Judged) -> Iterator[Value]:
     models = {"proposed": judged.proposed_model, "traditional": judged.traditional_model}
     for kind, fitted in models.items():
-        found = k_g(fitted, SHOWN_C) if fitted is not None else {}
+        sensitivities = k_g(fitted, SHOWN_C) if fitted is not None else {}
         why = (
             "interpolated to 25 deg C; the size is compared, as signs are lost in print"
             if kind == "proposed"
             else "of the one temperature nearest to 25 deg C; the size is compared"
         )
         for name in paper.NAMES:
-            value = abs(found[name]) if name in found else None
+            value = abs(sensitivities[name]) if name in sensitivities else None
             yield Value(f"{kind}_{name}", judged.name, value, why if value is not None else "this axis was not turned")
 
 

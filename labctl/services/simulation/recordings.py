@@ -82,7 +82,7 @@ def make_recording(request: SimulateRequest, serial: str | None = None) -> Made:
 
 
 def _gyro(bench: BenchFile, name: str | None) -> GyroSettings:
-    found = [gyro for gyro in bench.gyros if name in {None, gyro.name}]
-    if not found:
+    gyros = [gyro for gyro in bench.gyros if name in {None, gyro.name}]
+    if not gyros:
         raise BadInput(f"bench {bench.name} has no gyro {name!r}; choose {', '.join(g.name for g in bench.gyros)}")
-    return found[0]
+    return gyros[0]

@@ -44,8 +44,8 @@ def matched(store: Store, standards: Sequence[Standard]) -> list[tuple[Standard,
 
 def _match(entry: Standard, known: Sequence[RegisteredStandard]) -> RegisteredStandard | None:
     """Return the standard that an entry names, else the one whose certificate it names."""
-    found = sorted((one for one in known if is_entry_of(one, entry)), key=lambda one: not is_named(one, entry))
-    return next(iter(found), None)
+    matches = sorted((one for one in known if is_entry_of(one, entry)), key=lambda one: not is_named(one, entry))
+    return next(iter(matches), None)
 
 
 def as_used(store: Store, standards: Sequence[Standard], on: date) -> tuple[Standard, ...]:
@@ -56,9 +56,9 @@ def as_used(store: Store, standards: Sequence[Standard], on: date) -> tuple[Stan
 def _as_used(entry: Standard, known: RegisteredStandard, on: date) -> Standard:
     """Return an entry with the larger uncertainty, the known error of the day and the earlier due date."""
     due = min((day for day in (entry.due, due_of(known)) if day is not None), default=None)
-    found = entry if due == entry.due else entry.model_copy(update={"due": due})
+    standard = entry if due == entry.due else entry.model_copy(update={"due": due})
     if not _is_comparable(entry, known):
-        return found
+        return standard
     predictions = [each for _, each in predictions_of(known, on)]
     u = max((each.u for each in predictions), default=0.0)
     changed: dict[str, object] = {}
@@ -67,7 +67,7 @@ def _as_used(entry: Standard, known: RegisteredStandard, on: date) -> Standard:
     left = max(_left(entry, known, predictions), key=abs, default=entry.uncorrected)
     if abs(left - entry.uncorrected) > ROUNDING * max(u, entry.standard_u):
         changed |= {"value": left, "corrected": False}
-    return found.model_copy(update=changed) if changed else found
+    return standard.model_copy(update=changed) if changed else standard
 
 
 def _left(entry: Standard, known: RegisteredStandard, predictions: Sequence[Prediction]) -> Iterator[float]:

@@ -94,7 +94,7 @@ def affected(store: Store, label: str, bad_from: date | None = None, bad_until: 
         row.id: row for row in touched if any(overlaps(*days[row.id], *span) for span in spans)
     }  # fmt: skip
     serials = sorted({row.serial for row in inside.values()})
-    found = [
+    versions = [
         _affected(store, version, [inside[n] for n in version.recordings if n in inside], days, standard)
         for serial in serials
         for version in reversed(store.calibrations.of_unit(serial))
@@ -105,8 +105,8 @@ def affected(store: Store, label: str, bad_from: date | None = None, bad_until: 
         label=standard.row.label,
         bad_from=None if None in starts else min(each for each in starts if each is not None),
         bad_until=None if None in ends else max(each for each in ends if each is not None),
-        calibrations=found,
-        text=list(_text(standard, found)),
+        calibrations=versions,
+        text=list(_text(standard, versions)),
     )
 
 
@@ -140,19 +140,19 @@ def _affected(
     )
 
 
-def _text(standard: RegisteredStandard, found: Sequence[AffectedCalibration]) -> Iterator[str]:
+def _text(standard: RegisteredStandard, calibrations: Sequence[AffectedCalibration]) -> Iterator[str]:
     label = standard.row.label
-    if not found:
+    if not calibrations:
         yield f"No calibration was measured with standard {label} on these days."
         return
-    units = len({each.serial for each in found})
-    issued = [number for each in found for number in each.certificates]
-    what = "calibration" if len(found) == 1 else "calibrations"
-    of, was = ("unit", "was") if units == 1 == len(found) else ("unit" if units == 1 else "units", "were")
-    yield f"{len(found)} {what} of {units} {of} {was} measured with standard {label} on these days."
+    units = len({each.serial for each in calibrations})
+    issued = [number for each in calibrations for number in each.certificates]
+    what = "calibration" if len(calibrations) == 1 else "calibrations"
+    of, was = ("unit", "was") if units == 1 == len(calibrations) else ("unit" if units == 1 else "units", "were")
+    yield f"{len(calibrations)} {what} of {units} {of} {was} measured with standard {label} on these days."
     if issued:
         yield f"Certificates issued of them: {', '.join(issued)}. Inform those who hold them, and measure again."
-    if any(each.in_force for each in found):
+    if any(each.in_force for each in calibrations):
         yield "Versions in force are among them: revoke them, or state why they remain usable."
 
 

@@ -60,8 +60,8 @@ def anchor_fits(engine: sa.Engine, location: str) -> bool:
     with engine.connect() as connection:
         if not sa.inspect(connection).has_table(m.name):
             return True
-        found = connection.scalar(sa.select(m.c.hash).where(m.c.sequence == kept.length))
-    return found == kept.hash
+        anchored_hash = connection.scalar(sa.select(m.c.hash).where(m.c.sequence == kept.length))
+    return anchored_hash == kept.hash
 
 
 def parse_anchor(text: str) -> ChainHead:

@@ -169,16 +169,16 @@ class Database:
 
     def _refuse_old(self) -> None:
         """Make the tables of an empty database; one of an earlier version is only migrated when a person asks."""
-        found = self.revision()
-        if found is None:
+        revision = self.revision()
+        if revision is None:
             if not self.writes and not is_url(self.location):
                 Database(self.location, write=True).close()
             else:
                 self.upgrade()
-        elif found != migrate.HEAD:
-            migrate.refuse_unknown(found, self._shown)
+        elif revision != migrate.HEAD:
+            migrate.refuse_unknown(revision, self._shown)
             raise OldSchema(
-                f"{self._shown}: the schema of the database is number {found}, this version of labctl needs number "
+                f"{self._shown}: the schema of the database is number {revision}, this version of labctl needs number "
                 f"{migrate.HEAD}; run `labctl migrate --database {self._shown}`"
             )
 

@@ -36,10 +36,10 @@ Identity = tuple[int, int]
 def identity_of(path: str) -> Identity | None:
     """Return device and inode of what a path names; None where there is nothing."""
     try:
-        found = os.stat(path)  # noqa: PTH116  before every commit: a Path costs several times as much
+        file_status = os.stat(path)  # noqa: PTH116  before every commit: a Path costs several times as much
     except OSError:
         return None
-    return found.st_dev, found.st_ino
+    return file_status.st_dev, file_status.st_ino
 
 
 class FileIdentity:
@@ -92,8 +92,8 @@ def first_damage(connection: sa.Connection) -> str:
     if pages * page_bytes <= WHOLE_UP_TO_BYTES:
         return _damage(connection, "PRAGMA quick_check(1)")
     names = connection.exec_driver_sql("SELECT name FROM sqlite_schema WHERE type = 'table' ORDER BY name").scalars()
-    found = (_damage(connection, f"PRAGMA quick_check('{name}')") for name in names.all() if name != READINGS)
-    return next(filter(None, found), "")
+    damages = (_damage(connection, f"PRAGMA quick_check('{name}')") for name in names.all() if name != READINGS)
+    return next(filter(None, damages), "")
 
 
 def _damage(connection: sa.Connection, check: str) -> str:

@@ -65,9 +65,9 @@ def _copy(location: str, made: Path) -> None:
         source.execute("PRAGMA query_only=ON")
         source.backup(copy)  # in one go, from one snapshot; the writer is not kept waiting
         copy.execute("PRAGMA journal_mode=DELETE")  # one file, with no log beside it
-        found = [row[0] for row in copy.execute("PRAGMA integrity_check(1)")]
-        if found != ["ok"]:
-            raise sqlite3.DatabaseError(found[0])
+        complaints = [row[0] for row in copy.execute("PRAGMA integrity_check(1)")]
+        if complaints != ["ok"]:
+            raise sqlite3.DatabaseError(complaints[0])
 
 
 def _synced_digest(path: Path) -> str:

@@ -64,10 +64,10 @@ class ManifestCheck:
         wanted = {(head.length, head.hash): where for where, head in anchors.items()}
         hashes: dict[int, str] = {}
         for row, document in self._rows():
-            found = self.chain
-            if (sequence := int(row.sequence)) != found.head.length + 1:
+            checked_chain = self.chain
+            if (sequence := int(row.sequence)) != checked_chain.head.length + 1:
                 self._find("manifests", f"manifests before manifest {sequence} are missing: the chain has a gap")
-            for text in _misfits(row, document, found.head.hash):
+            for text in _misfits(row, document, checked_chain.head.hash):
                 self._find("manifests", f"manifest {sequence} {text}")
             self._take(row, document)
             self._verify(row)
@@ -93,16 +93,16 @@ class ManifestCheck:
             yield row, document if isinstance(document, dict) else {}
 
     def _take(self, row: sa.Row[*tuple[Any, ...]], document: Mapping[str, Any]) -> None:
-        found = self.chain
-        found.head = ChainHead(int(row.sequence), str(row.hash))
-        found.trail = max(found.trail, (document.get("audit") or {}).get("length", 0))
+        checked_chain = self.chain
+        checked_chain.head = ChainHead(int(row.sequence), str(row.hash))
+        checked_chain.trail = max(checked_chain.trail, (document.get("audit") or {}).get("length", 0))
         if not row.kind:
             return
         made = _Sealed(
             int(row.sequence), str(document.get("title") or f"{row.kind} {row.record}"), str(row.act),
             str(document.get("at", "")), str(document.get("reason", "")), document.get("parts") or {},
         )  # fmt: skip
-        found.newest[(row.kind, row.record)] = made
+        checked_chain.newest[(row.kind, row.record)] = made
         for name in document.get("unfit", ()):
             text = f"{name} had been changed by hand before it was changed in order on {made.at[:10]}"
             self._find(row.kind, f"{made.title}: {text} (manifest {made.sequence}, {made.reason})")
@@ -118,18 +118,18 @@ class ManifestCheck:
             self.chain.signed = int(row.sequence)
 
     def _check_end(self, wanted: Mapping[tuple[int, str], str], hashes: Mapping[int, str]) -> None:
-        found, said = self.chain.head, chain.head_of(self._connection)
+        computed, said = self.chain.head, chain.head_of(self._connection)
         if said is None:
             self._find("manifests", "the head of the chain, which counts the manifests, is missing")
-        elif said.length > found.length:
-            self._find("manifests", f"the last {said.length - found.length} manifests are missing")
-        elif said != found:
+        elif said.length > computed.length:
+            self._find("manifests", f"the last {said.length - computed.length} manifests are missing")
+        elif said != computed:
             self._find("manifests", "the last manifest is not the one that the head of the chain names")
         for (length, digest), where in wanted.items():
-            if length > found.length:
+            if length > computed.length:
                 self._find(
                     "manifests",
-                    f"{length - found.length} manifests that {where} counts are missing: the end of the chain was "
+                    f"{length - computed.length} manifests that {where} counts are missing: the end of the chain was "
                     "removed, or an older copy of the database was put in its place",
                 )
             elif hashes.get(length) != digest:

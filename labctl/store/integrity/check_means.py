@@ -32,13 +32,13 @@ class MeansCheck:
 
         A data set with a damaged block has its own finding.
         """
-        found: list[str] = []
+        complaints: list[str] = []
         if (recording, number) != self._place:
-            found = self.rest()
+            complaints = self.rest()
             self._place = (recording, number)
         self._damaged |= columns is None
         self._parts += [columns] if columns is not None else []
-        return found
+        return complaints
 
     def rest(self) -> list[str]:
         """Return what is wrong with the data set whose blocks came last, one line a channel."""
@@ -83,20 +83,20 @@ class KeptMeans:
             return [f"the readings have no column {', '.join(absent)}"]
         columns = scaled(dict(raw), self._channels, cast(DataSetHead, self._heads[number])) if self._channels else raw
         valid = np.asarray(columns["valid"]) != 0 if "valid" in columns else slice(None)
-        found = []
+        damages = []
         for channel, mean, std, n in kept:
             if channel not in columns:
-                found.append(f"the readings have no column {channel}, but its mean is stored")
+                damages.append(f"the readings have no column {channel}, but its mean is stored")
                 continue
             now = statistics(np.asarray(columns[channel])[valid].astype(np.float64), spectrum=False)
             if now.n != n:
-                found.append(f"the stored mean of {channel} is of {n} readings, but {now.n} readings are stored")
+                damages.append(f"the stored mean of {channel} is of {n} readings, but {now.n} readings are stored")
             elif not (_same(mean, now.mean) and _same(std, now.std)):
-                found.append(
+                damages.append(
                     f"the stored mean of {channel} is {mean:.9g} +- {std}, but the readings give {now.mean:.9g} +- "
                     f"{now.std}"
                 )
-        return found
+        return damages
 
 
 def _same(kept: float | None, now: float | None) -> bool:

@@ -50,13 +50,13 @@ def remove_abandoned(folder: Path) -> list[Path]:
     """
     removed = []
     with suppress(OSError):
-        for found in sorted(folder.glob(f"{PREFIX}*")):
+        for path in sorted(folder.glob(f"{PREFIX}*")):
             with suppress(OSError):
-                handle = os.open(found, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+                handle = os.open(path, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
                 try:
-                    if os.fstat(handle).st_uid == os.getuid() and _lock(handle) and _holds_only_a_copy(found):
-                        shutil.rmtree(found)
-                        removed.append(found)
+                    if os.fstat(handle).st_uid == os.getuid() and _lock(handle) and _holds_only_a_copy(path):
+                        shutil.rmtree(path)
+                        removed.append(path)
                 finally:
                     os.close(handle)
     return removed

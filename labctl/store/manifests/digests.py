@@ -99,9 +99,9 @@ def block_digests(columns: Mapping[str, NDArray[np.generic]]) -> dict[str, str]:
     """Return a digest for each group of the columns (n,) of a block, equal before packing and after unpacking."""
     made = {group: hashlib.sha256() for group in GROUPS}
     for name in sorted(columns):
-        found = made[group_of(name)]
-        found.update(name.encode() + b"\n")
-        found.update(_content(columns[name]))
+        group_digests = made[group_of(name)]
+        group_digests.update(name.encode() + b"\n")
+        group_digests.update(_content(columns[name]))
     return {group: each.hexdigest() for group, each in made.items()}
 
 

@@ -42,13 +42,13 @@ class BlockParts:
 def parts_of(connection: sa.Connection, kind: Kind, record: str, *, blocks: bool = True) -> Parts:
     """Return the digest of every part of a record; those of blocks, unless left out, by what is kept of them."""
     key = kind.key_of(record)
-    found: dict[str, JsonObject] = {}
+    contents: dict[str, JsonObject] = {}
     for part in kind.parts:
         rows: Iterable[sa.Row[*tuple[object, ...]]] = connection.execute(
             part.query(key).execution_options(yield_per=AT_ONCE)
         )
-        found[part.name] = digest_of_rows(rows).as_json()
-    return {**found, **(_block_parts(connection, int(key)) if kind.has_blocks and blocks else {})}
+        contents[part.name] = digest_of_rows(rows).as_json()
+    return {**contents, **(_block_parts(connection, int(key)) if kind.has_blocks and blocks else {})}
 
 
 def _block_parts(connection: sa.Connection, recording: int) -> Parts:

@@ -114,17 +114,17 @@ class Campaigns:
 
     def get(self, campaign: int) -> CampaignRow:
         """Return one campaign; raises NotFound."""
-        found = self._rows(tables.campaigns.c.id == campaign)
-        if not found:
+        rows = self._rows(tables.campaigns.c.id == campaign)
+        if not rows:
             raise NotFound(f"campaign {campaign} is not in this database; `labctl campaign list` shows the campaigns")
-        return found[0]
+        return rows[0]
 
     def newest(self) -> CampaignRow:
         """Return the campaign made last; raises NotFound when there is none."""
-        found = self._rows(tables.campaigns.c.id == sa.select(sa.func.max(tables.campaigns.c.id)).scalar_subquery())
-        if not found:
+        rows = self._rows(tables.campaigns.c.id == sa.select(sa.func.max(tables.campaigns.c.id)).scalar_subquery())
+        if not rows:
             raise NotFound("there is no campaign in this database yet; `labctl campaign start RECIPE` starts one")
-        return found[0]
+        return rows[0]
 
     def newest_of_unit(self, serial: str) -> CampaignRow | None:
         """Return the campaign in which a unit was measured last; None for none."""
@@ -180,10 +180,12 @@ class Campaigns:
     def state(self, campaign: int) -> CampaignState:
         """Return the state of one campaign; raises NotFound."""
         with self._database.reading() as connection:
-            found = connection.scalar(sa.select(tables.campaigns.c.state).where(tables.campaigns.c.id == campaign))
-        if found is None:
+            stored_state = connection.scalar(
+                sa.select(tables.campaigns.c.state).where(tables.campaigns.c.id == campaign)
+            )
+        if stored_state is None:
             raise NotFound(f"campaign {campaign} is not in this database; `labctl campaign list` shows the campaigns")
-        return found
+        return stored_state
 
     def count_by_state(self) -> dict[str, int]:
         """Return how many campaigns there are in each state that has any."""

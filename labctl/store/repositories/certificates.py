@@ -173,7 +173,7 @@ class Certificates:
         return CertificateForms(bytes(row.document), bytes(row.xml), bytes(row.pdf))
 
 
-def _row(found: Sequence[Any]) -> CertificateRow:
-    own, document = found[: -len(_WITHDRAWAL) - 1], found[-len(_WITHDRAWAL) - 1]
+def _row(columns: Sequence[Any]) -> CertificateRow:
+    own, document = columns[: -len(_WITHDRAWAL) - 1], columns[-len(_WITHDRAWAL) - 1]
     signed_by = json.loads(bytes(document)).get("signed_by")
-    return replace(CertificateRow(*own), withdrawal=_withdrawal(found[-len(_WITHDRAWAL) :]), signed_by=signed_by)
+    return replace(CertificateRow(*own), withdrawal=_withdrawal(columns[-len(_WITHDRAWAL) :]), signed_by=signed_by)

@@ -125,11 +125,11 @@ class Imports:
             query = sa.select(r.id, r.importing).where(r.importing.is_not(None))
             if connection.dialect.name != "sqlite":
                 query = query.where(r.import_sign_at < sa.func.now() - ABANDONED_AFTER)
-            found = [ImportTicket(*row) for row in connection.execute(query)]
-        for ticket in found:
+            tickets = [ImportTicket(*row) for row in connection.execute(query)]
+        for ticket in tickets:
             with suppress(Conflict):
                 self.discard(self.claim(ticket))
-        return len(found)
+        return len(tickets)
 
     @transaction
     def claim(self, ticket: ImportTicket) -> ImportTicket:

@@ -112,10 +112,10 @@ class Recordings:
 
     def get(self, recording: int) -> RecordingRow:
         """Return one recording's head; raises NotFound."""
-        found = self._heads(tables.recordings.c.id == recording)
-        if not found:
+        heads = self._heads(tables.recordings.c.id == recording)
+        if not heads:
             raise NotFound(f"recording {recording} is not in this database; check its number")
-        return found[0]
+        return heads[0]
 
     def of_unit(self, serial: str) -> list[RecordingRow]:
         """Return a unit's recordings, newest first."""

@@ -102,7 +102,7 @@ class ResumePoints:
 
     def _last_t_s(self, connection: sa.Connection, campaign: int, recordings: list[int]) -> float:
         e, v, d = tables.environment.c, tables.events.c, tables.data_sets.c
-        found = [
+        times_s = [
             connection.scalar(sa.select(sa.func.max(v.t_s)).where(v.campaign_id == campaign)),
             connection.scalar(sa.select(sa.func.max(e.t_s)).where(e.recording_id.in_(recordings))),
             connection.scalar(
@@ -111,8 +111,8 @@ class ResumePoints:
         ]
         newest = sa.select(d.recording_id, d.number).where(d.recording_id.in_(recordings), d.state != "complete")
         for recording, number in connection.execute(newest).all():
-            found += [float(part["t_ns"][-1]) / 1e9 for part in blocks_of(connection, recording, number)[-1:]]
-        return max((t_s for t_s in found if t_s is not None), default=0.0)
+            times_s += [float(part["t_ns"][-1]) / 1e9 for part in blocks_of(connection, recording, number)[-1:]]
+        return max((t_s for t_s in times_s if t_s is not None), default=0.0)
 
     @staticmethod
     def _events(connection: sa.Connection, campaign: int, ended_s: float) -> tuple[bool, int]:

@@ -84,12 +84,12 @@ class Starts:
 
     def get(self, start: int) -> StartRow:
         """Return one entry; raises NotFound."""
-        found = self._rows(tables.scheduled_starts.c.id == start)
-        if not found:
+        rows = self._rows(tables.scheduled_starts.c.id == start)
+        if not rows:
             raise NotFound(
                 f"scheduled start {start} is not in this database; `labctl campaign schedule list` shows the starts"
             )
-        return found[0]
+        return rows[0]
 
     def all(self, *, ended: bool) -> list[StartRow]:
         """Return what waits, next first, and what was missed and not removed since; with `ended` all entries."""

@@ -101,13 +101,13 @@ class RegisteredStandard:
 
         A row without a reason is another certificate, also where another laboratory used the same number.
         """
-        found: list[StandardCertificate] = []
+        certificates: list[StandardCertificate] = []
         for each in self.certificates:
-            alike = [one for one in found if one.number == each.number]
+            alike = [one for one in certificates if one.number == each.number]
             if each.reason and alike:
-                found.remove(next((one for one in alike if one.laboratory == each.laboratory), alike[-1]))
-            found.append(each)
-        return tuple(sorted(found, key=lambda each: each.calibrated))
+                certificates.remove(next((one for one in alike if one.laboratory == each.laboratory), alike[-1]))
+            certificates.append(each)
+        return tuple(sorted(certificates, key=lambda each: each.calibrated))
 
     @property
     def bad(self) -> tuple[StandardFinding, ...]:
@@ -152,17 +152,19 @@ class Standards:
         """Return a standard by label or serial; None: it is not in the register."""
         s = tables.standards.c
         with self._database.reading() as connection:
-            found = self._registered(connection, sa.or_(s.label == label, sa.and_(s.serial == label, s.serial != "")))
-        return next(iter(sorted(found, key=lambda each: each.row.label != label)), None)
+            standards = self._registered(
+                connection, sa.or_(s.label == label, sa.and_(s.serial == label, s.serial != ""))
+            )
+        return next(iter(sorted(standards, key=lambda each: each.row.label != label)), None)
 
     def get(self, label: str) -> RegisteredStandard:
         """Return a standard by label or serial. Raises NotFound."""
-        if (found := self.find(label)) is None:
+        if (standard := self.find(label)) is None:
             raise NotFound(
                 f"standard {label!r} is not in the register; `labctl standards list` lists those that are, "
                 "`labctl standards add` adds one"
             )
-        return found
+        return standard
 
     def has_findings(self) -> bool:
         """Return whether any standard was ever found bad: a point query before anything is compared."""
@@ -180,11 +182,11 @@ class Standards:
         numbers = [row.id for row in rows]
 
         def of(table: sa.Table, order: str = "id") -> dict[int, list[sa.Row[Any]]]:
-            found: dict[int, list[sa.Row[Any]]] = {}
+            certificates: dict[int, list[sa.Row[Any]]] = {}
             query = sa.select(table).where(table.c.standard_id.in_(numbers)).order_by(table.c[order], table.c.id)
             for row in connection.execute(query):
-                found.setdefault(row.standard_id, []).append(row)
-            return found
+                certificates.setdefault(row.standard_id, []).append(row)
+            return certificates
 
         certificates, findings = of(tables.standard_certificates), of(tables.standard_findings)
         checks = of(tables.standard_checks, "checked_at")
@@ -257,14 +259,19 @@ class Standards:
         audited: Mapping[str, Any] | None = None,
     ) -> int:
         """Add a row of a standard with its audit row and its manifest; returns its number. Raises NotFound."""
-        found = self.get(label).row.label
+        known_label = self.get(label).row.label
         with self._database.writing() as connection:
             s = tables.standards.c
-            standard = connection.scalar(sa.select(s.id).where(s.label == found))
+            standard = connection.scalar(sa.select(s.id).where(s.label == known_label))
             row = sa.insert(table).values(standard_id=standard, by=by, at=at, **values).returning(table.c.id)
             number = int(connection.scalar(row) or 0)
             append(
-                connection, at, f"standard {act}", f"standard {found}", dict(audited or values), who=acting_key() or by
+                connection,
+                at,
+                f"standard {act}",
+                f"standard {known_label}",
+                dict(audited or values),
+                who=acting_key() or by,
             )
             seal(connection, (kind, str(number)), at, act)
         return number

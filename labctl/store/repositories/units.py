@@ -45,12 +45,12 @@ def remember_unit(connection: sa.Connection, serial: str, model: str, technology
     """Keep a unit that is seen for the first time; fill in what was not known of it."""
     if add_missing_unit(connection, serial, model, technology, at):
         return
-    found = connection.execute(sa.select(tables.units).where(tables.units.c.serial == serial)).one()
-    if (model and not found.model) or (technology and not found.technology):
+    row = connection.execute(sa.select(tables.units).where(tables.units.c.serial == serial)).one()
+    if (model and not row.model) or (technology and not row.technology):
         connection.execute(
             sa.update(tables.units)
             .where(tables.units.c.serial == serial)
-            .values(model=found.model or model, technology=found.technology or technology)
+            .values(model=row.model or model, technology=row.technology or technology)
         )
 
 

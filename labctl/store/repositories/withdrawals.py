@@ -31,8 +31,8 @@ def withdraw(
 
 def withdraw_of_version(connection: sa.Connection, serial: str, version: int, said: Withdrawal) -> list[str]:
     """Withdraw every certificate of a version that is not withdrawn; returns their numbers, oldest first."""
-    found = _standing(connection, serial, version)
-    for number in found:
+    certificates = _standing(connection, serial, version)
+    for number in certificates:
         withdraw(connection, number, said, said.at)
         detail = {"number": number, "reason": said.reason, "by": said.by, "revoked": True}
         append(
@@ -43,7 +43,7 @@ def withdraw_of_version(connection: sa.Connection, serial: str, version: int, sa
             detail,
             who=said.by_key or said.by,
         )
-    return found
+    return certificates
 
 
 def _standing(connection: sa.Connection, serial: str, version: int, issued_until: datetime | None = None) -> list[str]:

@@ -122,8 +122,8 @@ def sealed_at(connection: sa.Connection, campaign: int) -> datetime | None:
         return None
     c = tables.campaigns.c
     row = connection.execute(sa.select(c.ended_at, c.created_at).where(c.id == campaign)).one()
-    found: datetime = row.ended_at or row.created_at
-    return found
+    sealed: datetime = row.ended_at or row.created_at
+    return sealed
 
 
 def prepared_recordings(database: Database, records: Sequence[Record]) -> Prepared:

@@ -40,7 +40,7 @@ def views_of(
         "time": [time_line(view) for view in axes],
         "frequency": [line for view in axes if (line := between_sets(view)) is not None],
         "legs": [line for view in axes for line in hysteresis_lines(view)],
-        "previous_rate": [found for view in axes if (found := previous_rate(view)) is not None],
+        "previous_rate": [rate_before for view in axes if (rate_before := previous_rate(view)) is not None],
         "repeats": [again for view in axes if (again := repeats(view)) is not None],
         "angle": angle,
         "frequency_within": frequency,

@@ -22,14 +22,14 @@ def residual_maps(data: ReducedRecording, left: Mapping[str, Residuals]) -> list
     position = np.asarray(data.nodes["position"]).reshape(len(data), -1)[:, 0].astype(np.str_)
     column = rate_levels(rate)
     rate_level = level_centres(rate, column)
-    found: list[ResidualMap] = []
+    maps: list[ResidualMap] = []
     for axis, residuals in left.items():
         warm = data.at_sets(data.nodes.temperature_c(axis))
         row = temperature_rows(warm, position, column)
         temperature_level, width = level_centres(warm, row), widest(warm, row)
         for there in np.unique(position):
             rows = np.flatnonzero(position == there)
-            found.append(
+            maps.append(
                 {
                     "axis": axis,
                     "position": str(there),
@@ -43,4 +43,4 @@ def residual_maps(data: ReducedRecording, left: Mapping[str, Residuals]) -> list
                     "over_floor": residuals.score[rows].tolist(),
                 }
             )
-    return found
+    return maps

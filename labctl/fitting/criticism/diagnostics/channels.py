@@ -92,7 +92,7 @@ def data_sets(data: ReducedRecording, axes: Sequence[AxisView]) -> DataSetColumn
     if "previous_rate_dps" in data.nodes:
         names.add("previous_rate_dps")
     name, along = time_axis(first)
-    found: DataSetColumns = {
+    set_columns: DataSetColumns = {
         "of": len(first),
         "timed": first.timed,
         "dataset": data.dataset[rows].tolist(),
@@ -104,9 +104,9 @@ def data_sets(data: ReducedRecording, axes: Sequence[AxisView]) -> DataSetColumn
         "over_floor": {view.axis: plain_list(view.over_floor[rows]) for view in axes},
     }
     if RECORDING in data.nodes:
-        found["recording"] = _numbers(first.channel(RECORDING)[rows])
-        found["own_dataset"] = _numbers(first.channel(OWN_DATASET)[rows])
-    return found
+        set_columns["recording"] = _numbers(first.channel(RECORDING)[rows])
+        set_columns["own_dataset"] = _numbers(first.channel(OWN_DATASET)[rows])
+    return set_columns
 
 
 def _numbers(values: Array) -> list[int]:
@@ -197,7 +197,7 @@ def time_line(view: AxisView) -> TimeLine:
     _, along = time_axis(view)
     line = running_mean(view, along, np.ones(len(view), dtype=bool))
     z, p = runs_test(view.whitened)
-    found: TimeLine = {
+    line_json: TimeLine = {
         "axis": view.axis,
         "mean_dps": line["mean_dps"],
         "low_dps": line["low_dps"],
@@ -209,10 +209,10 @@ def time_line(view: AxisView) -> TimeLine:
         "runs_p": plain(p),
     }
     if view.timed:
-        found["t_s"], found["power_on_t_s"] = line["at"], plain_list(along[begins])
+        line_json["t_s"], line_json["power_on_t_s"] = line["at"], plain_list(along[begins])
     else:
-        found["order"], found["power_on_order"] = line["at"], plain_list(along[begins])
-    return found
+        line_json["order"], line_json["power_on_order"] = line["at"], plain_list(along[begins])
+    return line_json
 
 
 def runs_test(values: Array) -> tuple[float, float]:

@@ -106,7 +106,7 @@ def repeats(view: AxisView) -> Repeats | None:
     scatter = float(np.sqrt(np.mean(difference**2) / 2))
     everything = np.arange(len(first))
     shown = everything if len(first) <= MOST_PAIRS else np.sort(np.argsort(difference)[_evenly(len(first), MOST_PAIRS)])
-    found: Repeats = {
+    repeats_json: Repeats = {
         "axis": view.axis,
         "pairs": len(first),
         "scatter_dps": plain(scatter),
@@ -117,8 +117,8 @@ def repeats(view: AxisView) -> Repeats | None:
         "difference_dps": plain_list(difference[shown]),
     }
     if view.timed:
-        found["apart_s"] = plain_list(np.abs(view.t_s[second] - view.t_s[first])[shown])
-    return found
+        repeats_json["apart_s"] = plain_list(np.abs(view.t_s[second] - view.t_s[first])[shown])
+    return repeats_json
 
 
 def _evenly(n: int, most: int) -> NDArray[np.int64]:

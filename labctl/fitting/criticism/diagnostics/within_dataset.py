@@ -65,9 +65,9 @@ class Within:
 
     def _earth(self, values: NDArray[np.float64], axis: str) -> NDArray[np.float64]:
         """Return what once per turn belongs to the Earth's rate, by position: where the latitude is known."""
-        found = np.zeros_like(values)
+        earth_dps = np.zeros_like(values)
         if self.angle is None or self.recording.info.latitude_deg is None:
-            return found
+            return earth_dps
         for there in np.unique(self.position):
             rows = np.flatnonzero(self.position == there)
             if Position.of(there).axis == axis:
@@ -78,8 +78,8 @@ class Within:
             waves = waves - np.einsum("rkm,rmn->kmn", inner, self.basis[:, rows])
             normal = np.einsum("kmn,lmn->kl", waves, waves)
             size = np.linalg.lstsq(normal, np.einsum("kmn,mn->k", waves, values[rows]), rcond=1e-9)[0]
-            found[rows] = np.einsum("k,kmn->mn", size, waves)
-        return found
+            earth_dps[rows] = np.einsum("k,kmn->mn", size, waves)
+        return earth_dps
 
 
 @dataclass(frozen=True)
@@ -130,14 +130,14 @@ def _basis(
     turn = 2 * np.pi * angle if angle is not None else np.zeros_like(since)
     lines = [wave(k * turn) for k in STEP_LINES for wave in (np.cos, np.sin)]
     functions = [there, *lines, since]
-    found = np.zeros((len(functions), *there.shape))
+    basis = np.zeros((len(functions), *there.shape))
     for k, function in enumerate(functions):
         values = function * there
         size = np.sqrt(np.einsum("mn,mn->m", values, values))
         for _ in range(2):
-            inner = np.einsum("rmn,mn->rm", found[:k], values)
-            values = values - np.einsum("rm,rmn->mn", inner, found[:k])
+            inner = np.einsum("rmn,mn->rm", basis[:k], values)
+            values = values - np.einsum("rm,rmn->mn", inner, basis[:k])
         left = np.sqrt(np.einsum("mn,mn->m", values, values))
         independent = left > np.maximum(LEAST_INDEPENDENT_SHARE * size, 1e-9)
-        found[k] = np.where(independent[:, None], values / np.maximum(left, 1e-300)[:, None], 0.0)
-    return found
+        basis[k] = np.where(independent[:, None], values / np.maximum(left, 1e-300)[:, None], 0.0)
+    return basis

@@ -75,7 +75,7 @@ class MeansByNoise:
     ) -> MeansByNoise:
         """Return the products of `means` (m, k), the options' columns and the data, at each noise."""
         options = OptionPairs.of(slices)
-        found: dict[Noise, MeanProducts] = {}
+        products: dict[Noise, MeanProducts] = {}
         for tau_s in dict.fromkeys(noise.tau_s for noise in noises):
             modes = DriftModes.of(tau_s, white_var, design.t_s, design.run)
             here = [noise for noise in noises if noise.tau_s == tau_s]
@@ -86,10 +86,10 @@ class MeansByNoise:
             with_data = shares @ (columns * columns[:, -1:])
             for k, noise in enumerate(here):
                 weighted = shares[k][:, None] * base
-                found[noise] = MeanProducts(
+                products[noise] = MeanProducts(
                     noise, log_dets[k], weighted.T @ base, weighted.T @ columns, pairs[k], with_data[k]
                 )
-        return MeansByNoise(white_var, noises, slices, options, [found[noise] for noise in noises])
+        return MeansByNoise(white_var, noises, slices, options, [products[noise] for noise in noises])
 
 
 def gains_by_noise(means: MeansByNoise, others: NonMeanProducts) -> tuple[
@@ -122,8 +122,8 @@ def _projected(of_base: NDArray[np.float64], crossed: NDArray[np.float64]) -> tu
     size = np.sqrt(np.maximum(np.diag(of_base), 1e-300))
     scaled = of_base / np.outer(size, size) + 1e-10 * np.eye(len(size))
     factor = cholesky(scaled, lower=True, check_finite=False)
-    found = solve_triangular(factor, crossed / size[:, None], lower=True, check_finite=False)
-    return found, 2.0 * float((np.log(np.diag(factor)) + np.log(size)).sum())
+    projected = solve_triangular(factor, crossed / size[:, None], lower=True, check_finite=False)
+    return projected, 2.0 * float((np.log(np.diag(factor)) + np.log(size)).sum())
 
 
 def _log_p(noise: Noise, log_det: float, chi2: float) -> float:

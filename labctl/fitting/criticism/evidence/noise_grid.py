@@ -76,9 +76,9 @@ def _correlation(times: bytes, tau_s: float) -> NDArray[np.float64]:
     t_s = np.frombuffer(times, dtype=np.float64)
     lag = np.abs(t_s[:, None] - t_s[None, :])
     taus = (tau_s,) if tau_s > 0 else MIXTURE_S
-    found = np.mean([np.exp(-lag / tau) for tau in taus], axis=0)
-    found.setflags(write=False)
-    return np.asarray(found)
+    autocorrelation = np.mean([np.exp(-lag / tau) for tau in taus], axis=0)
+    autocorrelation.setflags(write=False)
+    return np.asarray(autocorrelation)
 
 
 def factors(
@@ -115,10 +115,10 @@ class DriftModes:
 
     def amplitudes(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return values (m, k) as amplitudes of the modes, (m, k), over white noise."""
-        found = np.empty_like(values)
+        mode_amplitudes = np.empty_like(values)
         for rows, modes in self.blocks:
-            found[rows] = modes.T @ values[rows]
-        return found
+            mode_amplitudes[rows] = modes.T @ values[rows]
+        return mode_amplitudes
 
     def weights(self, size_dps: float) -> tuple[Array, float]:
         """Return the factors (m,) that whiten amplitudes where the drift has a size, and the log determinant."""
@@ -162,7 +162,7 @@ def whiten(
     blocks: list[tuple[NDArray[np.int64], NDArray[np.float64]]], values: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Return values (m,) or (m, k) whitened by the Cholesky factors of their covariance, run by run."""
-    found = np.empty_like(values)
+    whitened = np.empty_like(values)
     for rows, factor in blocks:
-        found[rows] = solve_triangular(factor, values[rows], lower=True, check_finite=False)
-    return found
+        whitened[rows] = solve_triangular(factor, values[rows], lower=True, check_finite=False)
+    return whitened

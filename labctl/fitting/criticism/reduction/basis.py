@@ -33,7 +33,7 @@ def orthonormal_basis(
     if angle is not None:
         wanted += [wave(k * angle) for k in WAVES for wave in (np.cos, np.sin)]
     functions = [*lines, *wanted]
-    found = np.zeros((len(functions), *there.shape))
+    basis = np.zeros((len(functions), *there.shape))
     present = np.zeros((len(functions), len(there)), dtype=bool)
     count = np.maximum(there.sum(axis=1), 1.0)
     for k, function in enumerate(functions):
@@ -41,11 +41,11 @@ def orthonormal_basis(
         size = np.sqrt((values**2).sum(axis=1))
         steady = np.abs(values.sum(axis=1)) / np.maximum(size * np.sqrt(count), 1e-300)
         for _ in range(2):
-            inner = np.einsum("rmn,mn->rm", found[:k], values)
-            values = values - np.einsum("rm,rmn->mn", inner, found[:k])
+            inner = np.einsum("rmn,mn->rm", basis[:k], values)
+            values = values - np.einsum("rm,rmn->mn", inner, basis[:k])
         left = np.sqrt((values**2).sum(axis=1))
         present[k] = left > np.maximum(LEAST_INDEPENDENT_SHARE * size, 1e-9)
         if k < len(lines):
             present[k] &= steady < STEADY
-        found[k] = np.where(present[k][:, None], values / np.maximum(left, 1e-300)[:, None], 0.0)
-    return found[len(lines) :], present[len(lines) :]
+        basis[k] = np.where(present[k][:, None], values / np.maximum(left, 1e-300)[:, None], 0.0)
+    return basis[len(lines) :], present[len(lines) :]

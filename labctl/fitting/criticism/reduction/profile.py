@@ -92,15 +92,15 @@ def _basis(
     functions: list[Array], index: NDArray[np.int64], there: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Return orthonormal functions, (R, m, B), and which exist in which piece, (R, m): by Gram-Schmidt, twice."""
-    found = np.zeros((len(functions), *there.shape))
+    basis = np.zeros((len(functions), *there.shape))
     present = np.zeros((len(functions), len(there)), dtype=bool)
     for k, function in enumerate(functions):
         values = function[index] * there
         size = np.sqrt((values**2).sum(axis=1))
         for _ in range(2):
-            inner = np.einsum("rmb,mb->rm", found[:k], values)
-            values = values - np.einsum("rm,rmb->mb", inner, found[:k])
+            inner = np.einsum("rmb,mb->rm", basis[:k], values)
+            values = values - np.einsum("rm,rmb->mb", inner, basis[:k])
         left = np.sqrt((values**2).sum(axis=1))
         present[k] = left > np.maximum(LEAST_INDEPENDENT_SHARE * size, 1e-9)
-        found[k] = np.where(present[k][:, None], values / np.maximum(left, 1e-300)[:, None], 0.0)
-    return found, present
+        basis[k] = np.where(present[k][:, None], values / np.maximum(left, 1e-300)[:, None], 0.0)
+    return basis, present

@@ -57,12 +57,12 @@ def channels_of_free_shape(
         rivals = _shapes(first, axis)
         options = [shape for shapes in rivals.values() for shape in shapes]
         own = _named(first, axis, terms, catalogue)
-        found = _weighed(first, beside, axis, replace(first.designs[axis], options=[*options, *own])).log_bf
+        log_bf_by_shape = _weighed(first, beside, axis, replace(first.designs[axis], options=[*options, *own])).log_bf
         for channels, shapes in rivals.items():
-            here, found = found[: len(shapes)], found[len(shapes) :]
+            here, log_bf_by_shape = log_bf_by_shape[: len(shapes)], log_bf_by_shape[len(shapes) :]
             free[channels] = free.get(channels, 0.0) + float(here.max(initial=0.0))
         wrong_by = beside.axes[axis].log_p - _weighed(first, beside, axis, replace(exact, options=[])).log_p
-        named += float(found.max(initial=0.0)) + max(wrong_by, 0.0)
+        named += float(log_bf_by_shape.max(initial=0.0)) + max(wrong_by, 0.0)
     best = max(free, key=lambda channels: free[channels], default=())
     return best if best and free[best] > max((1 + SHARE_LEFT) * named, least) + LEAD else ()
 
@@ -93,14 +93,14 @@ def _shapes(comparison: Comparison, axis: str) -> dict[tuple[str, ...], list[Can
         return {}
     rate = channels[RATE] / max(float(np.abs(channels[RATE]).max()), 1e-9)
     of_rate = np.asarray(legvander(rate, max(OF_BOTH)), dtype=np.float64)
-    found: dict[tuple[str, ...], list[CandidateShape]] = {
+    shapes: dict[tuple[str, ...], list[CandidateShape]] = {
         (RATE,): [_shape(comparison, RATE, of_rate[:, 1 : degree + 1]) for degree in OF_RATE]
     }
     if TEMPERATURE in channels:
         warm = channels[TEMPERATURE]
         of_warm = legvander(2 * (warm - warm.min()) / np.ptp(warm) - 1, max(OF_BOTH)).astype(np.float64)
-        found[RATE, TEMPERATURE] = [_shape(comparison, RATE, _products(of_rate, of_warm, d)) for d in OF_BOTH]
-    return found
+        shapes[RATE, TEMPERATURE] = [_shape(comparison, RATE, _products(of_rate, of_warm, d)) for d in OF_BOTH]
+    return shapes
 
 
 def _products(first: NDArray[np.float64], other: NDArray[np.float64], degree: int) -> NDArray[np.float64]:

@@ -99,14 +99,14 @@ class _Axis:
         base, _, precision = base_rows(data, model, self.name)
         base = base / self.scale[:, :, None]
         seen, left = data.present & ~mask, data.present & mask
-        found = []
+        axis_errors = []
         for rows, prior in (
             (base, precision),
             (np.concatenate([base, self.added], axis=2), np.concatenate([precision, self.precision])),
         ):
             values = _solved(rows[seen], self.y[seen], prior)
-            found.append(float(np.sum((self.y[left] - rows[left] @ values) ** 2)))
-        return found[0], found[1]
+            axis_errors.append(float(np.sum((self.y[left] - rows[left] @ values) ** 2)))
+        return axis_errors[0], axis_errors[1]
 
 
 def _solved(rows: NDArray[np.float64], y: Array, precision: Array) -> Array:

@@ -78,10 +78,10 @@ def _along(comparison: Comparison, candidate: Candidate, kind: Effect, term: Ter
     def with_value(logarithm: float) -> Term:
         return replace(term, parameters={**term.parameters, name: float(np.exp(logarithm))})
 
-    found = minimize_scalar(
+    optimum = minimize_scalar(
         lambda value: -gain(with_value(value)), bounds=(low, high), method="bounded", options={"maxiter": EVALUATIONS}
     )
-    return with_value(float(found.x)) if -found.fun > gain(term) else term
+    return with_value(float(optimum.x)) if -optimum.fun > gain(term) else term
 
 
 def _gain_function(comparison: Comparison, candidate: Candidate, kind: Effect) -> Callable[[Term], float]:

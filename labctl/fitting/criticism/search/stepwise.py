@@ -78,10 +78,10 @@ def _within_and_between(comparison: Comparison, candidate: Candidate) -> NDArray
     """Return the shares of a candidate's signal beside the base that lie within data sets, and between them."""
     total = np.zeros(2)
     for axis, index in candidate.option.items():
-        design, found = comparison.designs[axis], comparison.axes[axis]
-        values, _ = solve_option(found.best, found.slices[index])
+        design, axis_comparison = comparison.designs[axis], comparison.axes[axis]
+        values, _ = solve_option(axis_comparison.best, axis_comparison.slices[index])
         scale = comparison.scales[axis].copy()
-        scale[0] = np.sqrt(comparison.white_var[axis] + found.best.noise.size_dps**2)
+        scale[0] = np.sqrt(comparison.white_var[axis] + axis_comparison.best.noise.size_dps**2)
         kept = design.present
         base, signal = (rows[kept] / scale[kept][:, None] for rows in (design.base, design.options[index].rows))
         size = np.maximum(np.linalg.norm(base, axis=0), 1e-300)
@@ -172,16 +172,16 @@ def _searched(first: Comparison, catalogue: Mapping[str, Effect]) -> tuple[Verdi
             findings = []
         form = _form(findings) if findings else "unexplained"
     depends = depends or step.depends_on or _driver_of(initial, step)
-    found = with_exact_terms(first, tuple(finding.term for finding in findings))
+    with_findings = with_exact_terms(first, tuple(finding.term for finding in findings))
     if findings:
         wrong_by = together([finding.discrepancy for finding in findings])
-        beside = beside_terms(first, found, wrong_by) if final is initial else final  # a pair is not in `final`
-        if channels := channels_of_free_shape(first, beside, found, catalogue):
+        beside = beside_terms(first, with_findings, wrong_by) if final is initial else final  # a pair is not in `final`
+        if channels := channels_of_free_shape(first, beside, with_findings, catalogue):
             return _unnamed(initial, (*channels, *(name for name in depends if name not in channels)))
-    remainder = remainder_of(first, final, found, catalogue) if findings else None
+    remainder = remainder_of(first, final, with_findings, catalogue) if findings else None
     if remainder is not None and remainder["share"] > MOST_LEFT:
         return _unnamed(initial, tuple(remainder["depends_on"]))
-    terms = {term.effect: term for term in found}
+    terms = {term.effect: term for term in with_findings}
     kept = depends if findings or form == "unexplained" else ()
     groups = tuple(finding.group for finding in findings)
     alike = not_physical_group(initial, step.leader) if step.leader is not None and findings else ()
@@ -261,11 +261,11 @@ def _finding(comparison: Comparison, step: Step, catalogue: Mapping[str, Effect]
         term = refined_term(comparison, known[name])
         if not held_out_rises(comparison, (term,), catalogue):
             left, chosen = [name], known[name]
-            found = term
+            missing_term = term
     if not left or (len(left) == 1 and chosen.log_bf < step.leader.log_bf - LEAD):
         return None
     axes = axes_of(comparison, chosen)
-    return Finding(tuple(left), found, chosen.log_bf, discrepancies(comparison, chosen), axes)
+    return Finding(tuple(left), missing_term, chosen.log_bf, discrepancies(comparison, chosen), axes)
 
 
 def _compared_beside(
@@ -286,13 +286,13 @@ def _finding_beside(first: Comparison, findings: Sequence[Finding], catalogue: M
 
 def _refined_findings(first: Comparison, findings: Sequence[Finding], catalogue: Mapping[str, Effect]) -> list[Finding]:
     """Return findings, each sought again beside the others: the first was found before the others were known."""
-    found = list(findings)
-    for k in range(len(found)):
-        others = found[:k] + found[k + 1 :]
+    refined = list(findings)
+    for k in range(len(refined)):
+        others = refined[:k] + refined[k + 1 :]
         again = _finding_beside(first, others, catalogue)
         if again is not None and not set(again.group) & {name for other in others for name in other.group}:
-            found[k] = again
-    return found
+            refined[k] = again
+    return refined
 
 
 def _judged(comparison: Comparison, catalogue: Mapping[str, Effect], *, first: bool = True) -> tuple[Comparison, Step]:

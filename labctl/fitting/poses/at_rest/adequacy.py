@@ -30,19 +30,19 @@ class Adequacy:
         return "unexplained" if self.heldout_g > UNEXPLAINED * self.expected_g else "adequate"
 
 
-def adequacy_of(found: Accelerometer, rests: Rests, known: NDArray[np.float64] | None = None) -> Adequacy:
+def adequacy_of(accelerometer: Accelerometer, rests: Rests, known: NDArray[np.float64] | None = None) -> Adequacy:
     """Return what is left of each rest by a fit to the others.
 
     The fit without a rest is that to all with one unknown more, which absorbs its residual: none is made again. `known`
     are the rows (m, 9), of variance 1, of what was known of the parameters before.
     """
-    accel_g, sigma = rests.accel_g[found.used], found.u_rest_g[found.used]
-    forces = np.linalg.solve(np.eye(3) + found.errors, (accel_g - found.bias_g).T).T
-    residual = np.linalg.norm(forces, axis=1) - found.gravity_g
-    white = rests.accel_white_var.mean(axis=1)[found.used]
-    jacobian = size_jacobian(found.errors, found.bias_g, accel_g) / sigma[:, None]
-    before = np.linalg.norm(accel_g, axis=1) - found.gravity_g
-    return left_out_adequacy(residual, jacobian, found.covariance, sigma, white, before, known)
+    accel_g, sigma = rests.accel_g[accelerometer.used], accelerometer.u_rest_g[accelerometer.used]
+    forces = np.linalg.solve(np.eye(3) + accelerometer.errors, (accel_g - accelerometer.bias_g).T).T
+    residual = np.linalg.norm(forces, axis=1) - accelerometer.gravity_g
+    white = rests.accel_white_var.mean(axis=1)[accelerometer.used]
+    jacobian = size_jacobian(accelerometer.errors, accelerometer.bias_g, accel_g) / sigma[:, None]
+    before = np.linalg.norm(accel_g, axis=1) - accelerometer.gravity_g
+    return left_out_adequacy(residual, jacobian, accelerometer.covariance, sigma, white, before, known)
 
 
 def left_out_adequacy(

@@ -27,12 +27,12 @@ class Bias:
     @property
     def mean_dps(self) -> Array:
         """The bias over the recording at 0 g, (3,)."""
-        return np.array([float(found.values[0]) for found in self.solutions])
+        return np.array([float(solution.values[0]) for solution in self.solutions])
 
     @property
     def per_g(self) -> NDArray[np.float64]:
         """The bias that a specific force of one g adds, (3, 3) deg/s/g: axis of the gyro, axis of the force."""
-        return np.array([found.values[1:] for found in self.solutions])
+        return np.array([solution.values[1:] for solution in self.solutions])
 
 
 def bias_of(readings: PoseReadings, rests: Rests, force_g: NDArray[np.float64], used: NDArray[np.bool_]) -> Bias:
@@ -52,7 +52,7 @@ def bias_of(readings: PoseReadings, rests: Rests, force_g: NDArray[np.float64], 
         return solve(design[used], rest[used, axis], scatter)
 
     solutions = tuple(_with_earth(of(axis), axis, readings) for axis in range(3))
-    per_g = np.array([found.values[1:] for found in solutions])
+    per_g = np.array([solution.values[1:] for solution in solutions])
     left = rest - force_g @ per_g.T
     change = np.diff(left, axis=0)
     # robust: a pull at the cable in one rest is no drift
@@ -61,13 +61,13 @@ def bias_of(readings: PoseReadings, rests: Rests, force_g: NDArray[np.float64], 
     return Bias(left, np.sqrt(white + extra), solutions)
 
 
-def _with_earth(found: Solution, axis: int, readings: PoseReadings) -> Solution:
+def _with_earth(solution: Solution, axis: int, readings: PoseReadings) -> Solution:
     """Return a solution (4,) with what an unknown latitude adds to the uncertainty of the own axis' g-sensitivity.
 
     The vertical part of the Earth's rate, its sine, lies along the specific force in every pose and looks like one.
     """
     if readings.info.latitude_deg is not None:
-        return found
-    covariance = found.covariance.copy()
+        return solution
+    covariance = solution.covariance.copy()
     covariance[1 + axis, 1 + axis] += EARTH_RATE_DPS**2 / 3
-    return replace(found, covariance=covariance)
+    return replace(solution, covariance=covariance)

@@ -94,11 +94,11 @@ def by_fewer_poses(readings: PoseReadings, rests: Rests, known: Known) -> ByFewe
     errors, bias = matrices(theta)
     force = corrected(rests.accel_g, errors, bias)
     left = np.linalg.norm(force, axis=1) - gravity
-    found = Accelerometer(
+    result = Accelerometer(
         errors, bias, np.asarray(covariance, dtype=np.float64), unit(force), np.sqrt(white + extra),
         np.ones(len(rests), dtype=np.bool_), float(np.sqrt(np.mean(left**2))), gravity,
     )  # fmt: skip
-    return ByFewer(found, float(chdtrc(freedom, first)))
+    return ByFewer(result, float(chdtrc(freedom, first)))
 
 
 def _residual(
@@ -118,13 +118,13 @@ def _fitted(accel_g: NDArray[np.float64], gravity: float, variance: Array, known
     from scipy.optimize import least_squares
 
     sigma = np.sqrt(variance)
-    found = least_squares(
+    optimum = least_squares(
         lambda theta: _residual(theta, accel_g, gravity, sigma, known),
         np.concatenate([known.bias_g, known.errors]),
         lambda theta: _jacobian(theta, accel_g, sigma, known),
         x_scale="jac",
     )
-    return np.asarray(found.x, dtype=np.float64), 2 * float(found.cost)
+    return np.asarray(optimum.x, dtype=np.float64), 2 * float(optimum.cost)
 
 
 def _between(accel_g: NDArray[np.float64], gravity: float, white: Array, known: Known, freedom: int) -> float:

@@ -93,11 +93,11 @@ def _one_code(series: Series, name: str, step: float) -> Marked:
 
 def frozen_rows(series: Series, name: str, values: Array) -> Rows:
     """Return which rows, (n,), are in a run of equal readings that is no accident."""
-    found = np.zeros(len(values), dtype=bool)
+    is_frozen = np.zeros(len(values), dtype=bool)
     # a run of k+1 equal readings is k steps of 0
     steady = [(begin, end + 1) for begin, end in runs(np.diff(values) == 0)]
     if not steady:
-        return found
+        return is_frozen
     usual = [end - begin for begin, end in steady if end - begin <= USUAL_RUN]
     long = sum(end - begin for begin, end in steady if end - begin > USUAL_RUN)
     rest = len(values) - long
@@ -114,8 +114,8 @@ def frozen_rows(series: Series, name: str, values: Array) -> Rows:
             continue
         if is_coarse and not _would_move(series, slice(begin, end), gain, series.code_steps[name]):
             continue
-        found[begin:end] = True
-    return found
+        is_frozen[begin:end] = True
+    return is_frozen
 
 
 def _would_move(series: Series, rows: slice, gain: float, step: float) -> bool:

@@ -81,10 +81,10 @@ def _numbers(values: Array) -> list[float | None]:
     return [float(value) if np.isfinite(value) else None for value in values.tolist()]
 
 
-def marks_of(recording: Recording, found: Sequence[Marked]) -> list[MarkJson]:
+def marks_of(recording: Recording, marked: Sequence[Marked]) -> list[MarkJson]:
     """Return where each finding is, by time."""
-    t_s = np.asarray(recording.columns["t_s"], dtype=np.float64) if found else np.zeros(0)
-    return [_mark(each, t_s) for each in found]
+    t_s = np.asarray(recording.columns["t_s"], dtype=np.float64) if marked else np.zeros(0)
+    return [_mark(each, t_s) for each in marked]
 
 
 def _mark(marked: Marked, t_s: Array) -> MarkJson:
@@ -244,15 +244,15 @@ def _rows(recording: Recording, kept: Rows | Indices) -> Recording:
 
 
 def _spread(rows: Rows, at: Indices, n: int) -> Rows:
-    found = np.zeros(n, dtype=bool)
-    found[at[rows]] = True
-    return found
+    is_apart = np.zeros(n, dtype=bool)
+    is_apart[at[rows]] = True
+    return is_apart
 
 
 def examination(recording: Recording) -> Examination:
     """Return what is wrong with the readings of a recording, and the course of its channels."""
-    found = examine(recording)
-    return Examination([each.finding for each in found], courses_of(recording), marks_of(recording, found))
+    faults = examine(recording)
+    return Examination([each.finding for each in faults], courses_of(recording), marks_of(recording, faults))
 
 
 def joined_examinations(parts: Sequence[Examination]) -> Examination:
@@ -274,13 +274,13 @@ def _of_values(recording: Recording, series: Series, at: Indices) -> list[Marked
     repeated = list(check_repeated(series, _all(frozen, n)))
     clipped = list(check_clipped(series, _all(repeated, n)))
     shifted = list(check_shifted(series))
-    found = [*frozen, *repeated, *clipped, *check_thermometers(series), *shifted]
+    faults = [*frozen, *repeated, *clipped, *check_thermometers(series), *shifted]
     # what is written again is no reading, and makes the noise look smaller; a shifted row is none of its outputs
     once = np.flatnonzero(~_all([*repeated, *shifted], n))
     alone = series if len(once) == n else series_of(_rows(recording, at[once]))
     if alone is not None:
-        found += [replace(each, rows=_spread(each.rows, once, n)) for each in _of_each(alone)]
-    return [each for each in found if not _is_explained(each, found)]
+        faults += [replace(each, rows=_spread(each.rows, once, n)) for each in _of_each(alone)]
+    return [each for each in faults if not _is_explained(each, faults)]
 
 
 def _of_each(series: Series) -> Iterator[Marked]:
@@ -292,12 +292,12 @@ def _of_each(series: Series) -> Iterator[Marked]:
         yield from check(series)
 
 
-def _all(found: list[Marked], n: int) -> Rows:
-    return np.any([each.rows for each in found], axis=0) if found else np.zeros(n, dtype=bool)
+def _all(marked: list[Marked], n: int) -> Rows:
+    return np.any([each.rows for each in marked], axis=0) if marked else np.zeros(n, dtype=bool)
 
 
-def _is_explained(one: Marked, found: list[Marked]) -> bool:
-    for other in found:
+def _is_explained(one: Marked, marked: list[Marked]) -> bool:
+    for other in marked:
         if one.finding.what not in EXPLAINS.get(other.finding.what, frozenset()):
             continue
         if other.finding.what not in OF_CHANNEL or other.finding.channel == one.finding.channel:

@@ -52,7 +52,7 @@ def check_factors(series: Series) -> Iterator[Marked]:
     """Yield the outputs whose level and noise are both multiplied by one known factor from a row on."""
     if series.motion not in ("rest", "rates"):
         return  # where the rate changes all the time no level is known beside a row
-    found: dict[str, tuple[int, Change]] = {}
+    by_change: dict[str, tuple[int, Change]] = {}
     for name, values in series.outputs.items():
         if series.code_steps[name] > COARSE * series.noises[name]:
             continue
@@ -62,8 +62,8 @@ def check_factors(series: Series) -> Iterator[Marked]:
             if (change := _change(series, values[part], rows))
         ]
         if changes:
-            found[name] = max(changes, key=lambda each: each[1].size)
-    for name, (start, change) in found.items():
+            by_change[name] = max(changes, key=lambda each: each[1].size)
+    for name, (start, change) in by_change.items():
         yield _marked(series, name, start + change.row, change)
 
 

@@ -23,9 +23,9 @@ def without(recording: Recording, kinds: Sequence[str], name: str) -> Recording:
     What is left out is stated in `left_out` of its head. Nothing is removed: the readings stay as they were measured.
     Raises BadInput for readings that cannot be left out, and where no reading would stay.
     """
-    found = [each for each in examine(recording) if ALL in kinds or each.finding.what in kinds]
-    chosen = [each for each in found if each.finding.may_leave_out]
-    if refused := [each.finding for each in found if not each.finding.may_leave_out and each.finding.what in kinds]:
+    faults = [each for each in examine(recording) if ALL in kinds or each.finding.what in kinds]
+    chosen = [each for each in faults if each.finding.may_leave_out]
+    if refused := [each.finding for each in faults if not each.finding.may_leave_out and each.finding.what in kinds]:
         raise BadInput(f"{name}: {refused[0].where}: cannot be left out: {refused[0].said}; {refused[0].do}")
     if not chosen:
         return recording

@@ -75,23 +75,23 @@ def _pieces(series: Series) -> list[list[slice]]:
     readings = min(1 << int(np.log2(np.median(long))), MOST_READINGS)
     if len(series.parts) == 1 and long[0] < 8 * readings:
         readings = max(readings // 4, LEAST_READINGS)
-    found = []
+    pieces = []
     for part in series.parts:
         begins = range(part.start, part.stop - readings + 1, readings // 2)
-        found.append([slice(begin, begin + readings) for begin in begins])
-    return [same for same in found if same]
+        pieces.append([slice(begin, begin + readings) for begin in begins])
+    return [same for same in pieces if same]
 
 
 def _over_background(spectrum: Array) -> Array:
     """Return a spectrum (k,) over what is beside each bin; 0 in the first bins, where drift is."""
     padded = np.log(np.maximum(spectrum, 1e-300))
-    found = np.zeros(len(spectrum))
+    excess = np.zeros(len(spectrum))
     for k in range(FIRST_BIN, len(spectrum)):
         left = padded[max(k - GUARD - BACKGROUND, 1) : k - GUARD]
         right = padded[k + GUARD + 1 : k + GUARD + 1 + BACKGROUND]
         sides = [float(np.median(side)) for side in (left, right) if len(side) >= 2]
-        found[k] = np.exp(padded[k] - max(sides))
-    return found
+        excess[k] = np.exp(padded[k] - max(sides))
+    return excess
 
 
 def _peak(spectrum: Array, hz: Array, k: int) -> float:

@@ -225,20 +225,20 @@ def medians_around(values: Array, readings: int) -> Array:
     """Return the median of the `readings` (odd) values around each of (n,); the ends are repeated."""
     half = readings // 2
     padded = np.pad(values, half, mode="edge")
-    found = np.empty(len(values))
+    medians = np.empty(len(values))
     for begin in range(0, len(values), 50_000):  # a window of every row at once would take too much memory
         end = min(begin + 50_000, len(values))
         window = np.lib.stride_tricks.sliding_window_view(padded[begin : end + 2 * half], readings)
-        found[begin:end] = np.median(window, axis=1)
-    return found
+        medians[begin:end] = np.median(window, axis=1)
+    return medians
 
 
 def rows_in_words(rows: Rows) -> str:
     """Return "row 7" or "rows 7 to 20 and 3 more places"; rows count from 1."""
-    found = list(runs(rows))
-    if not found:
+    row_runs = list(runs(rows))
+    if not row_runs:
         return "no row"
-    begin, end = found[0]
+    begin, end = row_runs[0]
     first = f"row {begin + 1}" if end == begin + 1 else f"rows {begin + 1} to {end}"
-    more = len(found) - 1
+    more = len(row_runs) - 1
     return first + (f" and {more} more place{'s' if more > 1 else ''}" if more else "")

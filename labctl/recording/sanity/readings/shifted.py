@@ -37,8 +37,8 @@ def check_shifted(series: Series) -> Iterator[Marked]:
         turns = sorted((stretches[::2], stretches[1::2]), key=lambda part: sum(end - begin for begin, end in part))
         rows, said = np.zeros(n, dtype=bool), ""
         for begin, end in turns[0]:
-            if found := _exchanged(series, name, begin, end):
-                rows[begin:end], said = True, found
+            if exchanged := _exchanged(series, name, begin, end):
+                rows[begin:end], said = True, exchanged
         if not said:
             continue
         yield Marked(
